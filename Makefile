@@ -26,7 +26,7 @@ help:
 	@echo "  make reproduce-full   Table 5 and all readings from searches of full size; about fourteen hours on two cores"
 	@echo "  make reproduce-larger   of it only 75 x 25 beside 500 x 200 on 685 samples; about an hour and a half"
 	@echo "  make hexarotor   a six-rotor study with a rigid body under the fuzzy part"
-	@echo "  make full-circle full rotations of a held vehicle: the structure that wins, and a sweep over twelve others"
+	@echo "  make full-circle full rotations of a held vehicle: the structure that wins, and twelve others"
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
 	@echo "  make gap-example [HIDDEN=NAME=VALUES]   a flight with a hidden effect, and what the gap workflow makes of it"
 	@echo "  make replay-example   a vehicle that is not what its config states: found in flights, and what it predicts then"
@@ -108,7 +108,7 @@ PART_simulate := vehicle simulation
 PART_import := import vehicle identification.training_share
 PART_reduce := reduction $(addprefix identification.,$(STRUCTURE))
 PART_identify := identification
-PART_sweep := reduction identification sweep
+PART_searches := reduction identification
 PART_report := vehicle report
 
 define part
@@ -117,7 +117,7 @@ data/%/.part/$(1).yaml: configs/%.yaml FORCE | $(INSTALLED)
 	@{ echo "# $$$$($(CPFLS) --version)"; $(CPFLS) config $$< $(foreach key,$(PART_$(1)),--section $(key)); } > $$@.new
 	@if cmp --silent $$@.new $$@; then rm $$@.new; else mv $$@.new $$@; fi
 endef
-$(foreach stage,trajectory simulate import reduce identify sweep report,$(eval $(call part,$(stage))))
+$(foreach stage,trajectory simulate import reduce identify searches report,$(eval $(call part,$(stage))))
 
 data/%/trajectory.h5: data/%/.part/trajectory.yaml
 	$(CPFLS) trajectory configs/$*.yaml -o $@ --force
@@ -133,59 +133,38 @@ TABLE_4_SIZES := 1170 2743
 data/paper/selection-%.h5: data/paper/flight.h5 data/paper/.part/reduce.yaml
 	$(CPFLS) reduce configs/paper.yaml $< -o $@ --force --set reduction.size=$*
 
-# Stopped and started again a sweep goes on where it was.
-resumed = --force $(if $(wildcard $@.partial),--resume)
-# What an interrupt left is newer than its inputs all the same.
-$(foreach left,$(wildcard data/*/*.h5.partial),$(eval $(left:.partial=): FORCE))
-data/%/sweep.h5: data/%/flight.h5 data/%/.part/sweep.yaml
-	$(CPFLS) sweep configs/$*.yaml $< -o $@ $(resumed) $(CHOSEN_ON)
-
+# Stopped and started again searches go on where they were.
+SEARCHES = $(BIN)/python -m benchmarks.paper.searches --force
 # Table 5 in two parts of equal length, each named by its first seed; what follows is in small pieces.
-SMALL := --set "sweep.set={identification.population: 40, identification.generations: 10}"
-data/paper/sweep-%.h5 data/paper/full-%.h5: SEEDS := 5
-# One of two progress bars is enough.
-data/paper/sweep-6.h5 data/paper/full-6.h5: QUIET := --quiet
-data/paper/sweep-%.h5: data/paper/flight.h5 data/paper/.part/sweep.yaml
-	$(CPFLS) sweep configs/paper.yaml $< -o $@ $(resumed) --seed $* --set sweep.seeds=$(SEEDS) $(SMALL) $(QUIET)
+data/paper/searches-%.h5: data/paper/flight.h5 data/paper/.part/searches.yaml
+	$(SEARCHES) configs/paper.yaml $< table-5 -o $@ --seed $* --seeds 5 --population 40 --generations 10
 
-data/paper/full-%.h5: data/paper/flight.h5 data/paper/.part/sweep.yaml
-	$(CPFLS) sweep configs/paper.yaml $< -o $@ $(resumed) --seed $* --set sweep.seeds=$(SEEDS) $(QUIET)
+data/paper/full-%.h5: data/paper/flight.h5 data/paper/.part/searches.yaml
+	$(SEARCHES) configs/paper.yaml $< table-5 -o $@ --seed $* --seeds 5
 
 # What the paper leaves open, combined: two flights, three noises of the torque, four choices of samples, and whether
 # errors are taken over the whole flight or over the samples learned from.
-comma := ,
-CRITERIA := paper-literal sigma_min even KD-exchange
-BASES := training learned
-chosen = $(comma) {name: "cpFLS$(comma) $(1) samples by $(2)$(comma) judged on $(3)"$(comma) set: {reduction.size: \
-	$(1)$(comma) reduction.criterion: $(2)$(comma) identification.judged_on: $(3)}}
-read_as = --set 'sweep.set={identification.population: $(1)$(comma) identification.generations: $(2)$(comma) \
-	identification.local_search.reinsert: always}' --set 'sweep.settings=[{name: "FLS$(comma) all samples"$(comma) \
-	set: {identification.structure: fls$(comma) reduction.size: null}}$(comma) {name: "cpFLS$(comma) all samples"$(comma) \
-	set: {reduction.size: null}}$(foreach n,$(3),$(foreach c,$(CRITERIA),$(foreach b,$(BASES),$(call chosen,$(n),$(c),$(b)))))]'
 define reading
 data/$(1)/noise-$(2).h5: data/$(1)/trajectory.h5 data/$(1)/.part/simulate.yaml
 	$(CPFLS) simulate configs/$(1).yaml $$< -o $$@ --force --set simulation.relative_noise.torque=$(2)
 
-data/$(1)/readings-$(2).h5: data/$(1)/noise-$(2).h5 data/$(1)/.part/sweep.yaml
-	$(CPFLS) sweep configs/$(1).yaml $$< -o $$@ $$(resumed) --set simulation.relative_noise.torque=$(2) \
-		--set sweep.seeds=10 $$(call read_as,20,5,685)
+data/$(1)/readings-$(2).h5: data/$(1)/noise-$(2).h5 data/$(1)/.part/searches.yaml
+	$(SEARCHES) configs/$(1).yaml $$< readings -o $$@ $$(READ) --set simulation.relative_noise.torque=$(2) \
+		--population 20 --generations 5 --samples 685
 
-data/$(1)/readings-full-$(2).h5: data/$(1)/noise-$(2).h5 data/$(1)/.part/sweep.yaml
-	$(CPFLS) sweep configs/$(1).yaml $$< -o $$@ $$(resumed) --set simulation.relative_noise.torque=$(2) \
-		--set sweep.seeds=10 $$(call read_as,75,25,2743 1170 685)
+data/$(1)/readings-full-$(2).h5: data/$(1)/noise-$(2).h5 data/$(1)/.part/searches.yaml
+	$(SEARCHES) configs/$(1).yaml $$< readings -o $$@ $$(READ) --set simulation.relative_noise.torque=$(2) \
+		--population 75 --generations 25 --samples 2743 --samples 1170 --samples 685
 endef
+READ := --set identification.local_search.reinsert=always
 NOISES := 0 0.01 0.05
 FLIGHTS := paper paper-gentle
 $(foreach flight,$(FLIGHTS),$(foreach noise,$(NOISES),$(eval $(call reading,$(flight),$(noise)))))
 read = $(foreach flight,$(FLIGHTS),$(NOISES:%=data/$(flight)/$(1)-%.h5))
 
 # The smaller search beside the paper's, on its own.
-data/paper/larger-%.h5: SEEDS := 5
-data/paper/larger-6.h5: QUIET := --quiet
-LARGER := {name: "cpFLS, 685 samples"}, {name: "cpFLS, 685 samples, 75 x 25", \
-	set: {identification.population: 75, identification.generations: 25}}
-data/paper/larger-%.h5: data/paper/flight.h5 data/paper/.part/sweep.yaml
-	$(CPFLS) sweep configs/paper.yaml $< -o $@ $(resumed) --seed $* --set sweep.seeds=$(SEEDS) $(QUIET) --set 'sweep.settings=[$(LARGER)]'
+data/paper/larger-%.h5: data/paper/flight.h5 data/paper/.part/searches.yaml
+	$(SEARCHES) configs/paper.yaml $< larger -o $@ --seed $* --seeds 5
 
 # No artifact holds a time, so what the report says of time is measured for it and given to it.
 data/paper/times.json: benchmarks/reproduction_time.py data/paper/trajectory.h5
@@ -227,9 +206,20 @@ $(CIRCLE)/kept-trajectory.h5: $(CIRCLE)/.part/trajectory.yaml
 $(CIRCLE)/kept.h5: $(CIRCLE)/kept-trajectory.h5 $(CIRCLE)/.part/simulate.yaml
 	$(CPFLS) simulate configs/full-circle.yaml $< -o $@ --force
 
-$(CIRCLE)/sweep.h5: CHOSEN_ON := --choose-on $(CIRCLE)/kept.h5 --validate $(CIRCLE)/unseen.h5
-$(CIRCLE)/sweep.h5: $(CIRCLE)/kept.h5 $(CIRCLE)/unseen.h5
-$(CIRCLE)/report.html: $(CIRCLE)/sweep.h5
+# Structures beside the one that wins, as consequents-products-order-functions. Learned from all samples, chosen on a
+# flight kept for it and judged on another once; each is a file, so that a stopped loop goes on.
+STRUCTURES := $(addprefix seesaw-additive-2-,1 3 5 7) $(addprefix harmonic-additive-1-,1 3 5) \
+	$(addprefix harmonic-tensor-1-,1 3) harmonic-additive-2-3 $(addprefix harmonic-tensor-2-,1 3)
+of_structure = $(word $(1),$(subst -, ,$*))
+$(CIRCLE)/structures/%.h5: $(CIRCLE)/flight.h5 $(CIRCLE)/kept.h5 $(CIRCLE)/unseen.h5 $(CIRCLE)/.part/identify.yaml
+	@mkdir -p $(@D)
+	$(CPFLS) identify configs/full-circle.yaml $< --choose-on $(word 2,$^) --validate $(word 3,$^) -o $@ \
+		--force $(if $(wildcard $@.checkpoint),--resume) --set identification.choice=held-out \
+		--set identification.consequents=$(call of_structure,1) --set identification.products=$(call of_structure,2) \
+		--set identification.harmonic_order=$(call of_structure,3) --set identification.membership_functions=$(call of_structure,4) \
+		--set identification.validation.enabled=false
+
+$(CIRCLE)/report.html: $(STRUCTURES:%=$(CIRCLE)/structures/%.h5)
 
 # The real flight: its logs are in the folder LOGS.
 REAL := data/crazyflie
@@ -252,8 +242,8 @@ $(PAPER): data/paper-gentle/trajectory.h5
 $(PAPER): $(TABLE_4_SIZES:%=data/paper/selection-%.h5) data/paper/times.json
 $(PAPER): TIMES = --times data/paper/times.json
 $(PAPER) data/quick/report.html: $(wildcard benchmarks/paper/*.py)
-data/paper/report.html: data/paper/sweep-1.h5 data/paper/sweep-6.h5 $(call read,readings)
-data/paper/report-larger.html: data/paper/sweep-1.h5 data/paper/sweep-6.h5 data/paper/larger-1.h5 data/paper/larger-6.h5
+data/paper/report.html: data/paper/searches-1.h5 data/paper/searches-6.h5 $(call read,readings)
+data/paper/report-larger.html: data/paper/searches-1.h5 data/paper/searches-6.h5 data/paper/larger-1.h5 data/paper/larger-6.h5
 data/paper/report-full.html: data/paper/full-1.h5 data/paper/full-6.h5 $(call read,readings-full)
 
 # Two flights with an effect that the model lacks; the second is held out. HIDDEN takes several, or none.

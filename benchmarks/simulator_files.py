@@ -169,12 +169,20 @@ def _compared(
         # Of equal numbers in a line the one that differs is meant.
         before, true = min(numbers, key=lambda pair: (abs(pair[0] - change.before), pair[0] == pair[1]))
         true = before * true_gain / before_gain if change.element == "gear z" else true
+        if "mixing_matrix" in change.element:
+            # In lengths L, which are another in each file.
+            true_length, length = (float(found[1]) for text in (rights, wrongs) if (found := _length(text)))
+            true *= true_length / length
         true = dict(zip(("pose x", "pose y"), centre, strict=True)).get(change.element, true) if any(centre) else true
         if abs(true - before) > 1e-3 * abs(before):
             within.append(change.low <= true <= change.high)
         elif change.element not in FOLLOWS:
             others += 1
     return within, others
+
+
+def _length(lines: Sequence[str]) -> re.Match[str] | None:
+    return re.search(r"^L *= *(\S+)", "\n".join(lines), re.MULTILINE)
 
 
 def _named(hidden: Hidden, answers: Sequence[Answer]) -> Iterator[Any]:

@@ -16,12 +16,7 @@ _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
 def seconds(text: str) -> float:
-    """Read a duration, such as ``90``, ``90s``, ``10m`` or ``2h``.
-
-    Returns
-    -------
-    float, s
-    """
+    """Read a duration in s, such as ``90``, ``90s``, ``10m`` or ``2h``."""
     unit = _SECONDS.get(text[-1:])
     try:
         value = float(text if unit is None else text[:-1]) * (unit or 1.0)
@@ -118,8 +113,8 @@ AnywayOption = Annotated[
     bool,
     typer.Option(
         "--anyway",
-        help="Search in logs that contradict themselves, or are too slow to tell what is sought, too; nothing found "
-        "there is to be used.",
+        help="Search in logs that contradict themselves, or are too slow to identify what is sought, too; nothing "
+        "found there is to be used.",
     ),
 ]
 QuickOption = Annotated[
@@ -137,21 +132,6 @@ ExportAnywayOption = Annotated[
         "file says so first.",
     ),
 ]
-ResumeSweepOption = Annotated[
-    bool,
-    typer.Option("--resume", help="Go on with a sweep that was stopped, from OUTPUT.partial and OUTPUT.checkpoint."),
-]
-SweepTimeLimitOption = Annotated[
-    float | None,
-    typer.Option(
-        "--time-limit",
-        metavar="TIME",
-        parser=seconds,
-        help="Stop all runs together after TIME (90, 90s, 10m, 2h) and write the finished ones; --resume goes on.",
-    ),
-]
-
-
 PlayedArgument = Annotated[
     Path,
     typer.Argument(

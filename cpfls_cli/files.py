@@ -23,15 +23,7 @@ _PLAIN, _TIMES = 1 << 27, 200
 
 
 class Content(NamedTuple):
-    """What is known of a file whose bytes were all read.
-
-    Attributes
-    ----------
-    sha256 : str
-        Hexadecimal, of the whole file.
-    intact : bool
-        Whether it ends in a seal that fits what stands before it.
-    """
+    """What is known of a file whose bytes were all read: its hash, and whether it ends in a seal that fits."""
 
     sha256: str
     intact: bool

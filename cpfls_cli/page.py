@@ -223,12 +223,8 @@ def words(
 ) -> str:
     """Word a result by its template, in which it is ``r``.
 
-    Parameters
-    ----------
-    added : mapping of str to object, or None
-        What the template knows beside what all do; functions also as filters and tests.
-    **more : object
-        What it knows of this result.
+    `added`: what the template knows beside what all do, functions also as filters and tests; `more`: what it knows of
+    this result.
     """
     own = environment(folder, _NOTHING if added is None else added)
     return own.get_template(f"{template}.md.j2").render(r=given, **more)
@@ -328,12 +324,7 @@ def _name_cells(table: Sequence[Token]) -> None:
 def blocks(text: str, pictures: Mapping[str, Picture] | None = None, prefix: str = "") -> list[Block]:
     """Give a page as blocks, without headings of nothing and figures that are not given, as on a terminal.
 
-    Parameters
-    ----------
-    pictures : mapping of str to Picture, or None
-        Figures that are shown.
-    prefix : str
-        Before their names and those of tables on the page.
+    `prefix` stands before the names of shown figures and tables on the page.
     """
     made = list(_boxed(_blocks(tree(text), pictures or {}, prefix, count(1))))
     empty = (Heading, Folded, type(None))

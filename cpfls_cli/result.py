@@ -37,24 +37,10 @@ AXES = {"axis": 3}
 class About(NamedTuple):
     """What a value is.
 
-    Attributes
-    ----------
-    text : str
-        One line.
-    axes : tuple of str
-        Name of each axis of an array; two of one name in a result have one length.
-    unit, frame : str
-        ``1`` has no unit.
-    gaps : bool
-        Whether values may be missing: not finite.
-    least : float
-        Below which no value is.
-    ascends : bool
-        Whether each value is above the one before, and there are two at least.
-    brief : bool
-        Whether `--json` shows it too; what is not is in the file alone.
-    ragged : bool
-        Whether each row of a table has a length of its own of it.
+    `text`: one line; `axes`: name of each axis of an array, two of one name in a result have one length; `unit`: ``1``
+    is none; `gaps`: values may be missing, not finite; `least`: below which none is; `ascends`: each is above the one
+    before, and there are two at least; `brief`: `--json` shows it too, what is not is in the file alone; `ragged`: each
+    row of a table has a length of its own of it.
     """
 
     text: str

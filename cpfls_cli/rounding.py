@@ -1,4 +1,4 @@
-"""What rounding may not decide: numbers that differ by less than a computation can tell are equal.
+"""What rounding may not decide: numbers that differ by less than a computation resolves are equal.
 
 Another processor adds in another order, and so does another version of a library: what is computed differs in its last
 digits. Where two numbers are equal but for that, `<`, `min` and `sorted` would give every machine another word, name or

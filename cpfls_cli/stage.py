@@ -81,34 +81,13 @@ class Filled:
 class Run(Job):
     """One run of a stage; in a dry run it checks its inputs, and gives None in place of a result.
 
-    Attributes
-    ----------
-    writes : bool
-        False where the answer is only printed: the output then names nothing.
-    next : list of Command
-        To go on with.
-    exit_code : int
-        Of an answer that a script has to tell from others.
-    with_config : bool
-        Whether the stage takes a config, which its results hold.
-    files : dict of str to InputFile
-        Inputs of all results, by role.
-    outputs : list of Path
-        Files that will be written, as far as they are known before: no input is one of them.
-    also : dict of str to object
-        What ``--json`` says of this run beside its result.
-    last_words : str
-        Behind the answer.
-    texts : dict of Path to str or bytes
-        Other files that are written with the result.
-    said : list of Text
-        Of this run alone: its file says none of it again.
-    until_written : ExitStack
-        Contexts that last until the result is written, or it is sure that it will not be.
-    afterwards : list of callable
-        What is done when the result is written.
-    data : callable
-        Gives the config as plain data, with what the command line changes of it.
+    `writes`: False where the answer is only printed; `next`: commands to go on with; `exit_code`: of an answer that a
+    script has to distinguish; `with_config`: whether the stage takes a config, which its results hold; `files`:
+    inputs of all results, by role; `outputs`: files that will be written, as far as they are known before, no input is
+    one; `also`: what ``--json`` says beside its result; `last_words`: behind the answer; `texts`: other files that are
+    written with the result; `said`: of this run alone, its file says none of it again; `until_written`: contexts that
+    last until the result is written, or it is sure that it will not be; `afterwards`: done when it is; `data` gives the
+    config as plain data, with what the command line changes of it.
     """
 
     writes: bool = True
@@ -196,35 +175,17 @@ def _would(run: Run, stage: Stage) -> Outcome:
 class Stage:
     """A function with everything that makes it a command.
 
-    Attributes
-    ----------
-    function : callable
-        Takes a `Run` and what its command line says. It gives a result; or, of a stage that fills a
-        folder, results by name, with a page each; or None in a dry run; or the outcome of a command that goes on.
-    kind : type
-        Class of the result.
-    title : str
-        Of the section of a report that shows it.
-    figures : mapping from str to callable
-        Of each figure of the template its HTML, made of the result: `Drawn` of `report.canvas`, or a function.
-    words : mapping from str to object
-        What the template uses beside what all templates know: functions, also as filters and tests, and constants.
-    folder : bool
-        Whether its output is a folder with a page for each result; left out, the answer is only printed.
-    fills : Filled or None
-        Whether its output is a folder with one answer.
-    study : bool or callable
-        Whether it takes a config; or what separates it from what else was given, of one that declares its ``config``.
-    output : object
-        Option of its output where it is another than usual; may be left out. False of one that only answers.
-    several : bool
-        Whether options that may be repeated take all values that follow.
-    resumes : bool
-        Whether it can go on with what was stopped, and checks itself whether its output may be replaced.
-    overrides : callable or None
-        Gives overrides of the config that its options stand for.
-    together : callable
-        Gives the sources of a report that show its results: several may be shown as one.
+    `function` takes a `Run` and what its command line says. It gives a result; or, of a stage that fills a folder,
+    results by name, with a page each; or None in a dry run; or the outcome of a command that goes on.
+
+    `title` is of the section of a report; `figures`: of each figure of the template its HTML, made of the result,
+    `Drawn` of `report.canvas` or a function; `words`: what the template uses beside what all templates know; `folder`:
+    whether its output is a folder with a page for each result (left out, the answer is only printed); `fills`: whether
+    it is one with one answer; `study`: whether it takes a config, or what separates it from what else was given;
+    `output`: its option where it is another than usual, False of one that only answers; `several`: whether options that
+    may be repeated take all values that follow; `resumes`: whether it can go on with what was stopped, and checks
+    itself whether its output may be replaced; `overrides` gives those that its options stand for; `together` gives the
+    sources of a report that show its results.
     """
 
     function: Callable[..., Any]

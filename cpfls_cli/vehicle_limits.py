@@ -260,7 +260,7 @@ def figures_of(gravity: float = STANDARD_GRAVITY, **known: float) -> dict[str, f
 
 
 def figures_of_hubs(hubs: Array) -> dict[str, float]:
-    """Give the numbers that places of rotors tell, shape (rotor, 3), m; rotors in one place tell no size."""
+    """Give the numbers that places of rotors show, shape (rotor, 3), m; rotors in one place show no size."""
     with np.errstate(over="ignore"):
         arm = float(np.linalg.norm(hubs, axis=1).max())
     return {"arm": arm or nan, "room": room_between(hubs), "rotors": float(len(hubs))}

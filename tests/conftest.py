@@ -41,13 +41,15 @@ settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 
 
-@pytest.fixture
-def undrawn(request):
-    """Leave the pictures of pages away."""
-    with command_line.undrawn(told="data_of_figures" in request.fixturenames):
+@pytest.fixture(scope="session", autouse=True)
+def undrawn():
+    """Leave the pictures of pages away, but where a test looks at them."""
+    with command_line.undrawn():
         yield
 
 
 @pytest.fixture
-def data_of_figures():
-    """Keep the tables of what figures show where their pictures are left away."""
+def drawn():
+    """Draw the pictures of pages."""
+    with command_line.drawn():
+        yield

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,15 +20,14 @@ from benchmarks.paper.printed import (
     TABLE_5,
     PrintedColumn,
 )
-from cpfls_cli.identification.replicates import Setting
+from benchmarks.paper.replicates import Setting, Spread, Sweep, joined_sweeps
 from cpfls_cli.identification.scores import MODEL, TRAINING, Judged
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
-from cpfls_cli.stages.sweep import joined_sweeps
+from cpfls_cli.report.source import Source
 
 _LACKS_SWEEP = Text(
-    "Not shown, because no sweep was given: Table 5 with its means over several seeds; made by: cpfls sweep CONFIG "
-    "flight.h5 -o sweep.h5.",
+    "Not shown, because no searches were given: Table 5 with its means over several seeds; made by: make reproduce.",
     "note",
 )
 _PAPER_NOTE = Text(
@@ -54,7 +53,6 @@ def with_the_paper(section: Section, sources: PaperSources) -> Section:
 
 def _blocks(given: Sequence[Block], sources: PaperSources) -> Iterator[Block]:
     sweeps = [sweep.record.settings for sweep in joined_sweeps(sources.sweeps)]
-    shown = [settings for settings in sweeps if not compares_readings(settings)]
     in_sweeps = any(any(printed_beside(settings)) for settings in sweeps)
     for block in given:
         match block:
@@ -75,11 +73,6 @@ def _blocks(given: Sequence[Block], sources: PaperSources) -> Iterator[Block]:
             case Table() if _is_of(block, "comparison" if len(sources.models) > 1 else "identify", "Quantity"):
                 yield block if in_sweeps else _all_columns(block)
                 yield Text(_scale_sentence(sources), "note")
-            case Table() if _is_of(block, "sweep", "Quantity"):
-                printed = printed_beside(shown[int(block.name.split("-")[1]) - 1])
-                yield _replicates(block, printed)
-                if any(printed):
-                    yield _PAPER_NOTE
             case Plot(caption=caption) if _NUMBERED.match(caption):
                 yield replace(block, see=("figures-of-the-paper", "What the paper's shows."))
             case _:
@@ -140,35 +133,67 @@ def _largest_torque(judged: Judged) -> float:
     return float(np.max(torque[np.isfinite(torque)], initial=0.0))
 
 
-def _replicates(table: Table, printed: Sequence[PrintedColumn | None]) -> Table:
-    """Put a row of the paper below each of ours that it has too."""
-    if not any(printed):
-        return table
+def replicates(sources: PaperSources) -> Iterator[Section]:
+    """Show the searches that compare no readings, a row of the paper below each of ours that it has too."""
+    found = (sweep for sweep in joined_sweeps(sources.sweeps) if not compares_readings(sweep.record.settings))
+    for number_, sweep in enumerate(found, 1):
+        yield Section(f"searches-{number_}", f"Searches of {sweep.label}", list(_of_sweep(sweep, number_)))
+
+
+def _of_sweep(sweep: Source[Sweep], number_: int) -> Iterator[Block]:
+    settings = sweep.record.settings
+    printed = printed_beside(settings)
     rows: list[Sequence[str | Cell]] = []
-    for row in table.cells:
-        rows.append(row)
-        if (shown := _PRINTED_ROWS.get(row[_QUANTITY].text)) is not None:
-            rows.append(["· paper", *(shown(column) if column else UNKNOWN for column in printed)])
-    return replace(table, rows=rows)
+    for name, ours, paper in _QUANTITIES:
+        rows.append([name, *map(ours, settings)])
+        if any(printed) and paper is not None:
+            rows.append(["· paper", *(paper(column) if column else UNKNOWN for column in printed)])
+    caption = (
+        "On the whole training part. The best run of a setting is that of the smallest mean squared error; mean and "
+        "standard deviation are over its seeds, from "
+        f"{min(int(seed) for setting in settings for seed in setting.seeds)} on."
+    )
+    yield Table(f"searches-{number_}-table", caption, ["Quantity", *(each.name for each in settings)], rows)
+    lost = sum(int(np.sum(np.isnan(each.of("mse")))) for each in settings)
+    if lost:
+        yield Text(f"{lost} of {sweep.record.runs} runs found no finite model; all means leave them out.", "warning")
+    if any(printed):
+        yield _PAPER_NOTE
 
 
-_PRINTED_ROWS = {
-    "system": lambda p: p.system,
-    "training points": lambda p: str(p.samples),
-    "population × generations": lambda p: f"{p.population} × {p.generations}",
-    "runs": lambda _: "10",
-    "best run: MSE, (N m)²": lambda p: p.mse,
-    "best run: largest error, N m": lambda p: p.max_error,
-    "best run: condition number": lambda p: p.condition_number,
-    "mean MSE, (N m)²": lambda p: p.mse_of_runs[0],
-    "standard deviation of the MSE, (N m)²": lambda p: p.mse_of_runs[1],
-    "mean largest error, N m": lambda p: p.max_error_of_runs[0],
-    "standard deviation of the largest error, N m": lambda p: p.max_error_of_runs[1],
-    "mean condition number": lambda p: p.condition_number_of_runs[0],
-    "standard deviation of the condition number": lambda p: p.condition_number_of_runs[1],
-    "mean relative error": lambda _: RELATIVE_ERROR,
-}
-"""What is shown of a printed column beside each quantity of a sweep."""
+def _mean(values: Spread) -> str:
+    return number(values.mean, 3)
+
+
+def _deviation(values: Spread) -> str:
+    return number(values.standard_deviation, 2)
+
+
+def _best(name: str) -> Callable[[Setting], str]:
+    """Give a number of the best run of a setting, on the training part."""
+    return lambda own: UNKNOWN if own.best is None else number(np.atleast_1d(getattr(own.best, name))[0], 3)
+
+
+_QUANTITIES: tuple[tuple[str, Callable[[Setting], str], Callable[[PrintedColumn], str] | None], ...] = (
+    ("system", lambda s: s.structure.replace("fls", "FLS"), lambda p: p.system),
+    ("training points", lambda s: str(s.samples), lambda p: str(p.samples)),
+    ("population × generations", lambda s: f"{s.population} × {s.generations}",
+     lambda p: f"{p.population} × {p.generations}"),
+    ("runs", lambda s: str(s.runs), lambda _: "10"),
+    ("best run: MSE, (N m)²", _best("mse"), lambda p: p.mse),
+    ("best run: largest error, N m", _best("max_error"), lambda p: p.max_error),
+    ("best run: condition number", _best("condition_number"), lambda p: p.condition_number),
+    ("mean MSE, (N m)²", lambda s: _mean(s.mse), lambda p: p.mse_of_runs[0]),
+    ("standard deviation of the MSE, (N m)²", lambda s: _deviation(s.mse), lambda p: p.mse_of_runs[1]),
+    ("mean largest error, N m", lambda s: _mean(s.max_error), lambda p: p.max_error_of_runs[0]),
+    ("standard deviation of the largest error, N m", lambda s: _deviation(s.max_error),
+     lambda p: p.max_error_of_runs[1]),
+    ("mean condition number", lambda s: _mean(s.condition_number), lambda p: p.condition_number_of_runs[0]),
+    ("standard deviation of the condition number", lambda s: _deviation(s.condition_number),
+     lambda p: p.condition_number_of_runs[1]),
+    ("mean relative error", lambda s: percent(s.relative_error.mean), lambda _: RELATIVE_ERROR),
+)  # fmt: skip
+"""What is shown of each setting, and what of a printed column."""
 
 
 def printed_beside(settings: Settings) -> list[PrintedColumn | None]:

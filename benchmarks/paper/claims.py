@@ -18,15 +18,14 @@ from benchmarks.paper.printed import (
     PRINTED_SHARE,
     TABLE_4,
 )
+from benchmarks.paper.replicates import ALL_SAMPLES, Setting, Sweep, joined_sweeps
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.path import PlannedPath
-from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting
 from cpfls_cli.identification.scores import MODEL, TRAINING
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
 from cpfls_cli.report.source import Source, Sources
-from cpfls_cli.stages.sweep import joined_sweeps
 from cpfls_cli.words import joined
 
 Settings = Sequence[Setting]
@@ -46,9 +45,10 @@ class EvaluationTime:
 
 @dataclass(frozen=True)
 class PaperSources(Sources):
-    """Everything that a report on the paper is about; times are measured, for no artifact holds one."""
+    """Everything that a report on the paper is about: its searches too, and times, for no artifact holds one."""
 
     times: Sequence[EvaluationTime] = ()
+    sweeps: Sequence[Source[Sweep]] = ()
 
 
 class ClaimVerdict(StrEnum):
@@ -96,7 +96,7 @@ def compares_readings(settings: Settings) -> bool:
     return len({reading_of(setting) for setting in settings if setting.criterion != ALL_SAMPLES}) > 1
 
 
-def searches(sources: Sources) -> Searches:
+def searches(sources: PaperSources) -> Searches:
     """Gather the searches of a report that are no comparison of readings, the largest first."""
     found = [sweep.record.settings for sweep in joined_sweeps(sources.sweeps)]
     own = [settings for settings in found if not compares_readings(settings)]
@@ -118,7 +118,7 @@ def not_measured(missing: str, command: str) -> Measurement:
     return Measurement(ClaimVerdict.NOT_MEASURED, UNKNOWN, f"Missing: {missing}. Made by: {command}")
 
 
-def _relative_error(sources: Sources) -> Measurement:
+def _relative_error(sources: PaperSources) -> Measurement:
     models = (model for model in sources.models if _is_periodic(model))
     identified = np.array([model.record.judged.worst(MODEL, TRAINING)[0] for model in models])
     return _small_enough([*_relative_errors(searches(sources)), identified], _elsewhere(sources))
@@ -146,7 +146,7 @@ def _relative_errors(found: Searches) -> Iterator[Array]:
                 yield np.nan_to_num(setting.errors[:, 2], nan=np.inf)
 
 
-def _elsewhere(sources: Sources) -> str:
+def _elsewhere(sources: PaperSources) -> str:
     """Report what the claim leaves out: flights that the models did not learn from."""
     errors = [
         f"{percent(model.record.judged.worst(MODEL, part)[0], 2)} on {part}"

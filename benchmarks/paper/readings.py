@@ -10,16 +10,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.paper.claims import Claim, ClaimVerdict, Measurement, Settings, compares_readings, reading_of
+from benchmarks.paper.claims import (
+    Claim,
+    ClaimVerdict,
+    Measurement,
+    PaperSources,
+    Settings,
+    compares_readings,
+    reading_of,
+)
 from benchmarks.paper.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColumn
+from benchmarks.paper.replicates import ALL_SAMPLES, Setting, Sweep, joined_sweeps, spread
 from benchmarks.paper.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting, Sweep, spread
 from cpfls_cli.report.canvas import GREY, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent
-from cpfls_cli.report.source import Source, Sources
-from cpfls_cli.stages.sweep import joined_sweeps
+from cpfls_cli.report.source import Source
 from cpfls_cli.words import joined
 
 if TYPE_CHECKING:
@@ -123,7 +130,7 @@ def _median(runs: Array) -> float:
     return float(np.median(known)) if len(known) else float("nan")
 
 
-def readings(sources: Sources) -> list[Reading]:
+def readings(sources: PaperSources) -> list[Reading]:
     """Tell the readings of the paper apart that the sweeps of a report follow, in order of flight and noise."""
     found: dict[tuple[str, float, str, str], Reading] = {}
     for sweep in joined_sweeps(sources.sweeps):
@@ -159,7 +166,7 @@ def _noise(share: float) -> str:
     return f"{percent(share, 1)} noise" if share else "no noise"
 
 
-def readings_blocks(sources: Sources, claims: Sequence[Claim]) -> tuple[list[Block], list[Block]]:
+def readings_blocks(sources: PaperSources, claims: Sequence[Claim]) -> tuple[list[Block], list[Block]]:
     """Show how each claim about searches fares in each reading, where a report has several: answer, and details."""
     found = readings(sources)
     if len(found) < 2:
@@ -196,7 +203,7 @@ def _answer(found: Sequence[Reading], claims: Sequence[Claim], verdicts: Verdict
     )
 
 
-def _judged_here(sources: Sources) -> Iterator[Text]:
+def _judged_here(sources: PaperSources) -> Iterator[Text]:
     """Name the reading that the report's own searches follow, and which of its numbers are far from the printed."""
     for sweep in joined_sweeps(sources.sweeps):
         if compares_readings(sweep.record.settings):
@@ -213,7 +220,7 @@ def _judged_here(sources: Sources) -> Iterator[Text]:
             yield Text(f"The claims below are judged in this one: {reading.name}.{alone} {off}")
 
 
-def _mean_square_noise(sources: Sources, sweep: Source[Sweep]) -> float:
+def _mean_square_noise(sources: PaperSources, sweep: Source[Sweep]) -> float:
     """Find the mean square of the noise that was put on the torque of a sweep's flight; 0 where none is known."""
     flight = sources.by_hash(sweep.made_from("flight"))
     noise = None if flight is None else flight.record.noise

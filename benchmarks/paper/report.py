@@ -10,16 +10,18 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.paper.beside import with_the_paper
-from benchmarks.paper.claims import EvaluationTime, PaperSources, compares_readings
+from benchmarks.paper.beside import replicates, with_the_paper
+from benchmarks.paper.claims import EvaluationTime, PaperSources
+from benchmarks.paper.replicates import Sweep
 from benchmarks.paper.reproduction import reproduction_section
 from benchmarks.shared.measure import program
 from cpfls_cli.artifacts.output import write_text
 from cpfls_cli.config.load import load_study
 from cpfls_cli.files import read_content
 from cpfls_cli.pages.page import Page, page_of, sections_of
-from cpfls_cli.report.content import Section
+from cpfls_cli.report.source import source_of_result, unique_labels
 from cpfls_cli.stages.report import read_sources
+from cpfls_cli.store import format_name, read
 from cpfls_cli.version import __version__
 
 _BEFORE = ("summary", "comparison", "identify")
@@ -29,21 +31,21 @@ _BEFORE = ("summary", "comparison", "identify")
 def paper_page(config: Path, artifacts: Sequence[Path], times: Sequence[EvaluationTime] = ()) -> Page:
     """Write a report on the paper; times are measured, for no artifact holds one."""
     study = load_study(config)
-    given = read_sources(artifacts, [read_content(path).sha256 for path in artifacts])
-    sources = PaperSources(given, study.vehicle, study.report, times)
-    sections = [_without_readings(section, sources) for section in sections_of(sources)]
-    place = sum(section.name.startswith(_BEFORE) for section in sections if section)
+    searched = [path for path in artifacts if format_name(path) == Sweep.FORMAT]
+    others = [path for path in artifacts if path not in searched]
+    given = read_sources(others, [read_content(path).sha256 for path in others])
+    sweeps = [
+        source_of_result(*read(path, Sweep), path, label, read_content(path).sha256)
+        for path, label in zip(searched, unique_labels(searched), strict=True)
+    ]
+    sources = PaperSources(given, study.vehicle, study.report, times, sweeps)
+    sections = sections_of(sources)
+    place = sum(section.name.startswith(_BEFORE) for section in sections)
     ordered = [*sections[:place], reproduction_section(sources), *sections[place:]]
-    return page_of(sources, [with_the_paper(section, sources) for section in ordered if section], __version__)
-
-
-def _without_readings(section: Section, sources: PaperSources) -> Section | None:
-    """Leave out of the replicates the sweeps over readings of the paper, which stand beside its claims."""
-    if not section.name.startswith("sweep"):
-        return section
-    readings = [sweep for sweep in sources.sweeps if compares_readings(sweep.record.settings)]
-    others = replace(sources, all=[source for source in sources.all if source not in readings])
-    return next((each for each in sections_of(others) if each.name == section.name), None)
+    shown = [with_the_paper(section, sources) for section in ordered]
+    last = next((at for at, section in enumerate(shown) if section.name == "provenance"), len(shown))
+    page = [*shown[:last], *replicates(sources), *shown[last:]]
+    return page_of(replace(sources, all=[*given, *sweeps]), page, __version__)
 
 
 def main(

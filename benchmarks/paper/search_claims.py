@@ -12,8 +12,8 @@ from scipy.special import stdtrit
 
 from benchmarks.paper.claims import Claim, Measurement, Searches, Settings, decided, not_measured, searches, undecided
 from benchmarks.paper.printed import TABLE_5, TYPICAL_MAX_ERROR, TYPICAL_MSE, PrintedColumn
+from benchmarks.paper.replicates import ALL_SAMPLES, Setting
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.identification.replicates import ALL_SAMPLES, Setting
 from cpfls_cli.report.numbers import number, percent
 
 _CONFIDENCE = 0.95

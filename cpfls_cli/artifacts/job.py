@@ -38,27 +38,12 @@ def _uninterrupted() -> AbstractContextManager[Interrupted]:
 class Job:
     """One run of a stage.
 
-    Attributes
-    ----------
-    force : bool
-        Replace an existing output.
-    dry_run : bool
-        Check everything, compute and write nothing.
-    reads : callable
-        Takes note of every input file.
-    deferred_interrupts : callable
-        Gives a context in which an interrupt does not end the program, but is told to whoever asks.
-    inputs : list of Path
-        The config, and every input that was taken so far: no output may replace them.
-    config : Path
-        File of the study, as the commands that go on name it.
-    open_numbers : {"refused", "guessed", "found"}
-        What a command does that needs numbers which the config leaves open: it refuses, takes the guesses that stand
-        for them, or has those of a vehicle that was found in their place.
-    found : Path or None
-        Vehicle that was found, whose numbers the commands that go on take as well.
-    cautions : dict of str to None
-        What speaks against the models and numbers that it rests on, in order: the output carries it.
+    `reads` takes note of every input file; `deferred_interrupts` gives a context in which an interrupt does not end the
+    program, but is said to whoever asks; `inputs`: the config, and every input that was taken so far, no output may
+    replace them; `config`: file of the study, as the commands that go on name it; `open_numbers`: whether a command
+    that needs numbers which the config leaves open refuses, takes the guesses that stand for them, or has those of a
+    vehicle that was `found`; `cautions`: what speaks against the models and numbers that it rests on, in order, the
+    output carries it.
     """
 
     study: Study
@@ -89,7 +74,7 @@ def require_numbers(job: Job, command: str, *, whole: bool = True) -> None:
 def go_on(job: Job, command: str, *words: str | Path, output: Path) -> tuple[str | Path, ...]:
     """Give a command that goes on with the config of a job; what that leaves open it takes as the job did."""
     taken: Sequence[str | Path] = ()
-    # A path asks for none of them, but what a flight is to tell hangs on all.
+    # A path asks for none of them, but what a flight is to identify depends on all.
     if needs_numbers(job.study.vehicle, command) or (job.study.vehicle.unknown and "--for" in words):
         if job.found is not None:
             taken = () if "--model" in words else ("--model", job.found)

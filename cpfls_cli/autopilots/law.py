@@ -62,14 +62,9 @@ class Filter:
 
 
 class RateResponse(NamedTuple):
-    """Rate control by frequency, shape (frequency,) each, share of the full command per rad/s.
+    """Rate control by frequency, share of the full command per rad/s.
 
-    Attributes
-    ----------
-    feedback : array
-        From measured rate to minus the command.
-    forward : array
-        From asked rate to the command.
+    `feedback`: from measured rate to minus the command; `forward`: from asked rate to the command.
     """
 
     feedback: Numbers
@@ -80,25 +75,12 @@ class RateResponse(NamedTuple):
 class AxisLaw:
     """Control about one body axis.
 
-    Attributes
-    ----------
-    angle, angle_integral : float, 1/s and 1/s^2
-        Asked rate by error of the angle, and by its integral.
-    angle_slope : float
-        Rate taken off by measured rate of the angle.
-    angle_integral_limit : float, rad/s
-        Most of the integral.
-    p, i, d, ff : float
-        Share of the full command by error of the rate (per rad/s), its integral (per rad), its derivative (per
-        rad/s^2), and by asked rate (per rad/s).
-    integral_limit, limit : float
-        Most of the integral and of the command, shares.
-    rate_limit : float, rad/s
-        Most that the angle asks for.
-    measured, target, error, slope, output : tuple of Filter
-        Of the gyroscope, the asked rate, the error, the derivative, the command.
-    slope_of_error : bool
-        Whether the derivative is that of the error; else of the measured rate.
+    `angle` and `angle_integral` give asked rate by error of the angle and by its integral (1/s, 1/s^2), at most
+    `angle_integral_limit` and in all `rate_limit`, rad/s; `angle_slope`: rate taken off by measured rate of the angle;
+    `p`, `i`, `d`, `ff`: share of the full command by error of the rate (per rad/s), its integral (per rad), its
+    derivative (per rad/s^2), and by asked rate (per rad/s); `integral_limit`, `limit`: most of the integral and of the
+    command, shares; filters of the gyroscope, the asked rate, the error, the derivative and the command;
+    `slope_of_error`: whether the derivative is that of the error, else of the measured rate.
     """
 
     angle: float

@@ -128,10 +128,7 @@ class MixerRule:
 def mixing(rule: MixerRule, vehicle: VehicleSettings) -> Array:
     """Build the mixer of a vehicle, shape (rotor, 4): shares of full thrust for thrust, roll, pitch and yaw.
 
-    Raises
-    ------
-    ComputationError
-        If the rotors do not control thrust, roll, pitch and yaw.
+    `ComputationError` where the rotors do not control all four.
     """
     places = np.array([rotor.position_m for rotor in vehicle.rotors])
     spins = np.array([rotor.spin for rotor in vehicle.rotors], dtype=float)
@@ -142,15 +139,8 @@ def mixing(rule: MixerRule, vehicle: VehicleSettings) -> Array:
 def inverse_mix(rule: MixerRule, rows: Array) -> Array:
     """Invert what rotors do and scale it as a rule says, shape (rotor, 4).
 
-    Parameters
-    ----------
-    rows : array, shape (4 or more, rotor)
-        Thrust, roll, pitch, yaw of each rotor at full; forces across behind them, which are to stay nothing.
-
-    Raises
-    ------
-    ComputationError
-        If the rotors do not control thrust, roll, pitch and yaw.
+    `rows`: thrust, roll, pitch, yaw of each rotor at full; forces across behind them, which are to stay nothing.
+    `ComputationError` where the rotors do not control all four.
     """
     if np.linalg.matrix_rank(rows[:4]) < 4:
         raise ComputationError("vehicle.rotors: they do not control thrust, roll, pitch and yaw, so no autopilot flies")
@@ -171,14 +161,7 @@ def inverse_mix(rule: MixerRule, rows: Array) -> Array:
 class Mixed(NamedTuple):
     """What the mixer gives.
 
-    Attributes
-    ----------
-    speed : array, shape (rotor,), rad/s
-        Asked of the rotors.
-    wanted : array, shape (rotor,)
-        Shares of the full thrust before any limit.
-    saturated : array, shape (3,)
-        Whether roll, pitch, yaw are cut.
+    Speeds asked of the rotors, rad/s; shares of the full thrust before any limit; whether roll, pitch, yaw are cut.
     """
 
     speed: Array

@@ -40,27 +40,12 @@ _KINDS: tuple[tuple[FilterKind, int, float], ...] = (
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an autopilot.
+    """A parameter of an autopilot, as it writes it.
 
-    Attributes
-    ----------
-    name : str
-        As the autopilot writes it.
-    role : str
-        What it is in the law: axes (``roll``, ``pitch``, ``yaw``, ``tilt`` for the first two, ``all``) or ``motors``,
-        a dot, and the quantity.
-    default : float
-    low, high : float
-        Of the range that its documentation gives.
-    meaning : str
-    unit : str
-        Empty for a ratio.
-    scale : float
-        Factor from it to the quantity of the law, SI.
-    step : float
-        It is written in multiples of this.
-    absent : float or None
-        Its value where a log holds parameters but not this one; None: the default.
+    `role`: what it is in the law, axes (``roll``, ``pitch``, ``yaw``, ``tilt`` for the first two, ``all``) or
+    ``motors``, a dot, and the quantity; `low`, `high`: of the range that its documentation gives; `scale`: factor from
+    it to the quantity of the law, SI; it is written in multiples of `step`; `absent`: its value where a log holds
+    parameters but not this one, None for the default.
     """
 
     name: str
@@ -79,19 +64,10 @@ class Parameter:
 class Firmware:
     """The version of an autopilot whose names, defaults and ranges these are, and what others have otherwise.
 
-    Attributes
-    ----------
-    title : str
-    systems : tuple of str
-        First words by which a log names the program that wrote it.
-    oldest : tuple of int
-        First version whose gains count as these do.
-    older : str
-        What is otherwise in logs of before.
-    oldest_gains : tuple of int, or None
-        First version whose gains of the rate count as these do, whatever its filters; None: `oldest`.
-    renamed : tuple of (tuple of int, mapping of str to str)
-        A version, and from names here to those of the versions before it.
+    `systems`: first words by which a log names the program that wrote it; `oldest`: first version whose gains count as
+    these do, `older` what is otherwise in logs of before; `oldest_gains`: first version whose gains of the rate count
+    as these do, whatever its filters (None: `oldest`); `renamed`: versions, with names here and those of the versions
+    before.
     """
 
     title: str

@@ -13,16 +13,9 @@ from typing import Any
 
 @dataclass(frozen=True)
 class CommandLine:
-    """What the command line of a stage is made of.
+    """What the command line of a stage is made of: parameters of its function but for the run, the rest as of `Stage`.
 
-    Attributes
-    ----------
-    parameters : list of inspect.Parameter
-        Of its function, but for the run.
-    study, folder, fills, several : bool
-        As of `Stage`.
-    output : object
-        Option of its output where it has one of its own, or None.
+    `output` is the option of its output where it has one of its own.
     """
 
     parameters: list[inspect.Parameter]

@@ -77,10 +77,7 @@ def _sent_again(received: list[int], otherwise: Callable[[Any], object]) -> Call
 def deferred_interrupts() -> Iterator[Callable[[], int | None]]:
     """Record the first interrupt as a request to stop, which the work inside polls; the next one acts as outside.
 
-    Yields
-    ------
-    callable
-        Gives the number of the signal received, or None; also afterwards.
+    What it yields gives the number of the signal received, or None; also afterwards.
     """
     received: list[int] = []
     outside = {number: signal.getsignal(number) for number in _SIGNALS}

@@ -48,12 +48,7 @@ def refuse_misplaced_log(path: Path, order: str = "first the config, then the lo
 def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | None) -> None:
     """Refuse a log or an artifact in the place of the config, and give the command with the two exchanged.
 
-    Parameters
-    ----------
-    given : sequence of Path
-        Its arguments, the config first.
-    output : Path or None
-        Its option ``-o``.
+    `given` are its arguments, the config first.
     """
     kind = _kind(given[0])
     if command == "gap" and kind == "artifact" and _format(given[0]) == "cpfls/vehicle":

@@ -64,11 +64,11 @@ class Common:
         ),
     ] = None
 
-    def study(self, config: Path, *, sweep: bool = False) -> Study:
-        """Load a study with the overrides given on the command line; check its sweep where one is to be run."""
+    def study(self, config: Path) -> Study:
+        """Load a study with the overrides given on the command line."""
         from cpfls_cli.config.load import load_study
 
-        return load_study(config, self.overrides or (), self.seed, sweep=sweep)
+        return load_study(config, self.overrides or (), self.seed)
 
     def data(self, config: Path) -> dict[str, Any]:
         """Read a config as plain data, with the overrides given on the command line."""

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 STAGES = Path(__file__).parents[1] / "stages"
 ORDER = (
-    *("look", "trajectory", "simulate", "init", "import", "reduce", "identify", "sweep", "vehicle"),
+    *("look", "trajectory", "simulate", "init", "import", "reduce", "identify", "vehicle"),
     *("replay", "response", "tune", "report", "compare", "diagnose", "extend", "gap", "changed", "trend", "export"),
     *("spread", "info", "check", "config", "effects"),
 )
@@ -127,7 +127,7 @@ def run_of(
     from cpfls_cli.config.load import validate
     from cpfls_cli.stage import Run
 
-    study = common.study(config, sweep=own.name in ("sweep", "config")) if config else validate({}, "default")
+    study = common.study(config) if config else validate({}, "default")
     run = Run(study, output or Path(own.name), common.force, common.dry_run, progress, reads, deferred_interrupts)
     run.writes, run.with_config = output is not None, config is not None
     run.open_numbers = "guessed" if common.accept_guesses else "refused"
@@ -160,10 +160,7 @@ def noted(job: Job) -> Iterator[None]:
 def command_of(name: str, line: CommandLine, load: Callable[[], Stage]) -> Callable[..., None]:
     """Write the command line of a stage: its own parameters, its output, a config where it takes one, common options.
 
-    Parameters
-    ----------
-    load : callable
-        Gives the stage, when the command runs.
+    `load` gives the stage, when the command runs.
     """
     declared = any(each.name == "config" for each in line.parameters)
     hints = {"config": ConfigArgument} if line.study and not declared else {}

@@ -169,10 +169,8 @@ def _range_of(numbers: Sequence[str]) -> str:
 def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
     """Show the progress of long work on a terminal, with the time left.
 
-    Yields
-    ------
-    callable
-        Takes steps done, steps in all, and a note; where standard error is no terminal it writes a line now and then.
+    What it yields takes steps done, steps in all, and a note; where standard error is no terminal it writes a line now
+    and then.
     """
     with _log_shown(title, common):
         if common.quiet:
@@ -277,17 +275,7 @@ def _with_plain_names(text: str) -> str:
 
 @dataclass(frozen=True)
 class Narration:
-    """Report on standard error which files a command reads and writes, if asked to.
-
-    Attributes
-    ----------
-    title : str
-        The command.
-    wanted : bool
-        Whether to report anything.
-    started : float, s
-        When the command started, by a clock that only goes forward.
-    """
+    """Report on standard error which files a command reads and writes, if wanted."""
 
     title: str
     wanted: bool

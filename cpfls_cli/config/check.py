@@ -25,10 +25,12 @@ from cpfls_cli.vehicle_limits import beyond_any_vehicle
 
 _PAPER = "remove it; `make reproduce` writes the page that compares a study with the paper"
 _CONTROL = "a model is flown by `simulate --model` in closed loop; examples/computed_torque.py controls with one"
+_LOOP = "remove it; a loop over `cpfls identify --seed N --set KEY=VALUE` searches again (docs/long-searches.md)"
 _GONE = {
     ("report", "evaluation_times"): _PAPER,
     ("report", "paper"): _PAPER,
     ("simulation", "computed_torque"): f"remove it; {_CONTROL}",
+    **{("sweep", key): _LOOP for key in ("seeds", "set", "settings")},
 }
 """What to do about keys that configs of before hold; inside artifacts they are left out, in a file they are refused."""
 
@@ -71,6 +73,7 @@ def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[st
     """Validate plain data as a study, None where there are errors, with a line for each wrong key."""
     # A section that is named but left empty means its defaults.
     named = {key: {} if value is None and key in SECTIONS else _known(key, value) for key, value in data.items()}
+    named.pop("sweep", None)
     filled = with_guesses(_with_preset(named))
     missing = [_missing_line(source, key) for key in _left_out(named)]
     try:

@@ -33,18 +33,8 @@ _EXAMPLES: Final = MappingProxyType(
 class Key:
     """One key of a config.
 
-    Attributes
-    ----------
-    doc : str
-        One line; empty where none is declared.
-    section : type or None
-        The settings class below this key.
-    many : bool
-        Whether the key holds a list or a mapping of such sections.
-    choices : tuple of str, int or None
-        The only values allowed; empty where there are other ones.
-    entries : tuple of str
-        Names that the entries of a mapping may have; empty where it is no mapping of named entries.
+    `section`: the settings class below it; `many`: whether it holds a list or a mapping of such; `choices`: the only
+    values allowed; `entries`: names that the entries of a mapping may have. Empty where there are none.
     """
 
     name: str

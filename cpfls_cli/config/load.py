@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
+import copy
+import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from cpfls_cli.config.check import check_data, gone_lines
-from cpfls_cli.config.overrides import apply_override, setting_errors
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, resolved
 from cpfls_cli.config.yaml_text import parse_yaml
-from cpfls_cli.errors import ConfigError
+from cpfls_cli.errors import ConfigError, SettingError
 
 _LARGEST = 1_000_000
+_MALFORMED = "write section.key=value"
 ASK = "ASK"
 """Stands in a config for what only a person knows; `cpfls init` writes it."""
 
 
-def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = None, *, sweep: bool = False) -> Study:
-    """Load and validate a study, with overrides ``section.key=value`` (YAML), and its sweep if asked."""
+def load_study(path: Path, overrides: Sequence[str] = (), seed: int | None = None) -> Study:
+    """Load and validate a study, with overrides ``section.key=value`` (YAML)."""
     data = read_overridden(path, overrides, seed)
     # Nobody's file is of the vehicle that a study begins with: without the section its keys are missing.
     data.setdefault("vehicle", {})
-    return validate(data, str(path), sweep=sweep, wrong=gone_lines(data, str(path)))
+    return validate(data, str(path), wrong=gone_lines(data, str(path)))
 
 
 def read_overridden(path: Path, overrides: Sequence[str] = (), seed: int | None = None) -> dict[str, Any]:
@@ -51,6 +53,55 @@ def read_config(path: Path) -> dict[str, Any]:
     return parse_config(text, str(path))
 
 
+def apply_override(data: dict[str, Any], override: str) -> None:
+    """Apply ``section.key=value`` in place; entries of lists go by index, a list left out is the default one."""
+    key, separator, text = override.partition("=")
+    try:
+        if not separator:
+            raise SettingError(key, _MALFORMED)
+        _override_key(data, key.strip(), parse_yaml(text, f"--set {key}"))
+    except SettingError as error:
+        raise ConfigError(f"--set {override}: {error}") from None
+
+
+def _override_key(data: dict[str, Any], key: str, value: Any) -> None:
+    """Set one key, written with dots, in the data of a config; the data are changed in place."""
+    parts = key.split(".")
+    if not all(parts):
+        raise SettingError(key, _MALFORMED)
+    *parents, last = parts
+    node: Any = data
+    # A vehicle has no defaults: what its config leaves out is reported as missing.
+    default: Any = {section: values for section, values in resolved(Study()).items() if section != "vehicle"}
+    for parent, following in itertools.pairwise(parts):
+        default = default.get(parent) if isinstance(default, dict) else None
+        node = _enter(node, parent, default, key)
+        if node == {} and following.isdecimal():
+            raise SettingError(key, f"the config holds no list '{parent}', and there is no default for it")
+    if isinstance(node, list):
+        node[_index(node, last, key)] = value
+    elif isinstance(node, dict):
+        node[last] = value
+    else:
+        raise SettingError(key, f"'{'.'.join(parents)}' is a single value and has no keys")
+
+
+def _enter(node: Any, name: str, default: Any, key: str) -> Any:
+    if isinstance(node, list):
+        return node[_index(node, name, key)]
+    if not isinstance(node, dict):
+        raise SettingError(key, f"'{name}' is below a single value")
+    if node.get(name) is None:
+        node[name] = copy.deepcopy(default) if isinstance(default, list) else {}
+    return node[name]
+
+
+def _index(entries: list[Any], name: str, key: str) -> int:
+    if not name.isdecimal() or int(name) >= len(entries):
+        raise SettingError(key, f"'{name}' is not an index of a list of {len(entries)}; indices count from 0")
+    return int(name)
+
+
 def stored_study(config: str, path: object) -> Study:
     """Read the study that an artifact was made with; the path is for messages."""
     source = f"{path}: /config"
@@ -76,13 +127,11 @@ def flat_keys(config: Mapping[str, Any], above: str = "") -> Iterator[tuple[str,
             yield f"{above}{key}", value
 
 
-def validate(data: dict[str, Any], source: str, *, sweep: bool = False, wrong: Sequence[str] = ()) -> Study:
-    """Validate plain data as a study, beside what is known to be wrong; what sweeps need is checked for them alone."""
+def validate(data: dict[str, Any], source: str, *, wrong: Sequence[str] = ()) -> Study:
+    """Validate plain data as a study, beside what is known to be wrong."""
     _refuse_asked(data, source)
     study, found = check_data(data, source)
     errors = [*wrong, *found]
-    if sweep:
-        errors += setting_errors(data, source, errors)
     if study is None or errors:
         raise ConfigError("\n".join(errors))
     return study

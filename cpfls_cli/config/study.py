@@ -18,7 +18,7 @@ from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.errors import ConfigError, SettingError
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.identification.settings import IdentificationSettings, SweepSettings
+from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.settings import Settings
@@ -33,7 +33,6 @@ SECTIONS = (
     "import",
     "reduction",
     "identification",
-    "sweep",
     "gap",
     "playback",
     "report",
@@ -65,7 +64,6 @@ class Study(BaseModel):
     identification: Annotated[IdentificationSettings, Doc("what `cpfls identify` fits and how it searches")] = (
         IdentificationSettings()
     )
-    sweep: Annotated[SweepSettings, Doc("what `cpfls sweep` tries, and how often")] = SweepSettings()
     gap: Annotated[GapSettings, Doc("how `cpfls compare`, `diagnose`, `extend` and `gap` look for what is missing")] = (
         GapSettings()
     )

@@ -98,7 +98,7 @@ def _audit(flights: Sequence[Signals], windows: Windows, whole: Sequence[Signals
         findings=findings([*sensors.gyroscope.faults, *_others(sensors.flights)], windows.period),
         untested=sensors.gyroscope.untested,
         warnings=(*(f"{capitalised(each)}." for each in doubts(stays)), *channel_warnings(sensors.flights)),
-        notes=(*actuation_delay(sensors.flights), *sensors.notes, *(_gyro_notes(fit) if fit is not None else ())),
+        notes=(*actuation_delay(sensors.flights), *(_gyro_notes(fit) if fit is not None else ())),
         repairs=(*sensors.clocks, *sensors.motion.repairs),
         filtered=filter_warnings(sensors.flights),
         contradictions=contradictions(stays),

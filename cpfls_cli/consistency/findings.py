@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import ceil, inf, log10
 from typing import Annotated, NamedTuple, Self
 
 import numpy as np
@@ -96,6 +97,13 @@ def doubts(findings: Iterable[Finding]) -> tuple[str, ...]:
 
 def off_clock(delay_s: float, half_s: float = float("nan")) -> str:
     """Say how late or early something is, with its 95 % interval of so much to either side where that is known."""
-    ms, half = abs(1000 * delay_s), 1000 * half_s
-    interval = f" [{ms - half:.0f}, {ms + half:.0f}]" if half < float("inf") else ""
-    return f"{'late' if delay_s > 0 else 'early'} by {ms:.0f} ms{interval}"
+    size = abs(delay_s)
+    return f"{'late' if delay_s > 0 else 'early'} by {in_ms(size, size - half_s, size + half_s)}"
+
+
+def in_ms(delay_s: float, low_s: float, high_s: float) -> str:
+    """Write a delay with its interval where that is known, in whole ms or with the digits that the width needs."""
+    half = 500 * (high_s - low_s)
+    decimals = min(max(ceil(-log10(half) - 1e-9), 0), 3) if 0 < half < inf else 0
+    value, *ends = (f"{1000 * each:z.{decimals}f}" for each in (delay_s, low_s, high_s))
+    return f"{value} ms [{', '.join(ends)}]" if half < inf else f"{value} ms"

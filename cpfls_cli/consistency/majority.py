@@ -1,6 +1,6 @@
 """Which channel of the motion is wrong where two contradict each other, by majority; it is set right or left out."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
@@ -37,9 +37,9 @@ _MOVES_M_S2 = 0.1  # Below this a vehicle hovers, and noise points anywhere.
 # Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
 # and more along z.
 _ONE_PLANE, _NOT_ONE_PLANE, _REVERSED = 0.8, 0.5, 0.6
-# Logarithms: of a size that is no unit, and of what a unit may be off by against a sensor and against the thrust.
-_SAME_UNIT = 0.15
 _UNIT_ERROR, _THRUST_ERROR = 0.05, 0.25
+"""Logarithm of what a unit may be off by against a sensor and against the thrust."""
+
 _EXPLAINED = 0.8  # Share of a channel that other axes have to explain.
 # Growth of the residual between two channels from which on a repair sets them apart; noise and a shift make less.
 _APART = 1.2
@@ -89,8 +89,10 @@ class _Compared:
         return tuple(reduce(lambda s, each: each.applied(s), repairs, signals) for signals in self.flights)
 
     def checked(self, repair: ChannelRepair) -> tuple[PairCheck, ...]:
-        """Compare a channel with the others once it is repaired."""
-        return checked(self.repaired(*self.with_position(repair)), self.windows, repair.channel)
+        """Compare a channel with the others once it is repaired: with those that no third one contradicts, if any."""
+        disputed = _disputed(check for check in self.checks if repair.channel not in check.pair)
+        each = checked(self.repaired(*self.with_position(repair)), self.windows, repair.channel)
+        return tuple(check for check in each if disputed.isdisjoint(check.pair)) or each
 
 
 def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
@@ -249,13 +251,21 @@ def _surely_farther(before: Array, after: Array) -> bool:
     return bool(after.sum() > _APART * before.sum()) and _surely_less(before, after)
 
 
-def set_apart(flights: Sequence[Signals], repaired: Sequence[Signals], windows: Windows) -> tuple[str, ...]:
-    """Name the channels of the motion that a repair of a clock surely sets apart from each other."""
+def _disputed(checks: Iterable[PairCheck]) -> set[str]:
+    """List the channels of pairs that contradict each other."""
+    return {name for check in checks if check.problems for name in (check.pair.first, check.pair.second)}
+
+
+def set_apart(
+    logged: Sequence[Signals], before: Sequence[Signals], after: Sequence[Signals], windows: Windows
+) -> tuple[str, ...]:
+    """Name the channels of the motion that a repair of a clock surely sets apart, of those that agree as logged."""
     names: dict[str, None] = {}
-    for before, after in zip(checked(flights, windows), checked(repaired, windows), strict=True):
-        rest, left = (((each.first - each.second) ** 2).sum(axis=1) for each in (before, after))
-        if _surely_farther(rest, left):
-            names |= dict.fromkeys(before.pair.channels)
+    disputed = _disputed(check for check in checked(logged, windows) if check.pair.exact)
+    for one, other in zip(checked(before, windows), checked(after, windows), strict=True):
+        rest, left = (((each.first - each.second) ** 2).sum(axis=1) for each in (one, other))
+        if disputed.isdisjoint(one.pair) and _surely_farther(rest, left):
+            names |= dict.fromkeys(one.pair.channels)
     return tuple(names)
 
 
@@ -348,7 +358,7 @@ def _with_unit(repair: ChannelRepair, check: PairCheck) -> _Read:
     correlation = abs(float((should * reading).sum())) / np.sqrt(squares[0] * squares[1] + TINY)
     # Noise on one side makes its size too large, by no more than the correlation allows.
     error = (_UNIT_ERROR if check.pair.exact else _THRUST_ERROR) - np.log(float(np.clip(correlation, 0.1, 1.0)))
-    if abs(np.log(size)) < max(error, _SAME_UNIT):
+    if abs(np.log(size)) < error:
         return repair, ()
     unit, factor = min(CHANNELS[repair.channel].units.items(), key=lambda each: abs(np.log(size / each[1])))
     if abs(np.log(size / factor)) > error:

@@ -14,7 +14,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import Ground, first_derivative, fit_lean, second_derivative
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
-from cpfls_cli.weak_form.resampling import blocks_of
+from cpfls_cli.weak_form.resampling import blocks_of, folds
 from cpfls_cli.weak_form.windows import Windows
 from cpfls_cli.words import joined
 
@@ -98,6 +98,9 @@ class Sure(NamedTuple):
     def half(self) -> float:
         """Half of its 95 % interval."""
         return float(half_width(np.array(self.error), self.blocks))
+
+
+_NOT_KNOWN = Sure(0.0, np.inf, 2)
 
 
 class Pair(NamedTuple):
@@ -213,7 +216,7 @@ def _checked(pair: Pair, flights: Sequence[Signals], windows: Windows) -> PairCh
         # Noise on either side pulls one regression down and the other up; their geometric mean lies between.
         scale=np.sign(shared) * np.sqrt(np.divide(other_power, power, out=np.zeros(3), where=moves)),
         r2=np.divide(shared**2, power * other_power, out=np.zeros(3), where=moves),
-        delay=_ratio(((a - b) * slope).sum(axis=1), (slope**2).sum(axis=1), block),
+        delay=_late(a - b, slope, block),
         turn=_turned(a, b, slope, block),
         hop_s=windows.hop * windows.period,
     )
@@ -269,13 +272,19 @@ def _in_body(name: str, values: Array, signals: Signals, windows: Windows) -> tu
     return windows.average(values), windows.derivative(values)
 
 
-def _ratio(top: Array, bottom: Array, block: IntArray) -> Sure:
-    """Divide two sums, with a jackknife over blocks."""
-    tops, bottoms = np.bincount(block, top), np.bincount(block, bottom)
-    if len(tops) < 2 or not bottoms.sum():
-        return Sure(0.0, np.inf, len(tops))
-    left_out = (tops.sum() - tops) / np.where(bottoms.sum() == bottoms, 1.0, bottoms.sum() - bottoms)
-    return Sure(float(tops.sum() / bottoms.sum()), float(jackknife_error(left_out)), len(tops))
+def _regressed(columns: Array, right: Array, block: IntArray) -> Array:
+    """Fit columns, shape (window, axis, column), to a right side: all blocks, then without each, (fit, column)."""
+    normal, every = folds(columns, right, block), np.arange(columns.shape[2])
+    return np.concatenate([normal.fit(every)[0].T, normal.solve(every)[0][..., 0]])
+
+
+def _sure(fits: Array) -> Sure:
+    return Sure(float(fits[0]), float(jackknife_error(fits[1:])), len(fits) - 1)
+
+
+def _late(apart: Array, slope: Array, block: IntArray) -> Sure:
+    """Fit the delay of one against the other."""
+    return _sure(_regressed(slope[:, :, None], apart, block)[:, 0]) if block.any() and slope.any() else _NOT_KNOWN
 
 
 def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
@@ -283,20 +292,13 @@ def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
 
     In a steady circle what is late is turned: where most of a turn could be a delay, nothing is known of it.
     """
-    ahead, across, late, seen = a[:, :2], a[:, :2] @ _QUARTER, slope[:, :2], b[:, :2]
-    columns = np.stack([ahead, across, late], axis=2)
-    both = np.concatenate([columns, seen[:, :, None]], axis=2)
-    products = np.einsum("wax,way->wxy", both, both)
-    sums = np.stack([np.bincount(block, entry) for entry in products.reshape(len(a), -1).T], axis=1).reshape(-1, 4, 4)
-    total = sums.sum(axis=0)
-    if len(sums) < 2 or min(total[0, 0], total[2, 2]) <= 0:
-        return Sure(0.0, np.inf, len(sums))
-    shared = total[1, 2] ** 2 / (total[1, 1] * total[2, 2])
-    if shared > _COULD_BE_LATE:
-        return Sure(0.0, np.inf, len(sums))
-    fits = [np.linalg.lstsq(each[:3, :3], each[:3, 3], rcond=None)[0] for each in (total, *(total - sums))]
-    turns = np.array([fit[1] / fit[0] if fit[0] else np.inf for fit in fits])
-    return Sure(float(turns[0]), float(jackknife_error(turns[1:])), len(sums))
+    columns = np.stack([a[:, :2], a[:, :2] @ _QUARTER, slope[:, :2]], axis=2)
+    _, across, late = (columns**2).sum(axis=(0, 1))
+    shared = float((columns[..., 1] * columns[..., 2]).sum()) ** 2
+    if not block.any() or min(across, late) <= 0 or shared > _COULD_BE_LATE * across * late:
+        return _NOT_KNOWN
+    fits = _regressed(columns, b[:, :2], block)
+    return _sure(fits[:, 1] / np.where(fits[:, 0], fits[:, 0], TINY))
 
 
 def _problems(check: PairCheck) -> Iterator[Finding]:

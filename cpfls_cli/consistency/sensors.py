@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Self
 
 import numpy as np
@@ -15,7 +16,7 @@ from cpfls_cli.consistency.clocks import attitude_on_clock, rotors_on_clock
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber, Finding
 from cpfls_cli.consistency.gyroscope import DelayScan, GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.consistency.majority import Settled, set_apart, settled
-from cpfls_cli.consistency.repairs import ChannelRepair
+from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.consistency.rotors import thrust_is_known, weighed
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.hooks import FaultFit, SensorTest
@@ -151,7 +152,6 @@ class Sensors:
 
     gyroscope: Gyroscope  # Once a late attitude is set right.
     clocks: tuple[ChannelRepair, ...]  # What sets a late attitude and late rotors right.
-    notes: tuple[str, ...]  # What nobody knows of a clock.
     flights: tuple[Signals, ...]  # On one clock.
     motion: Settled  # What a majority says of the channels of the motion.
     findings: tuple[Finding, ...]  # What is wrong.
@@ -159,40 +159,47 @@ class Sensors:
 
 def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
     """Hold the sensors of flights with the same hardware, at the sampling period of the windows, against each other."""
-    gyroscope = _gyroscope(flights, windows)
+    gyroscope, dropped = _gyroscope(flights, windows), tuple[Finding, ...]()
     late = gyroscope.late(windows)
-    found, notes = attitude_on_clock(late.coefficients[0], flights, windows) if late else ((), ())
-    clocks, flights, dropped = _uncontradicted(found, flights, windows)
-    if clocks:
+    # The one that comes after the other is late: sensors, filters and wires delay a log, and nothing makes it early.
+    clocks: tuple[ChannelRepair, ...] = ()
+    if late and late.coefficients[0].value < 0:
+        clocks = _attitude_on_clock(late.coefficients[0], flights, windows)
+        flights = _repaired(clocks, flights)
         gyroscope = _gyroscope(flights, windows)
-    # Nothing is known of the rotors where nothing is known of the gyroscope's own clock.
-    rotors = None if gyroscope.late(windows) else rotors_on_clock(flights, windows)
+        late = gyroscope.late(windows)
+    # A gyroscope that is late is set right by what names its delay.
+    ahead = [_on_time(signals, late.coefficients[0].value) for signals in flights] if late else flights
+    rotors = rotors_on_clock(ahead, windows)
     if rotors is not None:
-        own, flights, doubted = _uncontradicted((rotors,), flights, windows)
-        clocks, dropped = (*clocks, *own), (*dropped, *doubted)
+        apart = set_apart(flights, flights, _repaired((rotors,), flights), windows)
+        if apart and rotors.finding is not None:
+            why = f", which {joined(apart)} contradict, so nothing is corrected"
+            remedy = f"check the clocks of {joined(rotors.finding.channels)}"
+            what = f"{rotors.finding.what}{why}"
+            dropped = (replace(rotors.finding, what=what, remedy=remedy, repairable=False),)
+        else:
+            clocks, flights = (*clocks, rotors), _repaired((rotors,), flights)
     motion = settled(flights if thrust_is_known(flights) else [weighed(signals) for signals in flights], windows)
     mended = [repair.finding for repair in clocks if repair.finding is not None]
     wrong = (*gyroscope.findings(windows), *mended, *dropped, *motion.findings)
-    return Sensors(gyroscope, clocks, notes, tuple(flights), motion, wrong)
+    return Sensors(gyroscope, clocks, tuple(flights), motion, wrong)
 
 
-def _uncontradicted(
-    clocks: tuple[ChannelRepair, ...], flights: Sequence[Signals], windows: Windows
-) -> tuple[tuple[ChannelRepair, ...], Sequence[Signals], tuple[Finding, ...]]:
-    """Set clocks right where that sets no channels of the motion apart; else say which know better."""
-    if not clocks:
-        return (), flights, ()
-    repaired = [repair.applied(signals) for signals in flights for repair in clocks]
-    apart = set_apart(flights, repaired, windows)
-    if not apart:
-        return clocks, repaired, ()
-    why = f", which {joined(apart)} contradict, so nothing is corrected"
-    wrong = (repair.finding for repair in clocks if repair.finding is not None)
-    dropped = (
-        replace(each, what=f"{each.what}{why}", remedy=f"check the clocks of {joined(each.channels)}", repairable=False)
-        for each in wrong
-    )
-    return (), flights, tuple(dropped)
+def _repaired(repairs: Sequence[ChannelRepair], flights: Sequence[Signals]) -> list[Signals]:
+    return [reduce(lambda s, each: each.applied(s), repairs, signals) for signals in flights]
+
+
+def _on_time(signals: Signals, delay_s: float) -> Signals:
+    return replace(signals, body_rate=shifted(signals.body_rate, signals.time, delay_s))
+
+
+def _attitude_on_clock(found: FaultNumber, flights: Sequence[Signals], windows: Windows) -> tuple[ChannelRepair, ...]:
+    """Set a late attitude right, and with it the motion where it alone sets them apart: they came over one wire."""
+    ways = attitude_on_clock(found), attitude_on_clock(found, ("position", "velocity", "acceleration"))
+    alone, both = (_repaired(each, flights) for each in ways)
+    along = set_apart(flights, flights, alone, windows) and not set_apart(flights, alone, both, windows)
+    return ways[1 if along else 0]
 
 
 def _gross(fault: AuditFinding) -> Finding | None:

@@ -90,13 +90,7 @@ def momentum_form(attitude: Array, body_rate: Array, inertia: InertiaValues) -> 
 
 
 class Turning(NamedTuple):
-    """The torque that motions take, ``inertia omega' + direct``.
-
-    Attributes
-    ----------
-    inertia : array, shape (bodies, 3, 3), kg m^2, body frame
-    direct : array, shape (bodies, 3), N m, body frame
-    """
+    """The torque that motions take, ``inertia omega' + direct``, kg m^2 and N m in the body frame."""
 
     inertia: Array
     direct: Array
@@ -170,19 +164,8 @@ def runge_kutta_step(
 ) -> Array:
     """Take one step of the classic Runge-Kutta method of fourth order.
 
-    Parameters
-    ----------
-    slope : callable
-        Differentiates a state by time under a torque.
-    state : array
-        At the begin of the step.
-    torque : tuple of array, shape (bodies, 3), N m, body frame
-        At the begin, in the middle and at the end of the step.
-    step : float or array, s
-
-    References
-    ----------
-    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, table 1.2 of section II.1.
+    `slope` differentiates a state by time under a torque; those of the step are at its begin, middle and end, N m in
+    the body frame. Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, table 1.2 of section II.1.
     """
     begin, middle, end = torque
     first = slope(state, begin)

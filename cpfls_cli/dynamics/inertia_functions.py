@@ -42,13 +42,7 @@ def visited_cells(attitudes: Iterable[Array]) -> BoolArray:
 
 
 def outside_visited(visited: BoolArray, attitude: Array) -> BoolArray:
-    """Flag attitudes whose cell was not visited.
-
-    Parameters
-    ----------
-    visited : array of bool, shape (72, 72)
-    attitude : array, shape (samples, 3), rad
-    """
+    """Flag attitudes, rad, whose cell was not visited."""
     return np.asarray(~visited[_cells(attitude[:, 0]), _cells(attitude[:, 1])])
 
 

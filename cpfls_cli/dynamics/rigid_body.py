@@ -11,7 +11,7 @@ from cpfls_cli.regressor.motion import Motion
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 VERTICAL = 0.1
-"""|cos(pitch)| below which the nose points up or down, so that Euler angles tell little of the body's axes."""
+"""|cos(pitch)| below which the nose points up or down, so that Euler angles hardly determine the body's axes."""
 
 # Shares of the largest eigenvalue. Near a vertical pitch a body's own smallest one is not larger than the second.
 _ROUNDING, _VERTICAL_ROUNDING = 1e-9, 0.01
@@ -66,21 +66,10 @@ def inertia_matrix_gradient(attitude: Array, inertia: Array) -> Array:
 
 
 def newton_euler_torque(attitude: Array, attitude_rate: Array, attitude_acceleration: Array, inertia: Array) -> Array:
-    """Compute the generalised torque from the body rates, ``tau = W^T (I omegad + omega x I omega)``.
+    """Compute the generalised torque, N m, from the body rates, ``tau = W^T (I omegad + omega x I omega)``.
 
-    Parameters
-    ----------
-    attitude, attitude_rate, attitude_acceleration : array, shape (time, 3), rad, rad/s, rad/s^2
-    inertia : array, shape (3, 3), kg m^2, body frame
-
-    Returns
-    -------
-    array, shape (time, 3), N m
-        On the Euler coordinates; `rotations.body_torque` turns it into the body's.
-
-    References
-    ----------
-    Equations (2) to (4) of the paper, which give the same; method.md section 2.
+    It is on the Euler coordinates; `rotations.body_torque` turns it into the body's. Equations (2) to (4) of the paper
+    give the same; method.md section 2.
     """
     body = body_torque(attitude, attitude_rate, attitude_acceleration, inertia)
     return rotations.generalised_torque(attitude, body)

@@ -40,18 +40,9 @@ def fits_of_others(ztz: Numbers, ztx: Numbers, ridge: Numbers | float, beside: i
 
 
 def first_stage_fit(instruments: Array, values: Array, ridge: float = RIDGE) -> Array:
-    """Predict values from instruments and a constant, each of five parts by the other ones.
+    """Predict values, time first, from instruments and a constant, each of five parts by the other ones.
 
-    Parameters
-    ----------
-    instruments : array, shape (time, instrument)
-    values : array, shape (time, ...)
-    ridge : float
-        Prior precision of the prediction, for instruments as large as 1.
-
-    Returns
-    -------
-    array, shape of `values`
+    `ridge`: prior precision of the prediction, for instruments as large as 1.
     """
     size, part = instruments.std(axis=0), contiguous(len(values), FOLDS)
     z = np.hstack([np.ones((len(values), 1)), instruments / np.where(size > 0, size, 1.0)])

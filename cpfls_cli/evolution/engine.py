@@ -71,24 +71,10 @@ class History:
 
 @dataclass(frozen=True)
 class Generation:
-    """Report a population after one generation.
+    """Report a population after one generation, of which 0 is the initial population.
 
-    Parameters
-    ----------
-    index : int
-        Generations bred so far; 0 is the initial population.
-    genes : array of int, shape (population, genes)
-        Chromosomes, after the evaluator refined them.
-    objectives : array, shape (population, objectives)
-        To be minimised; +inf where the evaluator gave no finite value.
-    subpopulations : array of int, shape (population,)
-        Label of each individual's subpopulation.
-    evaluations : int
-        Chromosomes evaluated so far, each counted once.
-    front_genes : array of int, shape (front, genes)
-        Non-dominated chromosomes among all ever evaluated.
-    front_objectives : array, shape (front, objectives)
-        Their objectives.
+    Genes are as the evaluator refined them; objectives are to be minimised, +inf where it gave no finite value;
+    evaluations count each chromosome once; the front holds the non-dominated chromosomes among all ever evaluated.
     """
 
     index: int
@@ -150,17 +136,10 @@ def ended(state: EvolutionState, settings: EvolutionSettings) -> End | None:
 
 
 def stalled(history: History, generations: int | None, improvement: float) -> bool:
-    """Tell whether the best of no objective improved enough over the last generations.
+    """Tell whether the best of no objective improved enough over the last generations; never for None of them.
 
-    ``best_before - best_now <= improvement * |best_before|`` for every objective.
-
-    Parameters
-    ----------
-    generations : int or None
-        Generations looked back; never stalled if None.
-    improvement : float
-        Relative improvement that is not enough. An objective that got its first finite value improved, and a history
-        that is shorter is not stalled.
+    Not enough is ``best_before - best_now <= improvement * |best_before|`` for every objective. An objective that got
+    its first finite value improved, and a history that is shorter is not stalled.
     """
     if generations is None or len(history) <= generations:
         return False
@@ -181,29 +160,10 @@ def evolve(
 ) -> Iterator[Generation]:
     """Search for non-dominated chromosomes, one generation at a time.
 
-    Parameters
-    ----------
-    evaluate : callable
-        Takes chromosomes, shape (n, genes), never seen before, and returns their `Evaluation`. It may rewrite
-        them (Lamarckian local search); the rewritten genes take their place.
-    gene_count : int
-        Genes of a chromosome, 16 bits each.
-    initial : array of int, shape (up to population, genes), optional
-        Chromosomes to start with; the rest of the initial population is random.
-
-    Yields
-    ------
-    Generation
-        First the initial population, then one for each of ``settings.generations``, or up to convergence.
-
-    Raises
-    ------
-    ComputationError
-        If `initial` does not fit, or the evaluator's result does not fit the chromosomes.
-
-    References
-    ----------
-    Paper, section 9; method.md section 7.
+    `evaluate` takes chromosomes, shape (n, genes), 16 bits each, never seen before, and returns their `Evaluation`. It
+    may rewrite them (Lamarckian local search); the rewritten genes take their place. `initial`: chromosomes to start
+    with; the rest of the initial population, which comes first, is random. `ComputationError` where they, or the
+    evaluator's result, do not fit. Paper, section 9; method.md section 7.
     """
     state = start(evaluate, gene_count, settings, rng, initial)
     yield state.report()

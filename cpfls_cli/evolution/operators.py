@@ -16,15 +16,7 @@ _BEYOND = 0.25
 def gray_encode(genes: IntArray, bits_per_gene: int = BITS_PER_GENE) -> BoolArray:
     """Write genes as reflected Gray code, ``g XOR (g >> 1)``, most significant bit first.
 
-    Parameters
-    ----------
-    genes : array, shape (individuals, genes)
-        Integers from 0 to ``2**bits_per_gene - 1``.
-
-    Returns
-    -------
-    array of bool, shape (individuals, genes * bits_per_gene)
-        Neighbouring integers differ in one bit.
+    Neighbouring integers differ in one bit; shape (individuals, genes * bits_per_gene).
     """
     code = genes ^ (genes >> 1)
     bits = (code[..., np.newaxis] >> _shifts(bits_per_gene)) & 1
@@ -32,17 +24,7 @@ def gray_encode(genes: IntArray, bits_per_gene: int = BITS_PER_GENE) -> BoolArra
 
 
 def gray_decode(bits: BoolArray, bits_per_gene: int = BITS_PER_GENE) -> IntArray:
-    """Read genes from reflected Gray code, as BS2RV of the Sheffield toolbox does with integer bounds.
-
-    Parameters
-    ----------
-    bits : array of bool, shape (individuals, genes * bits_per_gene)
-        Most significant bit first.
-
-    Returns
-    -------
-    array of int, shape (individuals, genes)
-    """
+    """Read genes from reflected Gray code, as BS2RV of the Sheffield toolbox does with integer bounds."""
     code = bits.reshape(len(bits), bits.shape[1] // bits_per_gene, bits_per_gene)
     binary = np.logical_xor.accumulate(code, axis=-1)
     genes: IntArray = (binary.astype(np.int64) << _shifts(bits_per_gene)).sum(axis=-1)
@@ -54,21 +36,11 @@ def _shifts(bits_per_gene: int) -> IntArray:
 
 
 def linear_ranking_fitness(ranks: IntArray, selective_pressure: float) -> Array:
-    """Assign fitness linear in the position among the sorted ranks (RANKING of the Sheffield toolbox).
+    """Assign fitness linear in the position among the sorted ranks (RANKING of the Sheffield toolbox), with mean 1.
 
-    ``2 - SP + 2 (SP - 1) (position - 1) / (individuals - 1)``, where position 1 is the least fit.
-
-    Parameters
-    ----------
-    ranks : array of int, shape (individuals,)
-        Smaller is better; two individuals at least.
-    selective_pressure : float
-        SP, from 1 (all equal) to 2 (the least fit gets nothing).
-
-    Returns
-    -------
-    array, shape (individuals,)
-        With mean 1; individuals of equal rank share the mean of their positions.
+    ``2 - SP + 2 (SP - 1) (position - 1) / (individuals - 1)``, where position 1 is the least fit and SP, the selective
+    pressure, goes from 1 (all equal) to 2 (the least fit gets nothing). Smaller ranks are better, of two individuals at
+    least; equal ones share the mean of their positions.
     """
     slope = 2.0 * (selective_pressure - 1.0) / (len(ranks) - 1)
     fitness: Array = 2.0 - selective_pressure + slope * (positions(-ranks) - 1.0)
@@ -78,16 +50,8 @@ def linear_ranking_fitness(ranks: IntArray, selective_pressure: float) -> Array:
 def stochastic_universal_sampling(fitness: Array, count: int, rng: np.random.Generator) -> IntArray:
     """Choose parents with one spin of a wheel with equally spaced pointers (SUS of the Sheffield toolbox).
 
-    Parameters
-    ----------
-    fitness : array, shape (individuals,)
-        Not negative, with a positive sum.
-
-    Returns
-    -------
-    array of int, shape (count,)
-        Indices in random order. An individual occurs ``count * fitness / sum(fitness)`` times, rounded down
-        or up.
+    Fitness is not negative, with a positive sum. Indices are in random order; an individual occurs ``count * fitness /
+    sum(fitness)`` times, rounded down or up.
     """
     wheel = np.cumsum(fitness)
     pointers = wheel[-1] * (rng.random() + np.arange(count)) / count
@@ -99,19 +63,8 @@ def stochastic_universal_sampling(fitness: Array, count: int, rng: np.random.Gen
 def intermediate_recombination(genes: IntArray, rate: float, largest: int, rng: np.random.Generator) -> IntArray:
     """Draw offspring between the parents of consecutive pairs and a little beyond (RECINT of the Sheffield toolbox).
 
-    ``offspring = first + u (second - first)``, u uniform from -0.25 to 1.25 for each gene of each offspring.
-
-    Parameters
-    ----------
-    genes : array of int, shape (individuals, genes)
-        Rows 0 and 1 are a pair, rows 2 and 3, and so on; an odd last row stays as it is.
-    rate : float
-        Probability that a pair is recombined.
-    largest : int
-        Offspring are clipped to 0 and this.
-
-    References
-    ----------
+    ``offspring = first + u (second - first)``, u uniform from -0.25 to 1.25 for each gene of each offspring, clipped to
+    0 and the largest; a pair of rows is recombined with the probability `rate`, an odd last row stays as it is.
     Mühlenbein and Schlierkamp-Voosen, Evolutionary Computation 1 (1993): extended intermediate recombination.
     """
     paired = 2 * (len(genes) // 2)
@@ -125,19 +78,10 @@ def intermediate_recombination(genes: IntArray, rate: float, largest: int, rng: 
 
 
 def single_point_crossover(bits: BoolArray, rate: float, rng: np.random.Generator) -> BoolArray:
-    """Exchange the tails of consecutive pairs (XOVSP of the Sheffield toolbox).
+    """Exchange the tails of consecutive pairs, with the probability `rate` (XOVSP of the Sheffield toolbox).
 
-    Parameters
-    ----------
-    bits : array of bool, shape (individuals, bits)
-        Rows 0 and 1 are a pair, rows 2 and 3, and so on; an odd last row stays as it is.
-    rate : float
-        Probability that a pair is crossed.
-
-    Returns
-    -------
-    array of bool, shape (individuals, bits)
-        Each crossed pair keeps at least the first bit and exchanges at least the last.
+    Each crossed pair of rows keeps at least the first bit and exchanges at least the last; an odd last row stays as it
+    is.
     """
     individuals, length = bits.shape
     pairs = individuals // 2
@@ -154,16 +98,8 @@ def single_point_crossover(bits: BoolArray, rate: float, rng: np.random.Generato
 def mutate(bits: BoolArray, individuals_share: float, bits_share: float, rng: np.random.Generator) -> BoolArray:
     """Flip a share of the bits of a share of the individuals (MUT of the Sheffield toolbox, on some rows).
 
-    Every individual and every bit is drawn on its own, so the shares are expectations and hold for small
-    populations and short chromosomes too.
-
-    Parameters
-    ----------
-    bits : array of bool, shape (individuals, bits)
-    individuals_share : float
-        Probability that an individual mutates.
-    bits_share : float
-        Probability that a bit of a mutating individual flips.
+    Every individual and every bit is drawn on its own, so the shares are expectations and hold for small populations
+    and short chromosomes too.
     """
     mutating = rng.random((len(bits), 1)) < individuals_share
     flipped = rng.random(bits.shape) < bits_share
@@ -172,13 +108,7 @@ def mutate(bits: BoolArray, individuals_share: float, bits_share: float, rng: np
 
 
 def subpopulation_labels(population: int, subpopulations: int) -> IntArray:
-    """Split a population as evenly as possible.
-
-    Returns
-    -------
-    array of int, shape (population,)
-        Label of each individual's subpopulation, in increasing order; sizes differ by one at most.
-    """
+    """Split a population as evenly as possible, by labels in increasing order; sizes differ by one at most."""
     return np.sort(np.arange(population, dtype=np.int64) % subpopulations)
 
 
@@ -198,24 +128,11 @@ def reinsert(
 ) -> IntArray:
     """Replace parents by the fittest offspring of their subpopulation (REINS of the Sheffield toolbox).
 
-    Parameters
-    ----------
-    genes : array of int, shape (parents + offspring, genes)
-        Chromosomes of parents, then offspring.
-    ranks : array of int, shape (parents + offspring,)
-        Their ranks, found together; smaller is better.
-    parent_labels, offspring_labels : array of int, shape (parents,) and (offspring,)
-        Subpopulation of each; both hold the same labels.
-    rate : float
-        Share of the offspring that is inserted, one at least and no more than there are parents.
-    method : {"uniform", "fitness", "elitist"}
-        Replace parents drawn at random, so that even the best may be lost, or the least fit. Elitist: the fittest of
-        parents and these offspring stay, and of equal chromosomes only one, as long as there are others.
-
-    Returns
-    -------
-    array of int, shape (parents,)
-        For each place in the population, the index, among parents then offspring, of who now takes it.
+    Genes and ranks (smaller is better) are of parents, then offspring; gives, for each place in the population, the
+    index among them of who now takes it. `rate`: share of the offspring that is inserted, one at least and no more than
+    there are parents. Uniform: replace parents drawn at random, so that even the best may be lost; fitness: the least
+    fit. Elitist: the fittest of parents and these offspring stay, and of equal chromosomes only one, as long as there
+    are others.
     """
     parents = len(parent_labels)
     source = np.arange(parents, dtype=np.int64)
@@ -242,21 +159,10 @@ def _fittest(candidates: IntArray, genes: IntArray, ranks: IntArray) -> IntArray
 def migrate(labels: IntArray, rate: float, rng: np.random.Generator) -> IntArray:
     """Exchange individuals over a complete net, chosen uniformly (MIGRATE of the Sheffield toolbox).
 
-    Each subpopulation sends copies of individuals drawn at random to a pool, and replaces as many of its own,
-    drawn at random too, by individuals from the pool of all the others. The number is the rounded-down share of
-    the smallest subpopulation, at least one, so that subpopulations of unequal size exchange evenly.
-
-    Parameters
-    ----------
-    labels : array of int, shape (population,)
-        Subpopulation of each individual.
-    rate : float
-        Share of a subpopulation that is replaced; nobody moves at 0, or in a single subpopulation.
-
-    Returns
-    -------
-    array of int, shape (population,)
-        For each place in the population, the index of the individual that now takes it.
+    Each subpopulation sends copies of individuals drawn at random to a pool, and replaces as many of its own, drawn at
+    random too, by individuals from the pool of all the others. The number is the rounded-down share (`rate`) of the
+    smallest subpopulation, at least one, so that subpopulations of unequal size exchange evenly; nobody moves at 0, or
+    in a single one. Gives, for each place in the population, the index of the individual that now takes it.
     """
     source = np.arange(len(labels), dtype=np.int64)
     groups = members(labels)

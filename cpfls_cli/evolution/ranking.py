@@ -25,17 +25,7 @@ def worst_where_not_finite(objectives: Array) -> Array:
 
 
 def pareto_front(objectives: Array) -> IntArray:
-    """Find the non-dominated individuals.
-
-    Parameters
-    ----------
-    objectives : array, shape (individuals, objectives)
-
-    Returns
-    -------
-    array of int, shape (front,)
-        Indices in increasing order. Of equal vectors of objectives only the first is kept.
-    """
+    """Find the non-dominated individuals, in increasing order; of equal objectives only the first is kept."""
     costs = comparable(objectives)
     front = []
     # In lexicographic order nobody is dominated by a later one, so the first of the remaining is always kept.
@@ -47,30 +37,15 @@ def pareto_front(objectives: Array) -> IntArray:
 
 
 def rank(objectives: Array, method: Ranking, first_weight: int = 1) -> IntArray:
-    """Rank individuals by the method of this name.
+    """Rank individuals by the method of this name; smaller is better.
 
     Quantity dominance sums, over the population, the components in which others are better minus those in which they
     are worse, ``rank_i = sum_j sum_k w_k sign(f_ik - f_jk)``: a Borda count, which sums to zero over the population,
-    with ties counted zero. The Pareto count ("block-type") is one more than the number of individuals that dominate.
-    Pareto fronts ("slice-type") are sorted out one after the other, and each gives its number.
-
-    Parameters
-    ----------
-    objectives : array, shape (individuals, objectives)
-        To be minimised. An objective that is not finite counts as worse than every finite one.
-    method : {"quantity-dominance", "pareto-count", "pareto-fronts"}
-    first_weight : int, optional
-        Of the first objective in quantity dominance, positive, where that of the others is 1, as are all in the paper;
-        the Pareto rankings know no weights.
-
-    Returns
-    -------
-    array of int, shape (individuals,)
-        Smaller is better. Under each method a dominating individual ranks before the dominated one.
-
-    References
-    ----------
-    Paper, section 6, after its references [6], [5] and [4]; method.md section 7.
+    with ties counted zero. The first objective may weigh more there (`first_weight`), where all are 1 in the paper. The
+    Pareto count ("block-type") is one more than the number of individuals that dominate. Pareto fronts ("slice-type")
+    are sorted out one after the other, and each gives its number. Objectives are to be minimised; one that is not
+    finite counts as worse than every finite one. Under each method a dominating individual ranks before the dominated
+    one. Paper, section 6, after its references [6], [5] and [4]; method.md section 7.
     """
     costs = comparable(objectives)
     if method == "quantity-dominance":
@@ -112,17 +87,9 @@ def _front_numbers(dominates: BoolArray) -> IntArray:
 
 
 def positions(values: Array | IntArray) -> Array:
-    """Give each value its position among the sorted values, equal ones the mean of theirs.
+    """Give each value its position from 1 on among the sorted values, equal ones the mean of theirs.
 
-    Parameters
-    ----------
-    values : array, shape (n,)
-        No NaN; infinite values of one sign are equal.
-
-    Returns
-    -------
-    array, shape (n,)
-        From 1 to n, with halves.
+    Without NaN; infinite values of one sign are equal.
     """
     # scipy.stats.rankdata does the same, but its import takes longer than the rest of the start.
     _, inverse, count = np.unique(values, return_inverse=True, return_counts=True)

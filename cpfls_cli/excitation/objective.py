@@ -20,12 +20,8 @@ from cpfls_cli.trajectory.rotation import RotationLimits, RotationMotion, Rotati
 class Design:
     """Motion at some times as a linear function of the design variables.
 
-    Attributes
-    ----------
-    matrices : array, shape (3, time, variables per angle)
-        By attitude, rate and acceleration.
-    turning : array, shape (3, time, 3)
-        Part of the motion that the turns give.
+    `matrices`: by attitude, rate and acceleration, shape (3, time, variables per angle); `turning`: part of the motion
+    that the turns give, shape (3, time, 3).
     """
 
     matrices: Array
@@ -62,38 +58,21 @@ class Design:
 
 
 def variables_of(path: RotationPath) -> Array:
-    """Write a path as design variables.
+    """Write a path as design variables of equal weight, shape (3, 1 + 2 harmonics).
 
-    Returns
-    -------
-    array, shape (3, 1 + 2 harmonics)
-        Start in rad, then the amplitudes of the rates of sine and cosine terms in rad/s: variables of equal weight.
+    Start in rad, then the amplitudes of the rates of sine and cosine terms in rad/s.
     """
     return np.hstack([path.start[:, None], path.sine * path.frequency, path.cosine * path.frequency])
 
 
 def path_of(variables: Array, like: RotationPath) -> RotationPath:
-    """Read a path from design variables.
-
-    Parameters
-    ----------
-    variables : array, shape (3, 1 + 2 harmonics)
-    like : RotationPath
-        Gives turns and duration.
-    """
+    """Read a path from design variables, with turns and duration of another."""
     sine, cosine = np.split(variables[:, 1:], 2, axis=1)
     return RotationPath(variables[:, 0], like.turns, sine / like.frequency, cosine / like.frequency, like.duration)
 
 
 def design(like: RotationPath, time: Array) -> Design:
-    """Build the linear map from design variables to the motion at some times.
-
-    Parameters
-    ----------
-    like : RotationPath
-        Gives turns, number of harmonics and duration.
-    time : array, shape (time,), s
-    """
+    """Build the linear map from design variables to the motion at some times, for the turns of a path."""
     frequency = like.frequency
     sine, cosine = np.sin(time[:, None] * frequency), np.cos(time[:, None] * frequency)
     one, zero = np.ones((len(time), 1)), np.zeros((len(time), 1))
@@ -125,17 +104,7 @@ ALL_INPUTS = tuple(product(range(3), range(3)))
 
 @dataclass(frozen=True)
 class Conditioning:
-    """Conditioning of a Gram matrix.
-
-    Attributes
-    ----------
-    condition_number : float
-        Of the regressor, the root of that of its Gram matrix.
-    smoothed : float
-        See `conditioning`.
-    slope : array, shape (parameters, parameters)
-        Derivative of `smoothed` by the Gram matrix.
-    """
+    """Conditioning of a Gram matrix: condition number of the regressor, smoothed, and its slope by the matrix."""
 
     condition_number: float
     smoothed: float
@@ -143,20 +112,11 @@ class Conditioning:
 
 
 def conditioning(gram: Array, exponent: float) -> Conditioning:
-    """Bound the logarithm of the condition number by a function without kinks.
+    """Bound the logarithm of the condition number of ``G = Q^T Q`` by a function without kinks.
 
-    ``(log tr G^p + log tr G^-p) / 2p``, which falls to the logarithm of the condition number as p grows.
-
-    Parameters
-    ----------
-    gram : array, shape (parameters, parameters)
-        ``G = Q^T Q``.
-    exponent : float
-        p; one weighs all eigenvalues (the A criterion of design), a large one only the extremes (the K criterion).
-
-    References
-    ----------
-    Pukelsheim (1993), Optimal Design of Experiments, chapter 6: matrix means.
+    ``(log tr G^p + log tr G^-p) / 2p``, which falls to the logarithm of the condition number as the exponent p grows:
+    one weighs all eigenvalues (the A criterion of design), a large one only the extremes (the K criterion). Pukelsheim
+    (1993), Optimal Design of Experiments, chapter 6: matrix means.
     """
     eigenvalues, vectors = np.linalg.eigh(gram)
     values = np.maximum(eigenvalues, _ROUNDING * eigenvalues[-1])
@@ -168,35 +128,18 @@ def conditioning(gram: Array, exponent: float) -> Conditioning:
 
 
 def regressor_of(structure: ModelStructure, motion: Array) -> Array:
-    """Build Q of a motion for uniform partitions.
+    """Build Q of a motion for uniform partitions, shape (samples, 3, parameters).
 
-    Parameters
-    ----------
-    motion : array, shape (3, samples, 3)
-        Attitude, Euler rates, Euler accelerations.
-
-    Returns
-    -------
-    array, shape (samples, 3, parameters)
+    The motion is attitude, Euler rates, Euler accelerations, shape (3, samples, 3), as in all of this module.
     """
     ranges = data_ranges(structure, motion[0])
     return Regressor(structure, Motion(*motion), ranges).matrix(uniform_breakpoints(structure))
 
 
 def condition_number(path: RotationPath, structure: ModelStructure, samples: int) -> float:
-    """Find the condition number of the regressor along a path.
+    """Find the condition number of the regressor along a path, at equal times, for uniform partitions.
 
-    Parameters
-    ----------
-    structure : ModelStructure
-        Its partitions are taken to be uniform.
-    samples : int
-        At equal times over the duration.
-
-    Returns
-    -------
-    float
-        1e15 and more where the path does not excite all parameters.
+    It is 1e15 and more where the path does not excite all parameters.
     """
     motion = path.sample(path.times(samples))
     Q = regressor_of(structure, np.stack([motion.attitude, motion.attitude_rate, motion.attitude_acceleration]))
@@ -208,19 +151,8 @@ class Objective:
     """Gradient of the smoothed condition number and the penalty, by the design variables.
 
     Each evaluation samples the path anew, shifted by a random part of the time between two samples: what lies between
-    samples counts too, on average.
-
-    Parameters
-    ----------
-    path : RotationPath
-        Gives turns, harmonics and duration.
-    iterations : int
-        Evaluations in all, over which the exponent of the smoothed condition number and the cost of the penalty grow.
-
-    Attributes
-    ----------
-    history : list of float
-        Condition number at each evaluation.
+    samples counts too, on average. Over all `iterations` the exponent of the smoothed condition number and the cost of
+    the penalty grow; `history` is the condition number at each.
     """
 
     def __init__(
@@ -257,20 +189,7 @@ class Objective:
 
 
 def conditioning_gradient(structure: ModelStructure, motion: Array, exponent: float) -> tuple[float, Array]:
-    """Differentiate the smoothed condition number F of Q by the motion, ``2 <Q dF/dG, dQ>``.
-
-    Parameters
-    ----------
-    motion : array, shape (3, samples, 3)
-        Attitude, Euler rates, Euler accelerations.
-    exponent : float
-        Of `conditioning`.
-
-    Returns
-    -------
-    condition_number : float
-    gradient : array, shape (3, samples, 3)
-    """
+    """Differentiate the smoothed condition number F of Q by the motion, ``2 <Q dF/dG, dQ>``; gives the number too."""
     Q = regressor_of(structure, motion)
     rows = Q.reshape(-1, structure.parameters)
     reached = conditioning(rows.T @ rows, exponent)
@@ -281,15 +200,7 @@ def conditioning_gradient(structure: ModelStructure, motion: Array, exponent: fl
 def penalty_gradient(limits: RotationLimits, motion: Array, cost: float) -> Array:
     """Differentiate the mean square of the excess over the limits by the motion.
 
-    Parameters
-    ----------
-    motion : array, shape (3, samples, 3)
-    cost : float
-        Of a limit exceeded twofold, all the time.
-
-    Returns
-    -------
-    array, shape (3, samples, 3)
+    `cost` is that of a limit exceeded twofold, all the time.
     """
     loads = limits.loads(RotationMotion(*motion))
     excess = np.sign(loads) * np.maximum(np.abs(loads) - _FREE_SHARE, 0.0)
@@ -300,21 +211,7 @@ def penalty_gradient(limits: RotationLimits, motion: Array, cost: float) -> Arra
 def regressor_gradient(structure: ModelStructure, motion: Array, weights: Array) -> Array:
     """Differentiate ``sum_n <weights_n, Q(motion_n)>``: by rates and accelerations exactly, by attitude by differences.
 
-    Parameters
-    ----------
-    structure : ModelStructure
-        Its partitions are taken to be uniform.
-    motion : array, shape (3, samples, 3)
-        Attitude, Euler rates, Euler accelerations.
-    weights : array, shape (samples, 3, parameters)
-
-    Returns
-    -------
-    array, shape (3, samples, 3)
-
-    References
-    ----------
-    method.md section 2: ``tau = J qdd + (dJ/dt) qd - 1/2 grad_q (qd^T J qd)``.
+    Partitions are taken to be uniform. method.md section 2: ``tau = J qdd + (dJ/dt) qd - 1/2 grad_q (qd^T J qd)``.
     """
     inputs = (_ATTITUDE, ROLL), (_ATTITUDE, PITCH)
     gradient = motion_gradient(lambda moved: regressor_of(structure, moved), motion, weights, _ATTITUDE_STEP, inputs)
@@ -353,25 +250,10 @@ def motion_gradient(
     step: float,
     inputs: Sequence[tuple[int, int]] = ALL_INPUTS,
 ) -> Array:
-    """Differentiate ``sum_n <weights_n, f(motion_n)>`` by central differences.
+    """Differentiate ``sum_n <weights_n, f(motion_n)>`` by central differences; zero for inputs that are left out.
 
-    A jump is smoothed over the step, so that its share in the slope is not lost between samples.
-
-    Parameters
-    ----------
-    function : callable
-        Takes a motion, shape (3, samples, 3), to values of shape (samples, ...), sample by sample.
-    motion : array, shape (3, samples, 3)
-        Attitude, Euler rates, Euler accelerations.
-    weights : array, shape (samples, ...)
-    step : float, rad and s
-    inputs : sequence of pairs of int
-        Index of attitude, rate or acceleration, and of the axis.
-
-    Returns
-    -------
-    array, shape (3, samples, 3)
-        Zero for the inputs that are left out.
+    A jump is smoothed over the step, so that its share in the slope is not lost between samples. An input is the index
+    of attitude, rate or acceleration, and of the axis.
     """
     gradient, flat = np.zeros_like(motion), weights.reshape(len(weights), -1)
     for kind, axis in inputs:

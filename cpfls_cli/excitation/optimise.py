@@ -116,22 +116,8 @@ class _Report:
 
 
 def adam(gradient: Callable[[Array], Array], start: Array, iterations: int, step: float) -> Iterator[Array]:
-    """Descend by Adam with a step that falls to zero along half a cosine.
+    """Descend by Adam with a step that falls to zero along half a cosine; the gradient has noise of mean zero.
 
-    Parameters
-    ----------
-    gradient : callable
-        Gradient at given variables, with noise of mean zero.
-    step : float
-        Of each variable, at the beginning.
-
-    Yields
-    ------
-    array
-        Variables after each iteration.
-
-    References
-    ----------
     Kingma & Ba (2015), Adam: a method for stochastic optimization, ICLR. Loshchilov & Hutter (2017), SGDR, ICLR, for
     the cosine.
     """

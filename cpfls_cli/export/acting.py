@@ -28,10 +28,7 @@ def parts_of(
 ) -> Iterator[tuple[str, Vector]]:
     """Give torque and force of each part, six components, those with levers for the forces of the others last.
 
-    Parameters
-    ----------
-    motion : sequence of value
-        Vectors of air velocity and body rate, then of the rotors speeds, accelerations and slow squared speeds.
+    `motion`: vectors of air velocity and body rate, then of the rotors speeds, accelerations and slow squared speeds.
     """
     air, rate, speed, turning, slow = motion
     seen = Instant(vehicle, speed, air, rate, turning, slow_square=slow, functions=functions)
@@ -51,11 +48,7 @@ def parts_of(
 def parts_along(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> dict[str, Array]:
     """Evaluate each part along a motion, shape (time, 6), N m and N, body frame.
 
-    Parameters
-    ----------
-    air, rate : array, shape (time, 3), m/s and rad/s, body frame
-    rotor : array, shape (time, 1 + 4 rotors)
-        See `RotorResponse.terms_by_step`.
+    Air velocity and rate are in m/s and rad/s, body frame; rotors as of `RotorResponse.terms_by_step`.
     """
     speed, square, turning, slow = rotor[:, 1:].T.reshape(4, model.rotors, -1)
     motion = (tuple(air.T), tuple(rate.T), speed, turning, slow + square)
@@ -95,15 +88,7 @@ def units_of(model: VehicleModel) -> dict[str, str]:
 
 
 class Traced(NamedTuple):
-    """Torque and force of a model by symbols.
-
-    Attributes
-    ----------
-    wrench : vector
-        Six components, N m and N, body frame.
-    parts : mapping of int to str
-        Name of each part by where it begins.
-    """
+    """Torque and force of a model by symbols, six components in the body frame, and where each part begins."""
 
     graph: Graph
     wrench: Vector
@@ -122,10 +107,7 @@ class Traced(NamedTuple):
 def traced_wrench(model: VehicleModel, *, shares: bool = False) -> Traced:
     """Trace torque and force with numbers by name; those that are 0 are left out.
 
-    Parameters
-    ----------
-    shares : bool
-        Whether each part is multiplied with a number, see `share_of`.
+    `shares`: whether each part is multiplied with a number, see `share_of`.
     """
     graph, values = Graph(), numbers_of(model)
 

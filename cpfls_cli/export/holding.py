@@ -120,20 +120,10 @@ class Missing:
 class Held:
     """What a target flies.
 
-    Attributes
-    ----------
-    weights : array, shape (6, terms, 1 + 4 rotors)
-        Torque and force by terms of the motion and of the rotors.
-    squares : bool
-        Whether the lag acts on speeds and on squared speeds each, and not on the speeds alone.
-    fuzzy : InertiaModel or None
-        In the place of the inertia of `body`.
-    numbers : mapping of str to float
-        Of a target that has numbers of its own.
-    beyond : tuple of Acting
-        What is no sum of weights, and levers for its forces.
-    wind : tuple of float, m/s, world frame
-        That it is flown in.
+    `weights`: torque and force by terms of the motion and of the rotors, shape (6, terms, 1 + 4 rotors); `squares`:
+    whether the lag acts on speeds and on squared speeds each, and not on the speeds alone; `fuzzy`: in the place of the
+    inertia of `body`; `numbers`: of a target that has numbers of its own; `beyond`: what is no sum of weights, and
+    levers for its forces; `wind`: m/s, world frame.
     """
 
     vehicle: VehicleSettings

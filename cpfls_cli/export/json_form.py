@@ -48,7 +48,7 @@ _ON_ATTITUDE = {
     "D": "inertia matrix on q, kg m^2, symmetric: fuzzy functions plus W^T I W",
     "C": "Coriolis matrix, kg m^2/s: C_ij = 1/2 sum_k (dD_ij/dq_k + dD_ik/dq_j - dD_jk/dq_i) qd_k",
     "W": "body rates = W qd, W = [[1, 0, -sin p], [0, cos r, sin r cos p], [0, -sin r, cos r cos p]]",
-    "body_torque": f"W^-T torque, N m; the Euler angles tell little of it where |cos(pitch)| < {VERTICAL}",
+    "body_torque": f"W^-T torque, N m; the Euler angles hardly determine it where |cos(pitch)| < {VERTICAL}",
 }
 
 HOW_TO_EVALUATE_INERTIA = (

@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.text import strict_json
+from cpfls_cli.export.text import number, strict_json
 from cpfls_cli.flights.path import Excited, PlannedPath
 from cpfls_cli.trajectory.excited import fade_time
 
@@ -209,7 +209,7 @@ def system_id_lines(excited: Excited, axis: str, run: float, hover: float) -> st
         "# Hover high and in still air, log at full rate (LOG_BITMASK, fast attitude), switch to the mode: it starts",
         "# after 1 s and stops by itself. Switch away at once if it drifts. Each switch to the mode is another run.",
     )
-    return "\n".join([*head, *(f"{name},{value:.6g}" for name, value in values.items())]) + "\n"
+    return "\n".join([*head, *(f"{name},{number(value, '.6g')}" for name, value in values.items())]) + "\n"
 
 
 def _refuse_record(length: float, low: float, high: float) -> None:

@@ -27,11 +27,7 @@ _PROBES = 900
 class Numbers:
     """A simulator's numbers, each with the torque and force that it gives per unit.
 
-    Attributes
-    ----------
-    tables : array, shape (number, 6, terms, 1 + 4 rotors)
-    size : array, shape (6, terms, 1 + 4 rotors)
-        Natural size of what one weight does.
+    `tables`: shape (number, 6, terms, 1 + 4 rotors); `size`: natural size of what one weight does.
     """
 
     names: tuple[str, ...]

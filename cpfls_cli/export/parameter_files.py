@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.autopilots.parameters import Autopilot
+from cpfls_cli.export.text import number
 from cpfls_cli.tuning.vehicle import ParameterRow
 
 Rows = Mapping[str, ParameterRow]
@@ -21,7 +22,7 @@ QGROUNDCONTROL_HEAD = "# Vehicle-Id Component-Id Name Value Type"
 
 def qgroundcontrol_line(name: str, value: float) -> str:
     """Write a parameter for QGroundControl; whole numbers are those that come as integers."""
-    return f"1\t1\t{name}\t{value:.9g}\t{_INTEGER if isinstance(value, int) else _FLOAT}"
+    return f"1\t1\t{name}\t{number(value, '.9g')}\t{_INTEGER if isinstance(value, int) else _FLOAT}"
 
 
 def parameter_file(autopilot: Autopilot, version: str, about: str, rows: Rows) -> tuple[str, str]:
@@ -98,13 +99,13 @@ def _crazyflie(rows: Rows) -> Iterator[str]:
     for name, row in rows.items():
         yield f"  # {_comment(row)}"
         yield f"  {name}:"
-        yield f"    default_value: {row.default:.9g}"
+        yield f"    default_value: {number(row.default, '.9g')}"
         yield "    is_stored: true"
         yield f"    stored_value: {_value(row)}"
 
 
 def _value(row: ParameterRow) -> str:
-    return f"{row.proposed:.9g}"
+    return number(row.proposed, ".9g")
 
 
 class _Form(NamedTuple):

@@ -41,13 +41,8 @@ _STEPS, _SPREAD, _SECOND = 12, 0.2, 1.0
 class Expected:
     """What a model gives along a motion.
 
-    Attributes
-    ----------
-    inertia, coriolis : array, shape (samples, 3, 3)
-    torque, body : array, shape (samples, 3), N m
-    inside : array of bool, shape (samples,)
-    scale : array, shape (samples, 4)
-        Sizes of the terms that D, C, torque and body torque are sums of: what their rounding errors are relative to.
+    `scale`: sizes of the terms that D, C, torque and body torque are sums of, which their rounding errors are relative
+    to, shape (samples, 4).
     """
 
     motion: Motion
@@ -112,14 +107,7 @@ def _cells(allowed: BoolArray, rng: np.random.Generator) -> Iterator[tuple[int, 
 
 
 class ReferencePoints(NamedTuple):
-    """States, what the model gives there, and the sizes of the terms that it is a sum of.
-
-    Attributes
-    ----------
-    air, rate : array, shape (point, 3)
-    rotor : array, shape (point, 1 + 4 rotors)
-    wrench, scale : array, shape (point, 6)
-    """
+    """States, what the model gives there, and the sizes of the terms that it is a sum of."""
 
     air: Array
     rate: Array
@@ -129,18 +117,11 @@ class ReferencePoints(NamedTuple):
 
 
 class ReferenceRun(NamedTuple):
-    """A run along logged rotor speeds, step by step.
+    """A run along logged rotor speeds, rad/s, step by step.
 
-    Attributes
-    ----------
-    hold : {"linear", "previous"}
-    speed : array, shape (step + 1, rotor), rad/s
-    rotor : array, shape (step, 1 + 4 rotors)
-        Terms of the rotors over each step.
-    states : State
-        Before the first step and after each.
-    condition : float
-        Largest condition number of an inertia over attitude on the way, which magnifies rounding; 1 for a constant one.
+    `rotor`: terms of the rotors over each step, shape (step, 1 + 4 rotors); `states`: before the first step and after
+    each; `condition`: largest condition number of an inertia over attitude on the way, which magnifies rounding, 1 for
+    a constant one.
     """
 
     hold: Hold

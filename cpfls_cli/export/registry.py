@@ -36,16 +36,8 @@ Write = Callable[[Sheet, Held, Sequence[str], str], str]
 class Form:
     """A form that a model is exported in.
 
-    Attributes
-    ----------
-    ending : str
-        Of its file.
-    held : callable
-        From a vehicle to what the form holds of it, and to how it takes weights.
-    also : str
-        Ending of a file that the other one needs; empty for none.
-    lacks : str
-        What no file of this form can state, whatever the vehicle.
+    `held`: from a vehicle to what the form holds of it, and to how it takes weights; `also`: ending of a file that the
+    other one needs, empty for none; `lacks`: what no file of this form can state, whatever the vehicle.
     """
 
     title: str
@@ -60,15 +52,9 @@ class Form:
 class Target(Form):
     """A form of which something flies otherwise than any sum of weights.
 
-    Attributes
-    ----------
-    fly, fly_as_held : callable
-        From the text of the file and a course to states at the samples behind each start, shape (run, horizon, ...);
-        the second leaves out what it does otherwise.
-    step_s : float
-        Longest step that it is flown with.
-    otherwise : str
-        What that is, in words.
+    `fly`, `fly_as_held`: from the text of the file and a course to states at the samples behind each start, shape (run,
+    horizon, ...); the second leaves out what it does `otherwise`, in words. `step_s`: longest step that it is flown
+    with.
     """
 
     fly: Callable[[str, Course], State]
@@ -134,14 +120,9 @@ FORMS: dict[str, Form] = {
 
 @dataclass(frozen=True)
 class Exported:
-    """A model in a form.
+    """A model in a form: the text of each file by name, the one that needs the others last.
 
-    Attributes
-    ----------
-    texts : dict of str to str
-        Of each file by its name, the one that needs the others last.
-    remarks : tuple of str
-        What the form does not hold, in words.
+    `remarks`: what the form does not hold, in words.
     """
 
     texts: dict[str, str]

@@ -35,7 +35,7 @@ GUST_RECIPE = (
 """How to play gusts, which no equation of an export holds."""
 
 LACK_RECIPE = (
-    "What the model lacks comes again, and is as large as shares of its parts: torque or force on each axis is x times "
+    "What the model lacks is repeatable, and as large as shares of its parts: torque or force on each axis is x times "
     "the root of rest^2 + the sum of (share * what that part of the model gives there now)^2, of a body that does not "
     "turn and rotors that turn alike, at the root mean square of their speeds, with x as of a gust of size 1 and this "
     "memory."
@@ -56,38 +56,14 @@ class References(NamedTuple):
 
 @dataclass(frozen=True)
 class Sheet:
-    """A model, ready to be written in any form.
+    """A model, ready to be written in any form, in still air.
 
-    Attributes
-    ----------
-    name : str
-        Prefix of all names in source code, an identifier.
-    model : VehicleModel
-        In still air; where its inertia depends on the attitude, it is that of an identified model.
-    worth : tuple of str
-        Paragraphs that say what it is worth.
-    origin : Header
-        Of the artifact that it was read from.
-    file, sha256 : str
-        Name, without its folder, and hash of the artifact.
-    verdict : str or None
-        In a word.
-    stopped : str or None
-        Why its search did not come to its end; None where it did.
-    evidence : mapping of str
-        What it was judged by, for JSON.
-    outside : tuple of Missing
-        Parts of the artifact that the model does not hold: effects that are no sums of weights.
-    wind : tuple of float, m/s, world frame
-        Of the flights that it was made with.
-    floor : tuple of float, length 6, N m and N
-        Noise floors of the flights that it was made with; NaN where unknown.
-    warnings : tuple of str
-        What speaks against using it, of an identified model, on the screen alone.
-    cautions : tuple of str
-        What speaks against using it, at the top of every file.
-    impossible : str
-        Its numbers that no such vehicle has, in the first line of every file; empty where all can be.
+    `name`: prefix of all names in source code; `worth`: paragraphs that say what it is worth; `verdict`: in a word;
+    `stopped`: why its search did not come to its end; `evidence`: what it was judged by, for JSON; `outside`: effects
+    of the artifact that are no sums of weights; `wind` of the flights that it was made with, m/s, world frame, and
+    their noise `floor`, N m and N, NaN where unknown; `warnings`: what speaks against using it, on the screen alone;
+    `cautions`: at the top of every file; `impossible`: its numbers that no such vehicle has, in the first line of every
+    file.
     """
 
     name: str

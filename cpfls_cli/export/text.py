@@ -67,9 +67,9 @@ def checked_identifier(name: str) -> str:
     return name
 
 
-def number(value: float) -> str:
-    """Write a number with as many digits as bring it back."""
-    return repr(float(value))
+def number(value: float, form: str = "") -> str:
+    """Write a number as a format of Python says, or with as many digits as bring it back; never as -0."""
+    return f"{value:z{form}}" if form else repr(float(value) + 0.0)
 
 
 def c_row(values: Iterable[float]) -> str:
@@ -113,7 +113,7 @@ def _written(value: Any, depth: int) -> str:
         return "{\n" + ",\n".join(entries) + "\n" + " " * depth + "}"
     if isinstance(value, list | tuple) and any(isinstance(item, Mapping | str) for item in value):
         return "[\n" + ",\n".join(blank + _written(item, depth + 1) for item in value) + "\n" + " " * depth + "]"
-    return json.dumps(_plain(value), allow_nan=False)
+    return in_json(value)
 
 
 def yaml_text(comment: Sequence[str], document: Mapping[str, Any]) -> str:
@@ -128,8 +128,13 @@ def _yaml_lines(document: Mapping[str, Any], blank: str) -> Iterator[str]:
             yield from _yaml_lines(value, f"{blank}  ")
         else:
             # Readers of YAML 1.1 take 1e-05 for text.
-            written = re.sub(r"(?<![\w.\"])(-?\d+)e([-+]\d+)", r"\1.0e\2", json.dumps(_plain(value), allow_nan=False))
+            written = re.sub(r"(?<![\w.\"])(-?\d+)e([-+]\d+)", r"\1.0e\2", in_json(value))
             yield f"{blank}{json.dumps(key)}: {written}"
+
+
+def in_json(value: Any) -> str:
+    """Write numbers, lists of them or text as JSON; null in place of what is not finite."""
+    return json.dumps(_plain(value), allow_nan=False)
 
 
 def _plain(value: Any) -> Any:
@@ -137,8 +142,8 @@ def _plain(value: Any) -> Any:
         return [_plain(item) for item in value]
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
+    if isinstance(value, float):
+        return value + 0.0 if math.isfinite(value) else None
     return _text(value) if isinstance(value, str) else value
 
 

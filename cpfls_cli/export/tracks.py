@@ -22,18 +22,10 @@ _VALUE_DIGITS, _STAMP_DECIMALS = 9, 9
 
 @dataclass(frozen=True, kw_only=True)
 class Track:
-    """A quantity over time, as it was measured and in other ways.
+    """A quantity over time, s, on the clock of the log, as it was measured and in other ways; NaN where not known.
 
-    Attributes
-    ----------
-    flight : str
-        Which of several flights; empty where there is one.
-    time : array, shape (time,), s
-        On the clock of the log, increasing.
-    values : mapping of str to array, shape (time,) or (time, axis)
-        By what they are; NaN where not known. A difference is measured less model.
-    axes : tuple of str
-        Names of the columns; empty for one without.
+    `flight`: which of several; `axes`: names of the columns. Both are empty where there is one. A difference is
+    measured less model.
     """
 
     name: str
@@ -61,15 +53,9 @@ class Track:
 
 @dataclass(frozen=True, kw_only=True)
 class Curve:
-    """Quantities over something else than time, such as a horizon or a frequency.
+    """Quantities over something else than time, such as a horizon or a frequency; NaN where not known.
 
-    Attributes
-    ----------
-    over : str
-        Name of the first column, with its unit.
-    x : array, shape (point,)
-    values : mapping of str to array, shape (point,)
-        By name, NaN where not known.
+    `over`: name of the first column, with its unit.
     """
 
     name: str
@@ -81,15 +67,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a vehicle is and how it is turned, of what is measured or of a model.
-
-    Attributes
-    ----------
-    position : array, shape (time, 3), m, world frame
-        NaN where not known.
-    attitude : array, shape (time, 3), rad
-        Roll, pitch, yaw.
-    """
+    """Where a vehicle is and how it is turned (roll, pitch, yaw, rad), measured or of a model; NaN where not known."""
 
     child: str
     time: Array

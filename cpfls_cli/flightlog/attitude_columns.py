@@ -4,7 +4,7 @@ The gyroscope follows the derivative of the attitude, the acceleration over grou
 an accelerometer senses what carries the vehicle. With other axes each of them may fit as well, since names of axes are
 free; so among the readings that explain the motion as well as the best, the one is taken that reads least otherwise
 than it is named. A column that disagrees with all others is then the odd one, and not they. Where another reading
-takes less than twice as much, the log does not tell.
+takes less than twice as much, the log does not show which.
 """
 
 from __future__ import annotations

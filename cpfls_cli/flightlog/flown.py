@@ -177,7 +177,7 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
         flies = smoothed(above, period, _SHORT_S) if starts_there else np.ones(len(height), dtype=bool)
         return flies, "it is on the ground"
     if rate is None:
-        why = "no rotors, no height and no rates are recognised, so flight cannot be told from standing"
+        why = "no rotors, no height and no rates are recognised, so flight cannot be distinguished from standing"
         return None, f"{why}: {BY_HAND}"
     spread = np.sqrt(averaged(rate**2, period, _SHORT_S))
     quiet = spread < max(_STILL_RAD_S, 0.05 * float(np.quantile(spread, 0.9)))

@@ -71,7 +71,7 @@ class Proposal:
     crops: Mapping[str, tuple[float, float] | None]  # Of each log.
     rate_hz: float | None  # One rate for all logs, Hz; None where they have one.
     gap_s: float  # Longest step that has to be bridged, s.
-    airframe: Airframe | None  # None where neither parameters nor motion tell the rotors.
+    airframe: Airframe | None  # None where neither parameters nor motion show the rotors.
     rotors: int  # Number of rotors; 0 where no columns are theirs.
     speed_max: float  # Round number above the largest rotor speed, rad/s.
     facts: tuple[str, ...]  # What else the logs state.
@@ -310,7 +310,7 @@ def _merged_choices(logs: Sequence[KnownLog]) -> tuple[KeyChoice, ...]:
 
 
 def _by_weight(guess: Guess, speeds: Array | None, mass_kg: float, arm_m: float) -> Guess:
-    """Let the mass that rotors carry tell rad/s from rpm, where the size of their speeds does not."""
+    """Let the mass that rotors carry decide between rad/s and rpm, where the size of their speeds does not."""
     if guess.signal != "rotor_speed" or speeds is None or [rival.text for rival in guess.rivals] != ["unit: rpm"]:
         return guess
     units: tuple[UnitName, UnitName] = ("rad/s", "rpm")
@@ -346,7 +346,7 @@ def _two_masses(logs: Sequence[KnownLog], mass_kg: float | None) -> list[str]:
 def _by_load(logs: Sequence[KnownLog]) -> list[tuple[Load, KnownLog]]:
     """Sort logs by what their rotors carry; none where that is known by speeds of some and commands of others.
 
-    What squared commands, or speeds without an accelerometer, tell of a flight that does not hover is how it is flown.
+    What squared commands, or speeds without an accelerometer, show of a flight that does not hover is how it is flown.
     """
     measured = {one.name: one.recognition.signal("rotor_speed") is not None for one in logs}
     loads = [(one.recognition.load, one) for one in logs]

@@ -32,7 +32,7 @@ class Known(NamedTuple):
     system: str
     signal: str  # One that `import.signals` takes, or one that `look` alone asks for.
     columns: tuple[str, ...]  # Each of them, or one pattern with ``*`` for the axes or numbers of a group.
-    unit: UnitName | None  # Of ``scale * column + offset``; None where numbers or the log tell it.
+    unit: UnitName | None  # Of ``scale * column + offset``; None where numbers or the log show it.
     frame: str | None  # None where it has none, and for a setpoint, which is in the axes of what is measured.
     scale: float
     offset: float

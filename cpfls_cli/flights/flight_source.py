@@ -35,18 +35,11 @@ _ROTORS = ("rotor-speed", "rotor-command")
 
 @dataclass(frozen=True)
 class FlightFile:
-    """Samples that stay in their file.
+    """Samples, from `start` to before `stop`, that stay in their file.
 
-    Attributes
-    ----------
-    path : Path
-        Absolute, because workers may read it too.
-    names : tuple of str
-        Paths of datasets: time, motion and, where it is asked for, torque.
-    start, stop : int
-        First sample, and the one after the last.
-    size_bytes, rows : int
-        Of the file as it was opened; whoever reads it elsewhere, or later, must find the same.
+    The path is absolute, because workers may read it too; `names` are paths of datasets: time, motion and, where it is
+    asked for, torque. Size and rows are those of the file as it was opened; whoever reads it elsewhere, or later, must
+    find the same.
     """
 
     path: Path

@@ -140,14 +140,7 @@ class RandomPaths:
 
 @dataclass(frozen=True)
 class FirstLeg:
-    """Motion along the line of the first move.
-
-    Attributes
-    ----------
-    time : array, shape (samples,), s
-    curves : dict of str to array, shape (samples,)
-        By name of the derivative, signed along the move.
-    """
+    """Motion along the line of the first move, by name of the derivative, signed along the move."""
 
     time: Array
     curves: dict[str, Array]

@@ -56,22 +56,10 @@ class Recordings:
 class ReadFlight:
     """A flight as it was read.
 
-    Attributes
-    ----------
-    signals : mapping of str to array
-        By the names of a flight's datasets.
-    units : mapping of str to str
-        Of the import that made it.
-    flown_at : float
-        When the log begins, s since 1970 began (UTC); NaN where it does not tell, and of an artifact.
-    updated_hz : mapping of str to float
-        Updates a second of signals that its log has more rows than.
-    begins : float
-        Stamp of the log's own clock at time 0, s; NaN where there is none.
-    stated : mapping of str to str
-        What the log says of its vehicle, as `stated_vehicle`; empty where nothing is known of it.
-    system : str
-        What wrote the log, such as ``PX4``, with its version where it is known; empty where the log does not say.
+    `flown_at`: when the log begins, s since 1970 began (UTC), NaN where it does not say, and of an artifact;
+    `updated_hz`: updates a second of signals that its log has more rows than; `begins`: stamp of the log's own clock at
+    time 0, s, NaN where there is none; `stated`: what the log says of its vehicle, as `stated_vehicle`; `system`: what
+    wrote the log, such as ``PX4``, with its version where it is known.
     """
 
     name: str
@@ -88,12 +76,8 @@ class ReadFlight:
 class ReadAlone(NamedTuple):
     """One flight that was read by itself.
 
-    Attributes
-    ----------
-    full_voltage : float
-        What its voltages are shares of, V; 1 where it states shares.
-    contradictions : tuple of str
-        Sentences: what of the flight contradicts itself or its vehicle, but for numbers that cancel between flights.
+    `full_voltage`: what its voltages are shares of, V, 1 where it states shares; `contradictions`: what of the flight
+    contradicts itself or its vehicle, but for numbers that cancel between flights.
     """
 
     flight: ReadFlight

@@ -104,18 +104,7 @@ def _with_constant(value: Array, slope: Array) -> tuple[Array, Array]:
 
 
 def row_products(first: Array, second: Array) -> Array:
-    """Multiply all pairs of columns, sample by sample (row-wise Kronecker product).
-
-    Parameters
-    ----------
-    first : array, shape (samples, m)
-    second : array, shape (samples, n)
-
-    Returns
-    -------
-    array, shape (samples, m * n)
-        The index of `second` runs fastest.
-    """
+    """Multiply all pairs of columns (row-wise Kronecker product); the index of `second` runs fastest."""
     return (first[:, :, None] * second[:, None, :]).reshape(len(first), -1)
 
 

@@ -46,21 +46,9 @@ class MappedInput:
 
 
 def seesaw(angle: Array) -> tuple[Array, Array]:
-    """Evaluate the triangle wave with value 0 at 0, 1 at pi/2, 0 at pi and -1 at 3 pi/2.
+    """Evaluate the triangle wave with value 0 at 0, 1 at pi/2, 0 at pi and -1 at 3 pi/2, and its slope, 1/rad.
 
-    Parameters
-    ----------
-    angle : array, shape (samples,), rad
-
-    Returns
-    -------
-    value : array, shape (samples,)
-    slope : array, shape (samples,), 1/rad
-        +-2/pi; it jumps at pi/2 and 3 pi/2.
-
-    References
-    ----------
-    Equation (11); method.md section 5.
+    The slope is +-2/pi; it jumps at pi/2 and 3 pi/2. Equation (11); method.md section 5.
     """
     near = wrapped(angle)
     folded = np.abs(near) > 0.5 * np.pi

@@ -80,23 +80,10 @@ class Memberships:
 
 
 def z_function(position: Array) -> tuple[Array, Array, Array]:
-    """Evaluate Zadeh's z-function, the edge along which a membership function falls.
+    """Evaluate Zadeh's z-function, the edge along which a membership function falls, and two derivatives by u.
 
-    ``z(u) = 1 - 2 u^2`` up to the middle, ``2 (1 - u)^2`` after it.
-
-    Parameters
-    ----------
-    position : array, shape (samples,)
-        u on [0, 1]: 0 at the function's own peak, 1 at its neighbour's.
-
-    Returns
-    -------
-    value, first, second : array, shape (samples,)
-        The function, and its derivatives by u.
-
-    References
-    ----------
-    Equation (8) with the squares that its print lost; method.md section 4.
+    ``z(u) = 1 - 2 u^2`` up to the middle, ``2 (1 - u)^2`` after it; u is 0 at the function's own peak, 1 at its
+    neighbour's. Equation (8) with the squares that its print lost; method.md section 4.
     """
     left = position < 0.5
     rest = 1.0 - position

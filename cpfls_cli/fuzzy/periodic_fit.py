@@ -194,20 +194,10 @@ def _quality(solution: RidgeSolution, samples: int, unit: float) -> FitQuality:
 
 @dataclass(frozen=True)
 class RidgeSolution:
-    """Solution of ``min |A c - y|^2 + weight |c|^2``.
+    """Solution of ``min |A c - y|^2 + weight |c|^2``, of minimum norm where the samples do not determine all.
 
-    Attributes
-    ----------
-    coefficients : array, shape (coefficients,)
-        Of minimum norm where the samples do not determine all.
-    rank : int
-        Number of singular values of A above the tolerance.
-    condition_number : float
-        Largest over smallest kept singular value of A; infinite for rank zero.
-    effective_coefficients : float
-        Trace of the matrix that takes y to its fit: the rank without a weight, less with one.
-    residual_square : float
-        Sum of the squared residuals.
+    `rank` and `condition_number` are of the singular values of A above the tolerance, infinite for rank zero;
+    `effective_coefficients`: trace of the matrix that takes y to its fit, the rank without a weight, less with one.
     """
 
     coefficients: Array
@@ -218,23 +208,11 @@ class RidgeSolution:
 
 
 def solve_ridge(blocks: Blocks, weight: float, rank_tolerance: float) -> RidgeSolution:
-    """Solve a least-squares problem whose rows come in blocks.
+    """Solve a least-squares problem whose rows, of A and y, come in blocks, which are called for twice.
 
-    The eigenvalues of the sums are the squares of the singular values, which costs digits; one step of refinement
-    with the residuals of the samples themselves gives them back.
-
-    Parameters
-    ----------
-    blocks : callable
-        Gives the rows of A and y, block after block; called twice.
-    weight : float
-        Weight of the squared coefficients.
-    rank_tolerance : float
-        Singular values below this share of the largest count as zero.
-
-    References
-    ----------
-    Björck, Numerical Methods for Least Squares Problems (1996), sections 2.9 and 6.6.
+    The eigenvalues of the sums are the squares of the singular values, which costs digits; one step of refinement with
+    the residuals of the samples themselves gives them back. Björck, Numerical Methods for Least Squares Problems
+    (1996), sections 2.9 and 6.6.
     """
     gram, moment = _sums(blocks)
     squares, vectors = np.linalg.eigh(gram)

@@ -128,7 +128,7 @@ class FitQuality:
         """Share of the coefficients that the samples determine, ``rank / coefficients``.
 
         Below 1 the system is the smallest of many that fit as well: where no samples were, its values mean nothing,
-        and `cross_validation_rms` does not tell.
+        and `cross_validation_rms` does not show.
         """
         return self.rank / self.coefficients
 
@@ -202,17 +202,10 @@ def as_angles(angles: npt.ArrayLike, inputs: int | None = None) -> Array:
 
 
 def as_points(angles: npt.ArrayLike, inputs: int) -> tuple[Array, tuple[int, ...]]:
-    """Check the angles at which a system is asked for; a single point needs no column of samples.
+    """Check the angles, rad, at which a system is asked for; a single point needs no column of samples.
 
-    Parameters
-    ----------
-    angles : array-like, shape (samples, inputs) or (inputs,), rad; one input: (samples,) or () too
-
-    Returns
-    -------
-    columns : array, shape (samples, inputs), rad
-    outer : tuple of int
-        Shape of one result for each point: (samples,), or () for a single point.
+    Gives them with shape (samples, inputs), and the shape of one result for each point: (samples,), or () for a single
+    one.
     """
     given = _numbers("angles", angles)
     if given.shape == _point_shape(inputs):

@@ -107,6 +107,7 @@ def extend(
     settings: GapSettings,
     base: InertiaModel | None,
     gusty_floor: Array | None = None,
+    first: Refit | None = None,
 ) -> Refit:
     """Refit a model together with effects and evaluate it on held-out flights.
 
@@ -115,6 +116,7 @@ def extend(
     `base`: None for the rigid body of the vehicle.
     `gusty_floor`, shape (6,), N m and N: noise floor with the gusts of the flights, above which the numbers come by
     instruments; None for no gusts.
+    `first`: of the model as given, with which that of another vehicle is compared; None for that of the flights.
     Raises ComputationError if the gap on the held-out flights does not shrink in the channels that change.
     """
     prepared = Preparation(common_windows([*training, *held], settings), base, settings, audit)
@@ -132,6 +134,8 @@ def extend(
         found = by_instruments(fitted(flights, start.chosen, floor, settings), given)
     hypothesis, estimates, *_ = found
     unseen = held_out(logged, repaired, hypothesis, estimates.linear, floor)
+    if first is not None:
+        unseen = replace(unseen, before=first.unseen.before, parameters=first.unseen.parameters)
     _require_smaller(unseen)
     model = ExtendedModel.of(base, hypothesis, estimates, audit)
     return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, unseen)

@@ -14,10 +14,12 @@ from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
+from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, Refit, plain
+from cpfls_cli.gap.naming.causes import of_thrust
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.rounding import less
 from cpfls_cli.simulation.model import late_effects
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
@@ -70,6 +72,65 @@ def _with_inertia(vehicle: VehicleSettings, inertia: Array) -> VehicleSettings:
     xx, yy, zz, xy, xz, yz = (float(inertia[entry]) for entry in INERTIA_ENTRIES)
     moments = (xx, yy, zz, xy, xz, yz) if xy or xz or yz else (xx, yy, zz)
     return vehicle if moments == vehicle.inertia_kg_m2 else replace(vehicle, inertia_kg_m2=moments)
+
+
+def thrust_put_in(refit: Refit, vehicle: VehicleSettings) -> VehicleSettings:
+    """Give rotors the thrust that a refit names as wrong, and their torque with it: levers are where they were.
+
+    Yaw torque follows, unless flights show that the inertia about z over it is off by another amount.
+
+    `vehicle`: that the effects were fitted with.
+    Result: the same vehicle where no thrust is named.
+    """
+    scale, _, yaw = _of_thrust(refit)
+    return vehicle if scale == 1.0 else _lifting(vehicle, scale, scale if yaw else 1.0)
+
+
+def above_thrust(refit: Refit, first: Refit, vehicle: VehicleSettings) -> tuple[Refit, VehicleSettings]:
+    """Give rotors all of the thrust that a second refit found, and the thrust's error against the vehicle as given.
+
+    Moments of inertia that only seemed wrong by the thrust are the stated ones.
+
+    `first`: of the vehicle as given; `vehicle`: what `thrust_put_in` made of it, that the second is of.
+    """
+    scale, right, yaw = _of_thrust(first)
+    parameters = refit.model.parameters.copy()
+    names = [each.name for each in VEHICLE_NUMBERS.coefficients]
+    rest = 1.0 + float(parameters[names.index("thrust_scale")])
+    parameters[[names.index(name) for name in ("thrust_scale", *right)]] = 0.0
+    numbers = tuple(
+        replace(
+            each, value=scale * (1 + each.value) - 1, low=scale * (1 + each.low) - 1, high=scale * (1 + each.high) - 1
+        )
+        if each.name == "thrust_scale"
+        else each
+        for each in refit.estimates.parameters
+    )
+    model, estimates = replace(refit.model, parameters=parameters), replace(refit.estimates, parameters=numbers)
+    return replace(refit, model=model, estimates=estimates), _lifting(vehicle, rest, rest if yaw else 1.0)
+
+
+def _of_thrust(refit: Refit) -> tuple[float, list[str], bool]:
+    """Give the named scale of the thrust, moments that are right by it, and whether yaw torque follows."""
+    named = {number.name for each in refit.effects if each.name == VEHICLE_NUMBERS.name for number in each.numbers}
+    numbers = {each.name: each for each in refit.estimates.parameters}
+    if "thrust_scale" not in named or refit.model.base is not None:
+        return 1.0, [], False
+    right = of_thrust(refit.estimates.parameters)
+    about_z = numbers.get("inertia_z")
+    # What flights do not show has no width beyond rounding.
+    yaw = about_z is None or not less(1 + about_z.low, 1 + about_z.high) or "inertia_z" in right
+    return 1.0 + numbers["thrust_scale"].value, right, yaw
+
+
+def _lifting(vehicle: VehicleSettings, thrust: float, yaw: float) -> VehicleSettings:
+    rotors = (
+        replace(
+            each, thrust_factor_n_s2=thrust * each.thrust_factor_n_s2, drag_factor_n_m_s2=yaw * each.drag_factor_n_m_s2
+        )
+        for each in vehicle.rotors
+    )
+    return replace(vehicle, rotors=tuple(rotors))
 
 
 def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
@@ -146,7 +207,8 @@ def with_known_wrench(recordings: Sequence[Recording], model: VehicleModel) -> l
         return [_with_vehicle(recording, model.vehicle) for recording in recordings]
     given = []
     for recording in of_vehicle(recordings, model):
-        signals = recording.signals
+        # What another model knew is no part of the rotors.
+        signals = replace(recording.signals, known_wrench=None)
         known = model.wrench_along(model.acting(signals)) - signals.wrench
         given.append(replace(recording, signals=replace(signals, known_wrench=known)))
     return given

@@ -2,8 +2,8 @@
 
 An autopilot answers gusts with torque, so least squares of torque on motion finds a mixture of vehicle and autopilot.
 Another run of the same path has the same motion asked for, and another gust, and a setpoint from outside of the loop
-knows of no gust: they are the instruments. Where there are none, what was before knows nothing of what is new in a
-gust.
+knows of no gust: they are the instruments. Where there are none, past windows are: they know nothing of the innovations
+of a gust.
 """
 
 from __future__ import annotations
@@ -63,22 +63,11 @@ _OF_YAW = (2, 4, 5)
 class FreedTorque:
     """Samples of flights with instruments, with the torque that they take where no gust acts.
 
-    Attributes
-    ----------
-    training, learned : TorqueSource
-        Those of the training part and of the samples learned from that the instruments know.
-    rigid_body, least_squares : array, shape (6,), kg m^2
-        Inertia parameters by instruments, and by least squares of the torque as measured.
-    half : array, shape (3,)
-        Half of the 95 % intervals of the logarithms of the moments of inertia by instruments.
-    runs, paths : int
-        Runs that repeat each other, and their paths; or runs with setpoints, of no common path.
-    alone, flights : int
-        Flights without instruments, and all flights.
-    instrument_kind : str
-        "repeats", "setpoints", or "past", which is what was before.
-    setpoints : tuple of str
-        Those that are the instruments.
+    `training`, `learned`: of those parts what the instruments know; `rigid_body`, `least_squares`: inertia parameters,
+    kg m^2, by instruments, and by least squares of the torque as measured; `half`: half of the 95 % intervals of the
+    logarithms of the moments of inertia by instruments; `runs` that repeat each other along `paths`, or with setpoints
+    of no common path; `alone`: flights without instruments, of all `flights`; `instrument_kind`: "repeats",
+    "setpoints", or "past", which are past windows.
     """
 
     training: TorqueSource
@@ -110,34 +99,24 @@ def freed_torque(training: TorqueSource, learned: TorqueSource) -> FreedTorque |
     """Free the torque of flights of what instruments do not know: other runs of a path, or setpoints; or by the past.
 
     Flights that have none are left out. So where there are such, the rest is taken only if least squares of it shows
-    the loop in all, or instruments find another body; setpoints, which tell less than repeats, only then.
+    the loop in all, or instruments find another body; setpoints, which identify less than repeats, only then.
 
     With ``A`` the columns of a rigid body along a run, ``tau`` its torque, both as far as they are fast, and ``A'``,
     ``tau'`` what instruments know of them, the inertia parameters x solve ``sum A^T (tau' - A' x) = 0``: gusts and
     noise of a run do not go with that. Of runs of a path it is the mean of what the others have at the same places; of
-    setpoints the first-stage fit of the other flights. Then ``sum A'^T (tau - A x) = 0``, for what is
-    predicted errs alike in many blocks. The torque becomes what the rigid body takes along the run's own motion and
-    what is known of the fast rest, ``tau' - A' x``, as far as A does not hold it. Least squares of it gives the rigid
-    body of the instruments again, and an inertia that depends on attitude as far as instruments know of it. Where they
-    know most of what a rigid body leaves, slow or fast, it is no gust, and nothing is freed by them.
+    setpoints the first-stage fit of the other flights. Then ``sum A'^T (tau - A x) = 0``, for what is predicted errs
+    alike in many blocks. The torque becomes what the rigid body takes along the run's own motion and what is known of
+    the fast rest, ``tau' - A' x``, as far as A does not hold it. Least squares of it gives the rigid body of the
+    instruments again, and an inertia that depends on attitude as far as instruments know of it. Where they know most of
+    what a rigid body leaves, slow or fast, it is no gust, and nothing is freed by them.
 
-    Where that is so, or there are none, and least squares shows the loop, what was before is asked for the body, though
-    not about yaw (`find_constants`). The torque becomes what it was, and what that body takes more than the other.
+    Where that is so, or there are none, and least squares shows the loop, the body is identified by past windows,
+    though not about yaw (`find_constants`). The torque becomes what it was, and what that body takes more than the
+    other.
 
-    Parameters
-    ----------
-    training, learned : TorqueSource
-        As `identify` takes them.
-
-    Returns
-    -------
-    FreedTorque or None
-        None where nothing identifies roll and pitch to a factor of two, or finds no body; where no instruments, for
-        long enough, are there and the flights do not show the loop; and of flights that stay in their files.
-
-    References
-    ----------
-    Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats).
+    None where nothing identifies roll and pitch to a factor of two, or finds no body; where no instruments, for long
+    enough, are there and the flights do not show the loop; and of flights that stay in their files. Söderström and
+    Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats).
     """
     flights = training.flights if isinstance(training, Flights) else (training,)
     parts = [flight for flight in flights if isinstance(flight, TorqueData)]
@@ -199,7 +178,7 @@ def _by_instruments(
 def _by_past(
     training: TorqueSource, learned: TorqueSource, parts: Sequence[TorqueData], given: Instruments
 ) -> FreedTorque | None:
-    """Free the torque of flights that show the loop by what was before."""
+    """Free the torque of flights that show the loop by past windows."""
     rows = np.concatenate(_laid(parts, 1.0 / axis_scale(training)))
     least_squares, _ = _solved(np.einsum("tap,taq->pq", rows[:, :, :-1], rows)[None])
     if why_unphysical(least_squares) is not None or not _shows_loop(training, least_squares):
@@ -214,7 +193,7 @@ def _by_past(
         return None
     inertia, yaw = found.fitted.model.body.inertia, list(_OF_YAW)
     rigid_body = np.array([inertia[entry] for entry in INERTIA_ENTRIES])
-    # What was before does not tell it.
+    # Past windows do not identify it.
     rigid_body[yaw] = least_squares[yaw]
     if why_unphysical(rigid_body) is not None:
         return None
@@ -257,19 +236,10 @@ def source_of(
 
 
 class _Run(NamedTuple):
-    """Samples of a run, and what instruments know of them; rows scaled by axis.
+    """Samples of a run, and what instruments know of them; rows scaled by axis, shape (samples, 3, 7).
 
-    Attributes
-    ----------
-    number : int
-        Of the run.
-    samples : array of int, shape (samples,)
-    rows : array, shape (samples, 3, 7)
-        Columns of the rigid body, last the torque.
-    own, others : array, shape (samples, 3, 7)
-        What of these is fast, of the run itself and as instruments know it.
-    block : array of int, shape (samples, 2)
-        Path, and number of the block along it.
+    `rows`: columns of the rigid body, last the torque; `own`, `others`: what of these is fast, of the run itself and as
+    instruments know it; `block`: path, and number of the block along it.
     """
 
     number: int
@@ -416,13 +386,7 @@ def _known_to_two(half: Array) -> BoolArray:
 
 
 def loop_along(training: TorqueSource, torque: Callable[[Motion], Array]) -> LoopBounds:
-    """Bound by which factors a loop may have misled a model, from its torque and the one measured.
-
-    Parameters
-    ----------
-    torque : callable
-        Predicts the generalised torque of a motion.
-    """
+    """Bound by which factors a loop may have misled a model, from its torque of a motion and the one measured."""
     return bounds_between([stretch for data in training.chunks() for stretch in _stretches(data, torque)])
 
 

@@ -18,19 +18,15 @@ from cpfls_cli.result import about
 from cpfls_cli.rounding import at_most, levelled
 
 SMALLEST_ERROR = 1e-12
-"""Share of the mean squared torque below which sums of products cannot tell errors apart."""
+"""Share of the mean squared torque below which sums of products cannot resolve errors."""
 
 
 @dataclass(frozen=True)
 class Blocks:
     """Contiguous blocks of a flight for cross-validation.
 
-    Attributes
-    ----------
-    validation : array of bool, shape (folds, judged samples)
-        Samples judged in each fold.
-    left_out : array of bool, shape (folds, learned samples)
-        Samples that do not train in each fold: those within the block's time, and within the embargo around it.
+    `validation`: samples judged in each fold; `left_out`: samples that do not train in it, those within the block's
+    time, and within the embargo around it.
     """
 
     validation: BoolArray
@@ -48,21 +44,10 @@ class RidgeCurve:
 
 
 def contiguous_blocks(judged: Array, learned: Array, folds: int, embargo: float) -> Blocks:
-    """Cut a flight into contiguous blocks of equal numbers of judged samples.
+    """Cut a flight into contiguous blocks of equal numbers of judged samples, by ascending times in s.
 
-    Parameters
-    ----------
-    judged : array, shape (judged samples,), s
-        Times of the samples that judge, ascending.
-    learned : array, shape (learned samples,), s
-        Times of the samples that train: the same, or a selection of them.
-    embargo : float
-        Seconds before and after a block that do not train with it held out.
-
-    Raises
-    ------
-    SettingError
-        If a block and its embargo leave no sample to train on.
+    Samples learned from are the same, or a selection of them; those within the embargo before and after a block do not
+    train with it held out. `SettingError` where a block and its embargo leave no sample to train on.
     """
     folds = max(min(folds, len(judged)), 1)
     label = contiguous(len(judged), folds)
@@ -81,7 +66,7 @@ def ridge_curve(learned: Products, judged: Products, left_out: BoolArray, weight
     """Cross-validate the ridge weight of the fuzzy columns, which stand after the six of the rigid body.
 
     The six rigid-body columns are free of penalty. For each fold they are eliminated (Schur complement), and one
-    eigendecomposition of the rest serves all weights. Errors that only rounding tells apart count as equal.
+    eigendecomposition of the rest serves all weights. Errors that differ by rounding alone count as equal.
 
     Parameters
     ----------

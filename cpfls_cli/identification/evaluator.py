@@ -21,21 +21,9 @@ LARGEST_GENE = 2**16 - 1
 
 
 def decode(structure: ModelStructure, weights: Array) -> tuple[Array, ...]:
-    """Decode weights into the breakpoints of every partition.
+    """Decode weights >= 0 into the breakpoints of every partition; only their ratios within a partition count.
 
-    Parameters
-    ----------
-    weights : array, shape (genes,), >= 0
-        Genes, or weights on any scale: only their ratios within a partition count.
-
-    Returns
-    -------
-    tuple of array, shape (functions,)
-        NaN in a partition whose weights are all zero.
-
-    References
-    ----------
-    Equation (10); method.md sections 4 and 7 for the order.
+    NaN in a partition whose weights are all zero. Equation (10); method.md sections 4 and 7 for the order.
     """
     decoded: list[Array] = [np.empty(0)] * len(structure.partitions)
     for partitions, genes in structure.alike:
@@ -45,31 +33,14 @@ def decode(structure: ModelStructure, weights: Array) -> tuple[Array, ...]:
 
 
 def encode(weights: Array) -> IntArray:
-    """Round weights on [0, 1] to genes.
-
-    Parameters
-    ----------
-    weights : array, shape (genes,)
-
-    Returns
-    -------
-    array of int, shape (genes,)
-        At least 1: a function of zero width would make the output jump.
-    """
+    """Round weights on [0, 1] to genes of at least 1: a function of zero width would make the output jump."""
     return np.clip(np.rint(weights * LARGEST_GENE), 1, LARGEST_GENE).astype(np.int64)
 
 
 def weight_jacobian(structure: ModelStructure, weights: Array) -> Array:
     """Differentiate all inner breakpoints by all weights, ``d b_k / d a_j = ([j <= k] - b_k) / sum a``.
 
-    Parameters
-    ----------
-    weights : array, shape (genes,)
-        No partition all zero.
-
-    Returns
-    -------
-    array, shape (inner breakpoints of all partitions, genes)
+    No partition may be all zero.
     """
     inner = np.concatenate([ends[1:-1] for ends in decode(structure, weights)])
     total = np.array([np.sum(weights[part]) for part in structure.weight_slices()])
@@ -99,17 +70,8 @@ _SMALL_ERROR = 1e-9
 class ChromosomePoint:
     """A chromosome with the linear parameters that its partitions need, at a given ridge.
 
-    Attributes
-    ----------
-    genes : array of int, shape (genes,)
-    products : Products
-        Of the columns, by label.
-    solution : array, shape (columns,)
-    factor : tuple
-        Cholesky factor of the matrix whose rows and columns are multiplied by `scale`.
-    scale : array, shape (columns,)
-    square : float
-        Smallest sum of squared residuals, penalty included.
+    `factor`: Cholesky factor of the matrix whose rows and columns are multiplied by `scale`; `square`: smallest sum of
+    squared residuals, penalty included.
     """
 
     genes: IntArray
@@ -123,15 +85,10 @@ class ChromosomePoint:
 
 @dataclass(frozen=True)
 class Problem:
-    """Partition weights as nonlinear least squares with the linear parameters eliminated.
+    """Partition weights as nonlinear least squares with the linear parameters eliminated, from a fit at the start.
 
-    Ridge weight and column sizes stay those of the start: a penalty that moved with the columns would add a term to
-    the gradient that variable projection leaves out.
-
-    Attributes
-    ----------
-    start : Fit
-        The fit at the start; its ridge weight is finite.
+    Its ridge weight is finite. Ridge weight and column sizes stay those of the start: a penalty that moved with the
+    columns would add a term to the gradient that variable projection leaves out.
     """
 
     solver: Solver
@@ -172,26 +129,11 @@ class Problem:
 
 
 def refine(problem: Problem, genes: IntArray, products: Products, evaluations: int) -> ChromosomePoint:
-    """Refine a chromosome by a projected Levenberg-Marquardt method.
+    """Refine a chromosome, no partition of which is all zero, by a projected Levenberg-Marquardt method.
 
-    Parameters
-    ----------
-    genes : array of int, shape (genes,)
-        No partition all zero.
-    products : Products
-        Of these genes.
-    evaluations : int
-        Largest number of model evaluations, that of the start included.
-
-    Returns
-    -------
-    Point
-        The best point found: the start, or one whose genes are at least 1.
-
-    References
-    ----------
-    method.md section 7; Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973); Kaufman, BIT 15 (1975); Marquardt, J. SIAM
-    11 (1963).
+    Gives the best point found within so many model evaluations: the start, whose products are given, or one whose genes
+    are at least 1. method.md section 7; Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973); Kaufman, BIT 15 (1975);
+    Marquardt, J. SIAM 11 (1963).
     """
     structure = problem.solver.learned.structure
     best, damping = problem.point(genes, products), _FIRST_DAMPING
@@ -251,16 +193,9 @@ class Evaluator:
         return self.judge.structure
 
     def __call__(self, genes: IntArray) -> Evaluation:
-        """Evaluate chromosomes, refining each by local search if enabled.
+        """Evaluate chromosomes, shape (individuals, genes), refining each by local search if enabled.
 
-        Parameters
-        ----------
-        genes : array of int, shape (individuals, genes)
-
-        Returns
-        -------
-        Evaluation
-            Refined genes and objectives; a chromosome without a finite model gets infinite objectives.
+        A chromosome without a finite model gets infinite objectives.
         """
         results = [self._evaluate(chromosome) for chromosome in genes]
         refined = np.array([chromosome for chromosome, _ in results]).reshape(genes.shape)

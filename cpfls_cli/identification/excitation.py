@@ -44,15 +44,9 @@ def rule_excitation(
 ) -> RuleExcitation:
     """Measure how far samples excite each rule.
 
-    A direction of the coefficients counts as determined where noise in the torque moves it by less than the
-    inertia itself: its singular value is above noise over inertia, and above the rank tolerance.
-
-    Parameters
-    ----------
-    noise : float, N m
-        Root mean square of what no model explains.
-    inertia : float, kg m^2
-        Typical moment of inertia.
+    A direction of the coefficients counts as determined where noise in the torque (root mean square of what no model
+    explains, N m) moves it by less than the inertia itself (a typical moment, kg m^2): its singular value is above
+    noise over inertia, and above the rank tolerance.
     """
     blocks, singular_values, Vt = learned.structure.blocks, *_decomposed(learned, partitions)
     floor = max(rank_tolerance * singular_values[0], noise / inertia if inertia > 0 else 0.0)
@@ -84,18 +78,11 @@ def _firing(learned: Samples, partitions: Breakpoints) -> Array:
 
 @dataclass(frozen=True)
 class AxisEvidence:
-    """Share of each body axis that a rigid body and a constant torque explain.
+    """Share of each body axis that a rigid body and a constant torque explain, where the pitch is not vertical.
 
-    Attributes
-    ----------
-    constant : array, shape (3,), N m
-        Constant body torque fitted beside the rigid body.
-    r2 : array, shape (3,)
-        Share of the body torque explained by both, at samples where the pitch is not vertical; NaN if there are none.
-    torque : array, shape (3,), N m
-        Root mean square of the body torque at these samples.
-    acceleration : array, shape (3,), rad/s^2
-        Root mean square of the derivative of the body rates.
+    `constant`: body torque fitted beside the rigid body, N m; `r2`: share of the body torque explained by both, NaN
+    without samples; `torque` and `acceleration`: root mean squares of it, N m, and of the derivative of the body rates,
+    rad/s^2.
     """
 
     constant: Array
@@ -130,14 +117,7 @@ def _columns(data: TorqueData) -> Array:
 
 @dataclass(frozen=True)
 class Swings:
-    """How often a flight turns round.
-
-    Attributes
-    ----------
-    seconds : float, s
-    by_axis : array of int, shape (3,)
-        Changes of direction of the Euler rates.
-    """
+    """How often a flight turns round: its seconds, and changes of direction of the Euler rates by axis."""
 
     seconds: float
     by_axis: IntArray

@@ -46,29 +46,13 @@ RIVALS = {
 class FitDiagnostics:
     """Diagnostics of an identification that its warnings, and a verdict on it, rest on.
 
-    Attributes
-    ----------
-    system : LeastSquares
-        The regressor of the model's parameters, without penalty.
-    axes : AxisEvidence
-        Of the training part.
-    rigid_body : array, shape (6,), kg m^2
-        The rigid body that fits the learned samples best.
-    stated : array, shape (6,), kg m^2, or None
-        Inertia stated for the vehicle.
-    indefinite : int
-        Training samples at which D(q) is not positive definite.
-    samples, outside, vertical : mapping of str to int
-        Samples judged, and of them outside the visited attitudes, and near a pitch of +-90 degrees, by part; the
-        training part comes first.
-    scores : mapping of str to mapping of str to Score
-        By part, then by model.
-    learned : Score
-        Of the model, on the samples learned from.
-    freed : FreedTorque or None
-        What the parameters were learned from, where instruments tell the vehicle from the loop.
-    loop : LoopBounds or None
-        How far the loop may have misled the model, where nothing from outside separates it from the vehicle.
+    `system`: regressor of the model's parameters, without penalty; `axes`: of the training part; `rigid_body`: that
+    fits the learned samples best, and the one `stated`, six parameters in kg m^2; `indefinite`: training samples at
+    which D(q) is not positive definite; `samples`, `outside`, `vertical`: samples judged, and of them outside the
+    visited attitudes, and near a pitch of +-90 degrees, by part, the training part first; `scores`: by part, then by
+    model; `learned`: of the model on the samples learned from; `freed`: what the parameters were learned from, where
+    instruments identify the vehicle and not its loop; `loop`: how far it may have misled the model, where nothing from
+    outside separates it from the vehicle.
     """
 
     fit: Fit
@@ -128,7 +112,7 @@ def _scale(diagnostics: FitDiagnostics) -> Iterator[str]:
 
 
 def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
-    """Say what the parameters rest on where instruments tell the vehicle from the loop."""
+    """Say what the parameters rest on where instruments identify the vehicle and not its loop."""
     freed = diagnostics.freed
     if freed is None:
         return
@@ -140,13 +124,13 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
         little, without = "too little of yaw follows", "have no such setpoint"
     elif freed.instrument_kind == "past":
         source = (
-            "the flights show the loop, so roll and pitch come from what was before, which knows no gust that is new"
+            "the flights show the loop, so roll and pitch come from past windows, which know no innovation of a gust"
         )
-        little, without = "what was before does not tell it", ""
+        little, without = "past windows do not identify it", ""
     else:
         paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
-        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the torque that comes again, {pure}"
-        little, without = "too little of yaw comes again", "repeat none"
+        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the repeatable torque, {pure}"
+        little, without = "too little of yaw is repeatable", "repeat none"
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"
         if identified
@@ -188,7 +172,7 @@ def loop_in_words(loop: LoopBounds, *, by_past: bool = False) -> str:
     )
     return (
         f"{shown}. An autopilot that reacts to gusts, or an effect missing here, makes a body look heavier or lighter "
-        f"than it is; true moments over those found: {bounds}. What was before does not tell them closer. {fly}"
+        f"than it is; true moments over those found: {bounds}. Past windows do not identify them better. {fly}"
     )
 
 

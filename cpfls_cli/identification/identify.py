@@ -73,7 +73,7 @@ def identify(
 ) -> Identification:
     """Identify a model and judge it beside its baselines.
 
-    Where instruments or what was before tell the vehicle from its loop, parameters and the errors that the search
+    Where instruments or past windows identify the vehicle and not its loop, parameters and the errors that the search
     minimises are those of the torque that they know (`freed_torque`); scores are those of the torque as measured.
 
     Parameters

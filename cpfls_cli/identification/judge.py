@@ -89,8 +89,6 @@ class VarianceExplained:
 class _AboutMean:
     """Sum of squares about the mean, chunk by chunk.
 
-    References
-    ----------
     Chan, Golub and LeVeque, The American Statistician 37 (1983), 242 (sums of squares about a mean, pairwise).
     """
 
@@ -142,14 +140,7 @@ def _ratio(numerator: Array, denominator: Array) -> Array:
 
 @dataclass(frozen=True)
 class Baseline:
-    """A linear model with few parameters.
-
-    Attributes
-    ----------
-    columns : callable
-        Motion to columns, shape (samples, 3, parameters).
-    parameters : array, shape (parameters,)
-    """
+    """A linear model with few parameters; `columns` takes motion to shape (samples, 3, parameters)."""
 
     name: str
     columns: Columns
@@ -171,18 +162,7 @@ def no_torque_columns(motion: Motion) -> Array:
 
 
 def fit_baselines(source: TorqueSource, row_scale: Array, rank_tolerance: float) -> tuple[Baseline, ...]:
-    """Fit all baselines to the samples that a model is trained on.
-
-    Parameters
-    ----------
-    row_scale : array, shape (3,)
-        Weight of each axis, the model's own.
-
-    Returns
-    -------
-    tuple of Baseline
-        Rigid body, constant inertia, torque zero.
-    """
+    """Fit rigid body, constant inertia and torque zero to the samples learned from, with weights by axis."""
     kinds: tuple[tuple[str, Columns], ...] = (
         ("rigid-body", rigid_columns),
         ("constant-inertia", constant_inertia_columns),

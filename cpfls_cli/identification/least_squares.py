@@ -28,20 +28,10 @@ _SETTLED = 1e-9
 
 @dataclass(frozen=True)
 class LeastSquares:
-    """Solution of a linear least-squares problem.
+    """Solution of a linear least-squares problem, of minimum norm where the data do not determine all.
 
-    Attributes
-    ----------
-    coefficients : array, shape (parameters,)
-        Of minimum norm where the data do not determine all.
-    singular_values : array, shape (min(rows, parameters),)
-        Descending.
-    rank : int
-        Number of singular values above the tolerance.
-    row_space : array, shape (rank, parameters)
-        Orthonormal basis of the directions that the data determine.
-    rank_tolerance : float
-        Singular values below this share of the largest counted as zero.
+    `singular_values` descend; `rank` of them are above `rank_tolerance`, a share of the largest; `row_space`:
+    orthonormal basis of the directions that the data determine, shape (rank, parameters).
     """
 
     coefficients: Array
@@ -67,10 +57,7 @@ class LeastSquares:
 class Triangle:
     """Triangular factor of columns and a right-hand side, which stands for any number of rows.
 
-    Attributes
-    ----------
-    matrix : array, shape (up to parameters + 1, parameters + 1)
-        ``R`` of a QR decomposition of the columns with the right-hand side as the last one.
+    ``R`` of a QR decomposition of the columns with the right-hand side as the last one.
     """
 
     matrix: Array
@@ -110,13 +97,6 @@ class Triangle:
 def solve(matrix: Array, right_side: Array, rank_tolerance: float) -> LeastSquares:
     """Solve ``min |matrix c - right_side|`` for the c of smallest norm.
 
-    Parameters
-    ----------
-    matrix : array, shape (rows, parameters)
-    right_side : array, shape (rows,)
-
-    References
-    ----------
     Paper section 5: ``c = V S^-1 U^T tau``; method.md section 5 for rank-deficient data.
     """
     U, singular_values, Vt = linalg.svd(matrix, full_matrices=False, check_finite=False, lapack_driver="gesdd")
@@ -131,14 +111,7 @@ def solve(matrix: Array, right_side: Array, rank_tolerance: float) -> LeastSquar
 class NormalEquations:
     """``(A^T A + P) x = A^T tau`` with a diagonal P that penalises some parameters.
 
-    Attributes
-    ----------
-    gram : array, shape (parameters, parameters)
-        ``A^T A`` of scaled columns.
-    moment : array, shape (parameters,)
-        ``A^T tau``.
-    penalty : array, shape (parameters,)
-        Diagonal of P.
+    `gram`: ``A^T A`` of scaled columns; `moment`: ``A^T tau``; `penalty`: diagonal of P.
     """
 
     gram: Array
@@ -155,14 +128,9 @@ class NormalEquations:
 
 @dataclass(frozen=True)
 class NormalSolution:
-    """Solution of normal equations.
+    """Solution of normal equations, of minimum norm where the samples do not determine all.
 
-    Attributes
-    ----------
-    parameters : array, shape (parameters,)
-        Of minimum norm where the samples do not determine all.
-    conditioning : float
-        Condition number of the columns; above every condition number where some are dependent.
+    `conditioning`: condition number of the columns; above every condition number where some are dependent.
     """
 
     parameters: Array
@@ -175,18 +143,9 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
     The eigenvalues are the squares of the singular values, so a condition number near 1e6 would be left with four
     digits. Where it is large and the rank full, the residual and the columns along the lowest eigenvectors are
     therefore computed from the samples themselves: one step of iterative refinement for the parameters, Rayleigh-Ritz
-    for the lowest singular value.
-
-    Parameters
-    ----------
-    rank_tolerance : float
-        Singular values below this share of the largest count as zero; not smaller than `SMALLEST_SINGULAR_SHARE`.
-    project : callable
-        Takes parameters x and directions V, gives ``(A V)^T (A V)`` and ``A^T (tau - A x)``.
-
-    References
-    ----------
-    Björck, Numerical Methods for Least Squares Problems (1996), sections 2.9 and 6.6 (accuracy of the normal equations,
+    for the lowest singular value. `project` takes parameters x and directions V to ``(A V)^T (A V)`` and ``A^T (tau - A
+    x)``; `rank_tolerance` is a share of the largest singular value, not smaller than `SMALLEST_SINGULAR_SHARE`. Björck,
+    Numerical Methods for Least Squares Problems (1996), sections 2.9 and 6.6 (accuracy of the normal equations,
     refinement).
     """
     tolerance = max(rank_tolerance, SMALLEST_SINGULAR_SHARE)
@@ -209,16 +168,8 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
 class _Inverse:
     """Pseudoinverse of a symmetric matrix.
 
-    Attributes
-    ----------
-    apply : callable
-        Multiplies a vector.
-    missing : int
-        Eigenvalues that count as zero.
-    largest, smallest : float
-        Eigenvalues; 0 where some count as zero.
-    lowest : array, shape (parameters, up to 3)
-        Orthonormal directions of the smallest ones; none where some count as zero.
+    `apply` multiplies a vector; `missing` eigenvalues count as zero, and then `smallest` is 0 and there are no
+    `lowest`, the orthonormal directions of up to three smallest ones.
     """
 
     apply: Callable[[Array], Array]
@@ -324,12 +275,7 @@ def _extreme(apply: Callable[[Array], Array], size: int) -> tuple[float, Array] 
 def quick_solution(equations: NormalEquations) -> tuple[Array, tuple[Array, bool], Array]:
     """Solve normal equations by Cholesky decomposition, with a tiny ridge for dependent columns.
 
-    Returns
-    -------
-    parameters : array, shape (parameters,)
-    factor : tuple
-        For `scipy.linalg.cho_solve`, of the matrix with rows and columns multiplied by `scale`.
-    scale : array, shape (parameters,)
+    The factor, for `scipy.linalg.cho_solve`, is of the matrix with rows and columns multiplied by the scale.
     """
     matrix = equations.matrix
     diagonal = np.diag(matrix)

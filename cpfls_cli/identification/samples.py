@@ -56,16 +56,7 @@ class Products:
 class MovedProducts:
     """Products with the derivatives M of the model torque by the inner breakpoints, at fixed parameters.
 
-    Attributes
-    ----------
-    columns : array, shape (columns, breakpoints)
-        ``A^T M``.
-    moved : array, shape (breakpoints, breakpoints)
-        ``M^T M``.
-    residual : array, shape (breakpoints,)
-        ``M^T r``, r the residual.
-    square : float
-        ``r^T r``.
+    `columns`: ``A^T M``; `moved`: ``M^T M``; `residual`: ``M^T r``, r the residual; `square`: ``r^T r``.
     """
 
     columns: Array

@@ -79,23 +79,12 @@ def _unstopped() -> None:
 class SearchRun:
     """Conditions under which a search is run; they do not change the result of a search that comes to its end.
 
-    Attributes
-    ----------
-    resumed : EvolutionState or None
-        Where to go on; None starts with a new population.
-    unfinished : Unfinished or None
-        What need not be evaluated again in the generation that comes first.
-    workers : callable
-        Takes the evaluator; gives the context in which workers evaluate by it, one chromosome after the other in
-        this process by default.
-    progress : callable
-        Takes a `SearchStep`, after each part of a generation that was evaluated.
-    on_generation : callable
-        Takes the state after each generation, the initial population included. The next generation changes it.
-    on_stop : callable
-        Takes what is `Unfinished` where the search is stopped within a generation.
-    should_stop : callable
-        Asked after each part of a generation: why to stop now, or None.
+    `resumed`: where to go on, None starts with a new population; `unfinished`: what need not be evaluated again in the
+    generation that comes first; `workers` takes the evaluator and gives the context in which workers evaluate by it,
+    one chromosome after the other in this process by default; `progress` takes a `SearchStep` after each part of a
+    generation; `on_generation` the state after each generation, the initial population included, which the next one
+    changes; `on_stop` what is `Unfinished` where the search is stopped within one; `should_stop` says after each part
+    why to stop now, or None.
     """
 
     resumed: EvolutionState | None = None
@@ -131,15 +120,7 @@ class Front:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Result of a search.
-
-    Attributes
-    ----------
-    history : History
-        Where the search stopped within a generation, the last row is of what was evaluated of it.
-    stop_reason : str
-        ``generations`` or ``converged`` for a search that came to its end, else ``time-limit`` or ``interrupted``.
-    """
+    """Result of a search; stopped within a generation, the last row of its history is of what was evaluated of that."""
 
     front: Front
     history: History
@@ -175,21 +156,10 @@ def search(
     run: SearchRun = UNWATCHED,
     kept: TorqueSource | None = None,
 ) -> SearchResult:
-    """Search for non-dominated partitions.
+    """Search for non-dominated partitions; one that goes on has a generator of its own.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Not used by a search that goes on, which has its own.
-    kept : TorqueSource, optional
-        Flights to choose on, for the choice `held-out`.
-
-    Raises
-    ------
-    NothingFoundError
-        If no chromosome gives a finite model.
-    SettingError
-        If the choice and the flights to choose on do not go together.
+    `kept`: flights to choose on, for the choice `held-out`, or `SettingError`; `NothingFoundError` where no chromosome
+    gives a finite model.
     """
     require_flights(settings.choice, given=kept is not None)
     archive, history, reason = _searched(evaluator, settings, rng, run)
@@ -285,31 +255,10 @@ def _front(
 
 
 def choose(objectives: Array, rule: Choice, held_out: Array | None = None) -> int:
-    """Choose one member of a Pareto front.
+    """Choose one member of a Pareto front by its mean squared error, largest error and condition number.
 
-    Parameters
-    ----------
-    objectives : array, shape (members, 3)
-        Mean squared error, largest error, condition number.
-    rule : {"mse-below-median-condition", "mse", "max-error", "held-out"}
-        The first takes the smallest mean squared error among members whose condition number is at most the
-        median of the front.
-    held_out : array, shape (members,), optional
-        Mean squared errors on flights kept for the choice, which `held-out` takes the smallest of.
-
-    Returns
-    -------
-    int
-        Index of the member.
-
-    Raises
-    ------
-    SettingError
-        If the rule and the flights kept for the choice do not go together.
-
-    References
-    ----------
-    method.md section 7.
+    `mse-below-median-condition` takes the smallest mean squared error among members whose condition number is at most
+    the median of the front, `held-out` that on flights kept for the choice, or `SettingError`. method.md section 7.
     """
     require_flights(rule, given=held_out is not None)
     if held_out is not None:
@@ -343,17 +292,8 @@ def require_flights(rule: Choice, *, given: bool) -> None:
 def held_out_errors(evaluator: Evaluator, kept: TorqueSource, chromosomes: IntArray) -> Array:
     """Compute the errors of chromosomes on data that is neither trained nor judged on in the end.
 
-    Parameters
-    ----------
-    evaluator : Evaluator
-        Solves each chromosome on the samples that it learns from.
-    chromosomes : array of int, shape (members, genes)
-
-    Returns
-    -------
-    array, shape (members,)
-        Mean squared error; of the torque in (N m)^2, or scaled by axis as the evaluator's own. Infinite where a
-        chromosome has no finite model.
+    Mean squared, of the torque in (N m)^2, or scaled by axis as the evaluator's own; infinite where a chromosome has no
+    finite model.
     """
     samples = replace(
         Samples.of(Ready(kept, evaluator.judge.ready.rigid), evaluator.structure, evaluator.judge.ranges),

@@ -1,14 +1,13 @@
-"""Settings of the identification: structure, search, its presets, base, validation; and of a sweep over them."""
+"""Settings of the identification: structure, search, its presets, base, validation."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
-from annotated_types import Ge, Gt, Le, MinLen
+from annotated_types import Ge, Gt, Le
 from typing_extensions import Doc
 
 from cpfls_cli.errors import SettingError
@@ -139,7 +138,7 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         float,
         Gt(0),
         Le(1e-2),
-        Doc("singular values below this share of the largest count as zero; the search cannot tell less than 3e-7"),
+        Doc("singular values below this share of the largest count as zero; the search cannot resolve less than 3e-7"),
     ] = 3e-7
     training_share: Annotated[
         float, Gt(0), Le(1), Doc("leading share of the flight that trains; the rest is held out")
@@ -155,34 +154,3 @@ class IdentificationSettings(StructureSettings, EvolutionSettings):
         """Apply the rules of both parents."""
         StructureSettings.__post_init__(self)
         EvolutionSettings.__post_init__(self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SweepSetting(Settings):
-    """One column of a sweep: what is different in it."""
-
-    name: Annotated[str, MinLen(1), Doc("how it is called in tables")]
-    set: Annotated[
-        dict[str, Any],
-        Doc("keys of reduction and identification, as --set takes them; reduction.size: null learns from all samples"),
-    ] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SweepSettings(Settings):
-    """What `cpfls sweep` runs: every setting with every seed."""
-
-    seeds: Annotated[int, Ge(1), Le(10_000), Doc("runs of each setting, with seed, seed + 1, seed + 2 and so on")] = 10
-    set: Annotated[dict[str, Any], Doc("keys of every setting that does not set them itself")] = field(
-        default_factory=dict
-    )
-    settings: Annotated[
-        tuple[SweepSetting, ...], Doc("what is tried, by name; empty: the study as it is, once for each seed")
-    ] = ()
-
-    def __post_init__(self) -> None:
-        """Refuse settings that cannot be told apart."""
-        count = Counter(setting.name for setting in self.settings)
-        for number, setting in enumerate(self.settings):
-            if count[setting.name] > 1:
-                raise SettingError(f"settings.{number}.name", "appears more than once; give each setting its own name")

@@ -56,19 +56,9 @@ class Fit:
 
 
 def decomposed(learned: Samples, partitions: Breakpoints, fit: Fit, rank_tolerance: float) -> tuple[Fit, LeastSquares]:
-    """Solve for the linear parameters by a singular value decomposition of all rows.
+    """Solve for the linear parameters by a singular value decomposition of all rows, at ridge and sizes of a fit.
 
-    Parameters
-    ----------
-    fit : Fit
-        Gives ridge weight and column sizes.
-
-    Returns
-    -------
-    fit : Fit
-        With the parameters of the decomposition.
-    unpenalised : LeastSquares
-        Of the parameters in use, without any penalty.
+    Gives the fit, and the least squares of the parameters in use without any penalty.
     """
     rigid, off = learned.ready.rigid, np.isinf(fit.ridge_weight)
     triangle = Triangle.of(_rows(learned, partitions, fit, fuzzy=not off))
@@ -106,12 +96,7 @@ def _rows(learned: Samples, partitions: Breakpoints, fit: Fit, *, fuzzy: bool) -
 class Solver:
     """Solve for the fuzzy coefficients, alone as in the paper or with six free inertia parameters under them.
 
-    Attributes
-    ----------
-    learned : Samples
-        The samples that parameters are learned from.
-    ridge : RidgeChoice or None
-        With a rigid body underneath: how the ridge on the coefficients is chosen. Without: no ridge.
+    Then `ridge` says how the ridge on the coefficients is chosen; alone there is none.
     """
 
     learned: Samples

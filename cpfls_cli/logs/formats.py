@@ -47,7 +47,7 @@ class LogContents:
     parameters: dict[str, float | str] = field(default_factory=dict)
     system: str = ""  # What wrote the log and its version, such as ``PX4 1.14.0``; empty where that is not known.
     warnings: tuple[str, ...] = ()  # Faults of the file as a whole.
-    flown_at: float = nan  # When it begins, s since 1970 began (UTC); NaN where the log does not tell.
+    flown_at: float = nan  # When it begins, s since 1970 began (UTC); NaN where the log does not say.
     # By column; stamp on the log's own clock, s, at 0 of a column of stamps that the reader has made to begin there;
     # an empty name is that of all stamps.
     begins: dict[str, float] = field(default_factory=dict)

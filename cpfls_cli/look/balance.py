@@ -108,12 +108,7 @@ def balance_of(flight: LogFlight, arm_m: float | None = None) -> Balance | None:
     """Estimate the share of thrust of each rotor in steady flight; None where the log has no rotors.
 
     Windows of 2 s count where the body hardly turns, tilts less than 15 degrees and no rotor is at a limit. Intervals
-    are by a jackknife over blocks of neighbouring windows.
-
-    Parameters
-    ----------
-    arm_m : float or None, m
-        For the centre of mass in mm.
+    are by a jackknife over blocks of neighbouring windows. The arm, m, is for the centre of mass in mm.
     """
     stated = stated_curve(flight)
     source, measured_by = _thrusts(flight, stated)

@@ -77,13 +77,9 @@ def _stamped_as_sampled(fields: Mapping[str, Array]) -> Mapping[str, Array]:
 def on_clock(samples: Samples | None, clock: Array, channels: int, *, cubic: bool = False) -> Array:
     """Put a signal on a uniform clock, shape (time, channel): linear between samples, NaN where there are none.
 
-    What comes faster than the clock is filtered first, without shift of phase, so that no vibration is folded into
-    the band of the clock.
-
-    Parameters
-    ----------
-    cubic : bool
-        By cubic splines where every sample is known: lines weaken what moves at a tenth of the samples' rate by 3 %.
+    What comes faster than the clock is filtered first, without shift of phase, so that no vibration is folded into the
+    band of the clock. `cubic`: by cubic splines where every sample is known; lines weaken what moves at a tenth of the
+    samples' rate by 3 %.
     """
     if samples is None:
         return np.full((len(clock), channels), np.nan)

@@ -35,15 +35,7 @@ _OLD_FULL, _FULL = 4500.0, 3.0
 
 @dataclass(frozen=True)
 class Rotors:
-    """Commands of rotors as a log holds them, and where they are.
-
-    Attributes
-    ----------
-    samples : Samples or None
-        Shape (sample, rotor), shares of full.
-    speeds : Samples or None
-        The same of measured speeds, rad/s.
-    """
+    """Commands of rotors as a log holds them, shares of full, and where they are; measured speeds in rad/s."""
 
     samples: Samples | None
     guess: Guess | None
@@ -86,14 +78,8 @@ def as_shares(speeds: Samples) -> Samples:
 class Driving(NamedTuple):
     """What acts on a vehicle.
 
-    Attributes
-    ----------
-    command : Samples or None
-        Shape (sample, 3): about roll, pitch and yaw, shares of the full command.
-    source : str
-        Where that is known from.
-    places, spins : array or None
-        As `LogFlight` has them.
+    `command`: about roll, pitch and yaw, shares of the full command; `source`: where that is known from; places and
+    spins as `LogFlight` has them.
     """
 
     command: Samples | None
@@ -107,12 +93,8 @@ def find_driving(
 ) -> Driving:
     """Find what acts about each axis: rotors that are logged fast, or else what the rate loop puts out.
 
-    Rotors come first since they hold what limits make of the output.
-
-    Parameters
-    ----------
-    torque : Samples or None
-        That a controller asks for in a log of no known autopilot, N m.
+    Rotors come first since they hold what limits make of the output. `torque`: that a controller asks for in a log of
+    no known autopilot, N m.
     """
     output, (places, spins) = _output(log, autopilot), rotors.layout() or (None, None)
     if output is None and torque is not None:

@@ -85,13 +85,8 @@ Z, U, Y, A, J, V = range(6)
 class PlantModel(NamedTuple):
     """Body rate by command, ``b (1 + s L) exp(-s tau) / ((1 + s T) (s + d))``; numbers or columns of shape (draw, 1).
 
-    Attributes
-    ----------
-    gain : float, rad/s^2
-        b, per full command.
-    delay, lag, lead : float, s
-        tau, T, and L by the angular momentum of accelerated rotors, 0 but about yaw.
-    damping : float, 1/s
+    `gain` b in rad/s^2 per full command; `delay` tau, `lag` T and `lead` L, by the angular momentum of accelerated
+    rotors, 0 but about yaw, in s; `damping` d in 1/s.
     """
 
     gain: float | Array
@@ -258,12 +253,9 @@ def plant_spectra(
 ) -> BlockSpectra | None:
     """Take spectra of instrument, command, body rate and angular acceleration; None where too little is usable.
 
-    Parameters
-    ----------
-    near : _Model, optional
-        By its delay windows of the command begin earlier: what entered a window is then what left it, and slow motion
-        of other windows does not leak into the phase. Windows weigh by what it leaves in them: one flip does not
-        outweigh a flight.
+    By the delay of the plant `near` windows of the command begin earlier: what entered a window is then what left it,
+    and slow motion of other windows does not leak into the phase. Windows weigh by what it leaves in them: one flip
+    does not outweigh a flight.
     """
     late = near.late_s if near else _USUAL_DELAY_S
     early, half = round(late * flight.rate_hz), round(_SLOW_S * flight.rate_hz)

@@ -14,15 +14,9 @@ AXES = ("roll", "pitch", "yaw")
 
 
 class Samples(NamedTuple):
-    """A signal as it was logged, on its own clock.
+    """A signal as it was logged, time first, on its own clock: strictly increasing, s from the first stamp of the log.
 
-    Attributes
-    ----------
-    time : array, shape (sample,), s
-        From the first stamp of the log; strictly increasing.
-    values : array, shape (sample,) or (sample, channel)
-    source : str
-        Columns of the log that it comes from.
+    `source`: columns of the log that it comes from.
     """
 
     time: Array

@@ -263,7 +263,7 @@ class _Work:
         self.refuted = [not self._keep_stable(axis) for axis in range(len(AXES))]
 
     def _keep_stable(self, axis: int) -> bool:
-        """Drop the plants with which the loop that flew would be unstable; tell where the one that was found is."""
+        """Drop the plants with which the loop that flew would be unstable; say where the one that was found is."""
         stable = self._held(axis, self.values) > 0
         if not stable[0] or stable.mean() < _MOSTLY:
             return False

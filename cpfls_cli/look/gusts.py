@@ -39,13 +39,7 @@ class AxisGusts:
 
 
 def gusts_of(flight: LogFlight, plants: Mapping[str, PlantModel]) -> tuple[AxisGusts, ...]:
-    """Estimate the gusts about each axis whose plant is known.
-
-    Parameters
-    ----------
-    plants : mapping of str to PlantModel
-        By axis, from an estimate that gusts do not bias (instruments).
-    """
+    """Estimate the gusts about each axis whose plant is known, from an estimate that gusts do not bias."""
     found = (_about(flight, axis, plants[name]) for axis, name in enumerate(AXES) if name in plants)
     return tuple(each for each in found if each)
 
@@ -71,12 +65,9 @@ def _about(flight: LogFlight, axis: int, plant: PlantModel) -> AxisGusts | None:
 
 
 def _spectrum(frequency: Array, logs: Array) -> tuple[Array, Array]:
-    """Evaluate the spectrum of gusts and noise as windows under Hann's taper show it, and its slopes.
+    """Evaluate the spectrum of gusts and noise as windows under Hann's taper show it, and its slopes by logarithms.
 
-    Parameters
-    ----------
-    logs : array, shape (3,)
-        Logarithms of size, memory and noise.
+    `logs`: of size, memory and noise.
     """
     size, memory, noise = np.exp(logs)
     near = frequency + (frequency[1] - frequency[0]) * np.array(list(_NEIGHBOURS))[:, None]
@@ -89,13 +80,7 @@ def _spectrum(frequency: Array, logs: Array) -> tuple[Array, Array]:
 
 
 def _fitted(frequency: Array, power: Array) -> Array:
-    """Fit size, memory and noise to a spectrum.
-
-    Returns
-    -------
-    array, shape (4,)
-        Logarithms of them, and of the size within the band.
-    """
+    """Fit size, memory and noise to a spectrum; logarithms of them, and of the size within the band."""
     spacing = frequency[1] - frequency[0]
     whole = float(power.sum() * spacing)
     floor = float(np.median(power / (2 * np.pi * frequency) ** 2))

@@ -244,10 +244,7 @@ def _battery(flight: LogFlight, throttle: Array) -> Battery | None:
 def _discharge(time: Array, voltage: Array, load: Array, ends: Array) -> Array:
     """Fit voltage without load as a polynomial of time, up to a cubic, minus a slope times the load.
 
-    Returns
-    -------
-    array, shape (3,)
-        Slope, and voltage without load at both ends of the flight.
+    Gives the slope, and voltage without load at both ends of the flight.
     """
     degree = int(np.clip((ends[1] - ends[0]) / _PER_DEGREE_S, 1, 3))
     scaled, bounds = (np.vander(2 * (at - ends[0]) / (ends[1] - ends[0]) - 1, degree + 1) for at in (time, ends))

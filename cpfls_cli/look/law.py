@@ -26,13 +26,9 @@ _AROUND, _TINY = 1.5, float(np.finfo(float).tiny)
 
 
 class FlownFeedback(NamedTuple):
-    """The feedback about one axis as it flew, over that of the stated law.
+    """The feedback about one axis as it flew, over that of the stated law, by frequency in Hz.
 
-    Attributes
-    ----------
-    frequency : array, shape (frequency,), Hz
-        Where the command is seen to follow the body rate.
-    over : array of complex, shape (frequency,)
+    Frequencies are those at which the command is seen to follow the body rate.
     """
 
     frequency: Array

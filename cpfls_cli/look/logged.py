@@ -73,14 +73,9 @@ def what_is_logged(
     flown_at: float = np.nan,
     warnings: tuple[str, ...] = (),
 ) -> Logged:
-    """List what a log holds, how fast, and what is lost.
+    """List what a log holds, how fast, and what is lost, with warnings of the reader.
 
-    Parameters
-    ----------
-    flown_at : float
-        When it begins, s since 1970 began; NaN where it does not say.
-    warnings : tuple of str
-        Of the reader.
+    `flown_at`: when it begins, s since 1970 began; NaN where it does not say.
     """
     frame = stated_frame(flight.parameters, recognition.rotors)
     spans = [(float(flight.time[a]), float(flight.time[b - 1])) for a, b in runs(flight.flown)]

@@ -84,7 +84,7 @@ def read_flight(
     Raises
     ------
     InputError
-        If the log holds no flight of a multirotor, or no body rates: what it is, and what would tell.
+        If the log holds no flight of a multirotor, or no body rates: what it is, and what is missing.
     """
     recognition = recognition or recognise(topics, units, parameters, system)
     # Commands that are rebuilt stand in a topic of their own.

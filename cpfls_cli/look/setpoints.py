@@ -22,15 +22,7 @@ _AT_REST = 0.01
 
 
 class Exogenous(NamedTuple):
-    """Instruments of one axis.
-
-    Attributes
-    ----------
-    candidates : tuple of (str, array)
-        Name and values on the common clock, that nearest to the command first.
-    reason : str
-        Why there is none.
-    """
+    """Instruments of one axis on the common clock, that nearest to the command first, or why there is none."""
 
     candidates: tuple[tuple[str, Array], ...]
     reason: str

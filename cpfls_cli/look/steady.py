@@ -25,13 +25,7 @@ _WHOLE = 0.7
 
 
 class Windows(NamedTuple):
-    """Equally long windows of a flight in order of time.
-
-    Attributes
-    ----------
-    begin : array, shape (window,), s
-    length_s : float
-    """
+    """Equally long windows of a flight in order of time, s."""
 
     begin: Array
     length_s: float
@@ -74,15 +68,7 @@ def calm(flight: LogFlight, windows: Windows) -> BoolArray:
 
 
 class Known(NamedTuple):
-    """Numbers with what is known of their errors.
-
-    Attributes
-    ----------
-    value, half : array, shape (number,)
-        Half: of the 95 % interval.
-    covariance : array, shape (number, number)
-    blocks : int
-    """
+    """Numbers with what is known of their errors; `half`: of the 95 % interval."""
 
     value: Array
     half: Array
@@ -104,14 +90,7 @@ def jackknifed(compute: Callable[[BoolArray], Array], count: int) -> Known | Non
     """Compute numbers from windows, and their errors without each block of neighbouring windows.
 
     Blocks hold what correlates from window to window. None where there are fewer than six windows, or a number is not
-    finite without a block.
-
-    Parameters
-    ----------
-    compute : callable
-        From windows that are kept, shape (window,), to numbers, shape (number,).
-    count : int
-        Windows there are.
+    finite without a block. `compute` takes which windows are kept to the numbers.
     """
     if count < FEWEST_WINDOWS:
         return None
@@ -124,18 +103,9 @@ def jackknifed(compute: Callable[[BoolArray], Array], count: int) -> Known | Non
 
 
 class StatedCurve(NamedTuple):
-    """The thrust curve that an autopilot was given.
+    """The thrust curve that an autopilot was given, by a parameter; no name and NaN where the log has none.
 
-    Attributes
-    ----------
-    curve : ThrustCurve
-        From commands as logged.
-    name : str
-        Of its parameter; empty where the log has none.
-    value : float
-        Of that parameter; NaN where the log has none.
-    thrust : bool
-        Whether commands as logged are shares of thrust, before that curve.
+    `curve` is from commands as logged; `thrust`: whether those are shares of thrust, before that curve.
     """
 
     curve: ThrustCurve

@@ -153,12 +153,7 @@ def timeline(
 ) -> tuple[Event, ...]:
     """List what happens in a log, in order; many of one kind are one.
 
-    Parameters
-    ----------
-    topics : mapping from topic to mapping from field to array
-        As the reader of the log gives them.
-    messages : sequence of (float, str, str)
-        Messages of the autopilot to its pilot: s, how bad, text.
+    Messages of the autopilot to its pilot: s, how bad, text.
     """
     found = [
         *_flights(flight, topics, recognition),

@@ -160,15 +160,7 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
 
 
 class _Power(NamedTuple):
-    """Power of a signal by window and frequency.
-
-    Attributes
-    ----------
-    samples : Samples
-    windows : Windows
-    frequency : array, shape (frequency,), Hz
-    density : array, shape (window, frequency, channel)
-    """
+    """Power of a signal, shape (window, frequency, channel), frequency in Hz."""
 
     samples: Samples
     windows: Windows
@@ -281,13 +273,7 @@ def _lines(flight: LogFlight, power: _Power) -> Iterator[Line]:
 
 
 class _Table:
-    """Mean height above the floor along all curves that a line may follow.
-
-    Attributes
-    ----------
-    heights : array, shape (block, power, start)
-        Sums over the windows of a block.
-    """
+    """Mean height above the floor along all curves that a line may follow: sums over windows, (block, power, start)."""
 
     def __init__(self, above: Array, drive: _Drive, rate: float, spacing: float) -> None:
         self.drive, self.rate, self.spacing = drive, rate, spacing

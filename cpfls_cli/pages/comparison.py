@@ -47,14 +47,9 @@ _Model = Source[IdentifiedModel]
 
 @dataclass(frozen=True)
 class JudgedOn:
-    """One part of the data, and the models that were judged on it: only those can be ranked.
+    """One part of the data, what each model calls it, and the models judged on it: only those can be ranked.
 
-    Attributes
-    ----------
-    names : tuple of str
-        What each model calls it.
-    hashes : tuple of str
-        Of the flights that it is taken from.
+    `hashes` are of the flights that it is taken from.
     """
 
     names: tuple[str, ...]
@@ -101,7 +96,7 @@ def compared_curves(models: Sequence[_Model]) -> list[tuple[str, list[tuple[str,
 
 
 def _parts(model: _Model) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
-    """Name each part, what tells it from all others, and the flights that it is taken from."""
+    """Name each part, what distinguishes it from all others, and the flights that it is taken from."""
     inputs = model.header.inputs
     learned = tuple(file.sha256 for role, file in inputs.items() if role.split("-")[0] == "flight")
     others = sorted((role for role in inputs if role.startswith("validate-")), key=lambda role: int(role.split("-")[1]))
@@ -204,18 +199,7 @@ COMPARISON_WORDS: Mapping[str, Any] = {
 
 
 def differences(configs: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
-    """List the keys whose values differ.
-
-    Parameters
-    ----------
-    configs : sequence of mapping
-        Resolved studies.
-
-    Returns
-    -------
-    list of (str, list of str)
-        Dotted key, and its value in each study; long values are cut.
-    """
+    """List the dotted keys of resolved studies whose values differ, with the value in each; long values are cut."""
     kept = [{name: own for name, own in config.items() if name not in _LEFT_OUT} for config in configs]
     flat = [dict(flat_keys(config)) for config in kept]
     keys = dict.fromkeys(key for one in flat for key in one)

@@ -30,7 +30,7 @@ def gust_words(axes: list[GustAxis], instrument_kind: str) -> str:
     if open_:
         said.append(f"Gusts {joined(open_)} are not known, because what they move is not.")
     if known:
-        what = "what nothing before predicts" if instrument_kind == "past" else "what does not come again"
+        what = "the innovations" if instrument_kind == "past" else "what is not repeatable"
         said.append(f"Standard deviations of {what}; `cpfls simulate --model --gusts` plays them.")
     return " ".join(said)
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import Estimate, NamedEffect
 
 _RELATIVE = "_error"
-_OF_99 = 2.576 / 1.960  # An interval at 99 % over one at 95 %.
 _SHORT = {"inertia_x": "Ixx", "inertia_y": "Iyy", "inertia_z": "Izz", "thrust_scale": "thrust"}
 _NUMBERS = {
     "inertia": "moment of inertia about",
@@ -78,26 +77,6 @@ def wrong_numbers(effects: Iterable[NamedEffect]) -> dict[str, str]:
     numbers = [(effect, number) for effect in named for number in effect.numbers]
     words = ((number.name, _error_words(effect.name, number)) for effect, number in numbers)
     return {name: f"{short} {value} %" for name, (short, value, *_) in words}
-
-
-def of_thrust(effects: Iterable[NamedEffect]) -> list[str]:
-    """List moments of inertia that are right where a wrong thrust is named: rates show their ratio to the rotor torque.
-
-    That is where a moment of inertia times the thrust is that of the config within 99 %, by independent errors.
-    """
-    numbers = {
-        number.name: number for effect in effects if effect.name == VEHICLE_NUMBERS.name for number in effect.numbers
-    }
-    thrust = numbers.pop("thrust_scale", None)
-    moments = {name: each for name, each in numbers.items() if name.startswith("inertia_")}
-    return [] if thrust is None else [name for name, each in moments.items() if _undone(each, thrust)]
-
-
-def _undone(number: Estimate, other: Estimate) -> bool:
-    """Tell whether two relative errors multiply to none."""
-    off = (1 + number.value) * (1 + other.value) - 1
-    own, its = ((1 + b.value) * 0.5 * (a.high - a.low) for a, b in ((number, other), (other, number)))
-    return bool(abs(off) < _OF_99 * np.hypot(own, its))
 
 
 def _error_words(effect: str, number: Estimate) -> list[str]:

@@ -470,7 +470,7 @@ def _look(label: str, kind: str, index: int) -> dict[str, Any]:
 
 
 def _scale(axes: Axes) -> None:
-    """Give the errors that can be told apart the whole width; those that are rounding stand at the left end."""
+    """Give the errors that can be resolved the whole width; those that are rounding stand at the left end."""
     from matplotlib.ticker import FuncFormatter
 
     values = np.concatenate([np.asarray(line.get_xdata(), dtype=float) for line in axes.lines])

@@ -127,13 +127,7 @@ _SHOWN = {"extended": "extended model"}
 
 
 def missing(sources: Sources) -> dict[str, str]:
-    """Name the formats of which no artifact was given.
-
-    Returns
-    -------
-    dict of str to str
-        One sentence by format, such as ``selection``: what is not shown, and the command that makes it.
-    """
+    """Name the formats, such as ``selection``, of which no artifact was given: what is not shown, and what makes it."""
     listed = _wanted(sources)
     lacking = {_word(kind): (shows, command) for kind, shows, command in listed if not sources.of_kind(kind)}
     return {
@@ -191,7 +185,7 @@ _EXACT = (
 )
 _HASH_SHOWN = 12
 _ORDER = (
-    *("identify", "diagnose", "extend", "vehicle", "compare", "trajectory", "simulate", "import", "reduce", "sweep"),
+    *("identify", "diagnose", "extend", "vehicle", "compare", "trajectory", "simulate", "import", "reduce"),
     *("twin", "response", "tune", "replay", "trend", "changed"),
 )
 """Stages whose results a report shows, answers first; what it does not name comes last."""

@@ -44,10 +44,7 @@ one of them, and logs that were filtered forward and backward what they know of 
 class Sums(NamedTuple):
     """Products of balances X and of what instruments know of them Z, by block of the path, band and axis.
 
-    Attributes
-    ----------
-    ztx, xtx, ztz : array, shape (block, band, axis, column, column)
-    windows : array, shape (block, band)
+    `ztx`, `xtx`, `ztz`: shape (block, band, axis, column, column); `windows`: shape (block, band).
     """
 
     ztx: Array
@@ -71,14 +68,8 @@ class Sums(NamedTuple):
 class Rows(NamedTuple):
     """Balances of a flight in windows.
 
-    Attributes
-    ----------
-    number : int
-        Of the flight.
-    own, known : array, shape (window, column)
-        Its columns, and what of them is known from outside of its loop; NaN where nothing is.
-    middles : array, shape (window,)
-        The sample in the middle of each window.
+    `own` are its columns, `known` what of them is known from outside of its loop (NaN where nothing is), shape (window,
+    column); `middles` the sample in the middle of each window.
     """
 
     number: int

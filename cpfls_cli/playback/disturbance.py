@@ -1,7 +1,7 @@
-"""How large gusts are and how long they last, by what of a balance of torque and force does not come again.
+"""How large gusts are and how long they last, by the non-repeatable part of a balance of torque and force.
 
 Along a flight, what a model's torque and force lack of what the motion takes is gust, noise, and what the model lacks.
-The last comes again in other runs of the path, or goes with what was asked for; the first two do not. Their power by
+The last is repeatable in other runs of the path, or follows what was asked for; the first two do not. Their power by
 frequency is that of a Gauss-Markov process, with the white noise of gyroscope and velocity, which a derivative makes
 grow with frequency, and that of the rotor speeds.
 """
@@ -37,7 +37,7 @@ from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 _Complex = npt.NDArray[np.complex128]
 
 _PIECE_S, _SHORTEST_S = 8.0, 3.0
-"""Pieces whose power is taken by frequency: several times what gusts remember; the shortest that tell anything."""
+"""Pieces whose power is taken by frequency: several times what gusts remember; the shortest that show anything."""
 _RUN_SHARE = 0.4
 """Of the longest run, that a piece may take."""
 _OVERLAP = 0.75
@@ -55,7 +55,7 @@ _KNOWN, _SEEN = 3.0, 0.1
 _LAG_S, _LAGS, _RIDGE = 0.1, 5, 1e-6
 """What was asked for is answered within half a second."""
 _NEW_S, _RARE = 0.4, 0.01
-"""Windows in which what was before is asked, and how surely what is new may grow with it."""
+"""Past windows that are asked, and how surely innovations may grow with them."""
 _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
 """Logarithms: of factors by which powers may be off where they begin, noise upwards, and what is near a bound."""
 
@@ -105,16 +105,10 @@ class FoundGusts(GustRanges):
 
 
 class _Powers(NamedTuple):
-    """Power of what does not come again.
+    """Power of what is not repeatable.
 
-    Attributes
-    ----------
-    power, whole : array, shape (block, axis, frequency)
-        Sums over the pieces of a block, squared units of torque and force; of that, and of all that is left.
-    pieces : array, shape (block,)
-        How many there are.
-    left : array, shape (piece, axis, frequency)
-        Power of all that is left, piece by piece.
+    `power` of that and `whole` of all residuals are sums over the `pieces` of a block, shape (block, axis, frequency),
+    squared units of torque and force; `left` is that of all residuals, shape (piece, axis, frequency).
     """
 
     power: Array
@@ -126,12 +120,8 @@ class _Powers(NamedTuple):
 class _Band(NamedTuple):
     """Pieces of flights, and the frequencies that they are taken apart into.
 
-    Attributes
-    ----------
-    pieces : Windows
-    turns : array, shape (frequency,), rad/s
-    weight, slope : complex array, shape (sample, frequency)
-        Kernels of the average and of the derivative, which is moved onto them.
+    `turns` in rad/s; `weight` and `slope`, shape (sample, frequency), are kernels of the average and of the derivative,
+    which is moved onto them.
     """
 
     pieces: Windows
@@ -171,34 +161,19 @@ def find_gusts(
     *,
     identified: bool = True,
 ) -> FoundGusts | None:
-    """Find sizes and memories of gusts in flights of a vehicle that is known.
+    """Find sizes and memories of gusts in flights of a vehicle that is known; None for too short ones or several rates.
 
-    The power of what does not come again is ``s^2 G(w; m) + a A(w) + b B(w)``: that of a Gauss-Markov process of size s
+    The power of what is not repeatable is ``s^2 G(w; m) + a A(w) + b B(w)``: that of a Gauss-Markov process of size s
     and memory m seen through the pieces, of white noise through their derivative, and of white noise. All four numbers
-    are fitted by Whittle's likelihood; their errors come from the scatter of its slopes over pieces of the runs.
+    are fitted by Whittle's likelihood (1953); their errors come from the scatter of its slopes over pieces of the runs
+    (White 1982; Uhlenbeck and Ornstein 1930).
 
-    Parameters
-    ----------
-    model : VehicleModel
-        Its constants have to be those of the vehicle: a wrong body is answered with gusts.
-    given : Instruments
-        Of flights with rotor speeds. Without any, gusts are identified by the past; where that does not identify them,
-        all that is left is counted, and no size is known.
-    determined : mapping of str to bool
-        Of numbers of the model that were sought. Nothing is known about an axis whose moment of inertia is not
-        determined, and of forces where the thrust factor is not.
-    identified : bool
-        Whether something identified the constants too. Those of a fit may be mixed with the loop, even where torque
-        explains nearly all of the rotation, by as much as the gusts are: then they are not asked, and there is a bound.
-
-    Returns
-    -------
-    FoundGusts or None
-        None for flights that are too short or of several rates.
-
-    References
-    ----------
-    Whittle 1953; White 1982 (errors from the scatter of slopes); Uhlenbeck and Ornstein 1930.
+    The constants have to be those of the vehicle: a wrong body is answered with gusts. Without repeats gusts are
+    identified by the past; where that does not identify them, all residuals are counted, and no size is known. Nothing
+    is known about an axis whose moment of inertia is not `determined`, and of forces where the thrust factor is not.
+    `identified`: whether something identified the constants too. Those of a fit may be mixed with the loop, even where
+    torque explains nearly all of the rotation, by as much as the gusts are: then they are not asked, and there is a
+    bound.
     """
     rows = 6 if all(flight.translates for flight in given.flown) else 3
     sides = [_sides(model, flight)[..., :rows] for flight in given.flown]
@@ -222,7 +197,7 @@ def find_gusts(
 
 
 def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Sequence[Array]) -> FoundGusts:
-    """Give gusts where what is new in what is left was not predicted by what was before, nor its size; else the bound.
+    """Give gusts where past windows predict neither the innovations of the residual nor their size; else the bound.
 
     Air turns a vehicle about every axis, and pushes it where flights know their velocity.
     """
@@ -279,7 +254,7 @@ def gusts_in(
     instrument_kind : str
         Which instruments to take.
     parts : mapping of str to sequence of array, shape (time, axis), N m and N
-        For each run what parts of the model give; what is left is held against them to tell what the model lacks.
+        For each run what parts of the model give; the residual is compared with them to show what the model lacks.
 
     Returns
     -------
@@ -385,7 +360,7 @@ def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
 
 
 def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Array]:
-    """Predict what is left from what was asked for, each part of the flights as the other parts tell; NaN for others.
+    """Predict what is left from what was asked for, each part of the flights by a fit to the others; NaN elsewhere.
 
     A delay of what was asked for is a turn of its phase.
     """
@@ -424,7 +399,7 @@ class _Fit(NamedTuple):
 
 
 class _Axis:
-    """What does not come again about one axis, and the process that has this power."""
+    """The non-repeatable part about one axis, and the process that has this power."""
 
     def __init__(self, band: _Band, power: Array, count: IntArray) -> None:
         self._period = band.pieces.period
@@ -444,10 +419,7 @@ class _Axis:
     def found(self, shared: float) -> Array:
         """Give size and memory with their intervals, as columns of `FoundGusts`; the bound where they are not known.
 
-        Parameters
-        ----------
-        shared : float
-            By how much errors are larger than the scatter of blocks tells.
+        Errors are larger than the scatter of blocks by the factor `shared`.
         """
         fit = self._fit
         half = half_width(shared * self._errors(*fit) * [0.5, 1.0], len(self._count))

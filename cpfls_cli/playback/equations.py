@@ -40,10 +40,7 @@ _BODY = (*INERTIA_PARAMETERS, _MASS)
 class Column(NamedTuple):
     """What balances are linear in: a product of numbers of the vehicle, along an axis.
 
-    Attributes
-    ----------
-    by : str
-        The time of the rotors' response by which it is differentiated; empty for none.
+    `by` names the time of the rotors' response by which it is differentiated; empty for none.
     """
 
     axis: int
@@ -61,11 +58,7 @@ class Signals(NamedTuple):
 class Form(NamedTuple):
     """Columns of a balance of torque or of force, those of one axis after those of another.
 
-    Attributes
-    ----------
-    columns : tuple of Column
-    changing, acting : array of int
-        Those in which something changes, and those in which something acts.
+    `changing` are those in which something changes, `acting` those in which something acts.
     """
 
     columns: tuple[Column, ...]

@@ -60,12 +60,7 @@ DRAG_OVER_THRUST = "drag_over_thrust"
 
 @dataclass(frozen=True)
 class VehicleAt:
-    """The vehicle that values of its free numbers make.
-
-    Attributes
-    ----------
-    values : array, shape (number,)
-    """
+    """The vehicle that values of its free numbers make."""
 
     free: FreeNumbers
     values: Array
@@ -275,13 +270,7 @@ def acting_numbers(
 
 
 def acting_at(free: FreeNumbers, number: Callable[[str], Value]) -> tuple[tuple[Acting, ...], Value]:
-    """List what acts on a vehicle of free numbers, and the ratio of the drag factors that effects share.
-
-    Parameters
-    ----------
-    number : callable
-        See `acting_numbers`.
-    """
+    """List what acts on a vehicle of free numbers, and the ratio of the drag factors that effects share."""
     index, hover = free.index, scales.hover_speed(free.vehicle)
 
     def given(name: str, otherwise: float) -> Value:
@@ -315,14 +304,7 @@ def acting_at(free: FreeNumbers, number: Callable[[str], Value]) -> tuple[tuple[
 
 
 class _Traced:
-    """A vehicle of symbols.
-
-    Attributes
-    ----------
-    values : tuple of Symbol
-        The numbers.
-    flown : Flown
-    """
+    """A vehicle of symbols, and its numbers."""
 
     def __init__(self, free: FreeNumbers, *, differentiated: bool = False) -> None:
         vehicle, self.free, self.graph = free.vehicle, free, Graph()
@@ -370,10 +352,7 @@ def traced_slopes(
 ) -> tuple[int, tuple[tuple[int, int], ...], Callable[..., Callable[..., Vector]]]:
     """Make a function of the numbers that gives derivatives of the accelerations; see `Slopes`.
 
-    Parameters
-    ----------
-    pushes : int
-        Numbers of what pushes on top, by which it is then differentiated, and not by those of the vehicle.
+    With so many `pushes` on top it is differentiated by those, and not by the numbers of the vehicle.
     """
     free = FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order))
     own = _Traced(free, differentiated=not pushes)

@@ -37,15 +37,9 @@ _LEAST = 0.1
 
 @dataclass(frozen=True)
 class FitWindows:
-    """Windows of a flight that runs are compared in.
+    """Windows of a flight that runs are compared in, by their first samples and the samples of a step.
 
-    Attributes
-    ----------
-    starts : array of int, shape (window,)
-    loss : Loss
-        In errors of "rate stays" on windows of the flight, or more for a quiet one (`windows_of`).
-    every : int
-        Samples of a step of the runs.
+    The loss is in errors of "rate stays" on windows of the flight, or more for a quiet one (`windows_of`).
     """
 
     flight: PlaybackFlight
@@ -100,13 +94,8 @@ def windows_of(
     """Take windows of flights, errors weighed so that a lively flight counts more, by the square root.
 
     A model misses more of a lively flight, but not in proportion: the noise of rotor speeds is there in hover as well.
-    In errors of "rate stays" a quiet flight would rule the fit, in plain errors the liveliest.
-
-    Parameters
-    ----------
-    horizon_s, interval_s : float, s
-    step_s : float, s
-        Longest step of runs; one sample at least.
+    In errors of "rate stays" a quiet flight would rule the fit, in plain errors the liveliest. All times in s; a step
+    of runs is one sample at least.
     """
     periods = [flight.motion.period for flight in flights]
     every = [max(1, int(min(step_s, horizon_s) / period + 1e-9)) for period in periods]
@@ -133,9 +122,7 @@ def rate_stays(flight: PlaybackFlight, starts: IntArray, horizon: int, every: in
 def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
     """Weigh errors by what is expected of a forecast that knows nothing, such as `rate_stays`.
 
-    Parameters
-    ----------
-    scale : array, shape (horizon, 4), m, m/s, rad, rad/s
+    `scale`: shape (horizon, 4), in m, m/s, rad and rad/s.
     """
     shown, scale = flight.shown[1:], scale[:, 1:]
     total = np.where(shown & (scale.sum(axis=0) > 0), scale.sum(axis=0), np.inf)
@@ -145,14 +132,7 @@ def loss_of(flight: PlaybackFlight, scale: Array) -> Loss:
 
 @dataclass(frozen=True)
 class FittedNumbers:
-    """Numbers fitted to windows.
-
-    Attributes
-    ----------
-    values : array, shape (number,)
-    loss : float
-        Mean over windows, without the prior; about 1.1 for rates that stay.
-    """
+    """Numbers fitted to windows, and the mean loss over windows without the prior; about 1.1 for rates that stay."""
 
     free: JointNumbers
     values: Array
@@ -166,12 +146,9 @@ class FittedNumbers:
 
 @dataclass(frozen=True)
 class Fitted(FittedNumbers):
-    """Numbers fitted to windows, and how well these tell them.
+    """Numbers fitted to windows, and how well these identify them.
 
-    Attributes
-    ----------
-    hessian : array, shape (number, number)
-        Gauss-Newton, of the mean loss with the prior, in scales of the numbers.
+    `hessian`: Gauss-Newton, of the mean loss with the prior, in scales of the numbers.
     """
 
     hessian: Array
@@ -188,16 +165,8 @@ class Fitted(FittedNumbers):
 class FitPoint:
     """A fit at values of its numbers; see `cpfls_cli.gauss_newton.Point`.
 
-    Attributes
-    ----------
-    loss : float
-        The objective without what was believed before.
-    derivatives : callable
-        Gives gradient and Hessian of the loss by the numbers. They cost ten times the loss, and a step that fails, or
-        is the last one, needs none.
-    scales : array, shape (number,)
-    prior : Prior
-        What was believed before, in scales.
+    `loss` is without the prior, which is in scales. `derivatives` gives gradient and Hessian: they cost ten times the
+    loss, and a step that fails, or is the last one, needs none.
     """
 
     values: Array
@@ -236,24 +205,10 @@ def fit(
 ) -> Fitted:
     """Minimise the robust prediction error over windows by a damped Gauss-Newton method within bounds.
 
-    Parameters
-    ----------
-    known : mapping of str to float
-        Values to start from, by name.
-    steps : int
-        At most.
-    tolerance : float
-        Relative decrease of the loss below which the fit has come to its end.
-
-    Raises
-    ------
-    ComputationError
-        If the starting values lead nowhere: the loss is not finite.
-
-    References
-    ----------
-    Ljung, System Identification, section 10.2; Jategaonkar, Flight Vehicle System Identification, chapter 4 (output
-    error); Bock 1983 (multiple shooting: each window starts from what was measured).
+    It ends after so many `steps`, or when the loss decreases by less than the relative `tolerance`; `ComputationError`
+    where the loss is not finite at the start. Ljung, System Identification, section 10.2; Jategaonkar, Flight Vehicle
+    System Identification, chapter 4 (output error); Bock 1983 (multiple shooting: each window starts from what was
+    measured).
     """
     return fit_parts(free, [windows], [known], steps, tolerance)[0]
 
@@ -318,13 +273,7 @@ def fit_parts(
 class SideBySide:
     """Windows of several flights of one configuration that are flown at once.
 
-    Attributes
-    ----------
-    places : array of int, shape (flight,)
-        Which of all they are.
-    windows : tuple of FitWindows
-    owner : array of int, shape (run,)
-        Which of these flights each run is of.
+    `places` says which of all flights they are, `owner` which of these flights each run is of.
     """
 
     places: IntArray
@@ -435,10 +384,7 @@ class WindowSet:
     def derivatives(self, free: JointNumbers, values: Array, groups: Sequence[IntArray]) -> list[tuple[Array, Array]]:
         """Sum gradient and Hessian by all numbers along each flight, the first axis that of the groups.
 
-        Parameters
-        ----------
-        groups : sequence of array of int, shape (run,)
-            Which sum of its flight each run is added to.
+        `groups` says of each flight which sum each run is added to.
         """
         count = len(values)
         sizes = [int(own.max(initial=0)) + 1 for own in groups]
@@ -487,14 +433,7 @@ class WindowSums:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How far the numbers of a fit scatter, from blocks of windows.
-
-    Attributes
-    ----------
-    covariance : array, shape (number, number)
-    determined : array of bool, shape (number,)
-        Whether the flights say more of a number than what was believed before.
-    """
+    """Covariance of the numbers of a fit from blocks of windows; determined where flights say more than the prior."""
 
     covariance: Array
     blocks: int
@@ -509,20 +448,12 @@ _INFORMED = 10.0
 
 
 def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
-    """Estimate how far the numbers scatter, from blocks of neighbouring windows.
+    """Estimate how far the numbers scatter, from blocks of neighbouring windows that they were fitted to.
 
-    Without a block b, windows within which are alike, the fit moves by ``(H - H_b)^-1 g_b``; the covariance is
-    ``(n - 1) / n`` times the sum of the squares of these moves about their mean. A block that alone tells of a number
-    has drawn the fit to itself, which a fixed ``H^-1`` would not see.
-
-    Parameters
-    ----------
-    windows : sequence of FitWindows
-        Of the flights that it was fitted to.
-
-    References
-    ----------
-    Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023 (jackknife by cluster); Ljung, section 9.4.
+    Without a block b, windows within which are alike, the fit moves by ``(H - H_b)^-1 g_b``; the covariance is ``(n -
+    1) / n`` times the sum of the squares of these moves about their mean. A block that alone identifies a number has
+    drawn the fit to itself, which a fixed ``H^-1`` would not see. Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb
+    2023 (jackknife by cluster); Ljung, section 9.4.
     """
     free, scale = fitted.free, fitted.free.scales
     count = sum(len(window.starts) for window in windows)

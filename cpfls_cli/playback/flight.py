@@ -29,24 +29,11 @@ def motion_at(motion: MeasuredMotion, samples: slice | IntArray) -> MeasuredMoti
 class PlaybackFlight:
     """A flight on a uniform clock, in stretches without pauses.
 
-    Attributes
-    ----------
-    motion : MeasuredMotion
-        Zero, and no rotation, where the flight does not know it.
-    speed : array, shape (time, rotor), rad/s
-        Measured, or commanded.
-    hold : {"linear", "previous"}
-        What a speed is between samples.
-    has_attitude, has_velocity, has_position : bool
-        Whether they were measured. Without attitude or velocity rotation alone is played back.
-    wrench : array, shape (time, 6), N m and N, body frame, or None
-        Stated torque and force of a flight without rotor speeds, which are then 0.
-    specific_force : array, shape (time, 3), m/s^2, body frame, or None
-        Of an accelerometer.
-    setpoints : mapping of str to array, shape (time, column)
-        Those of `Signals` that are known in all stretches.
-    group : str
-        Configuration of the vehicle that flew it, where there are several; empty for the one of the config.
+    `motion`: zero, and no rotation, where the flight does not know it; `speed`: measured or commanded, rad/s, shape
+    (time, rotor), and what it is between samples; without attitude or velocity rotation alone is played back; `wrench`:
+    stated torque and force of a flight without rotor speeds, which are then 0, shape (time, 6), N m and N, body frame;
+    `specific_force`: of an accelerometer, m/s^2, body frame; `setpoints`: those of `Signals` that are known in all
+    stretches; `group`: configuration of the vehicle that flew it, empty for the one of the config.
     """
 
     name: str
@@ -72,7 +59,7 @@ class PlaybackFlight:
 
     @property
     def shown(self) -> BoolArray:
-        """Whether runs tell position, velocity, attitude and rate, shape (4,)."""
+        """Whether runs show position, velocity, attitude and rate, shape (4,)."""
         return np.array([self.translates, self.translates, self.has_attitude, True])
 
     @cached_property
@@ -115,26 +102,11 @@ class PlaybackFlight:
 class LoggedFlight:
     """A flight to be played back, as it was logged.
 
-    Attributes
-    ----------
-    parts : tuple of Signals
-        Stretches without pauses, at least one.
-    hold : {"linear", "previous"}
-        What a speed is between samples.
-    actuation : str
-        What drives the playback, in words.
-    contradictions : tuple of str
-        What of it no verdict can stand beside.
-    group : str
-        See `PlaybackFlight`.
-    shares : bool
-        Whether its commands are shares of the full speed of the rotors.
-    updated_hz : float or None
-        How often the log tells what drives the playback; None where that is as often as there are samples.
-    begins : float
-        Stamp of the log's own clock at time 0, s; NaN where there is none.
-    system : str
-        What wrote the log; empty where it does not say.
+    `parts`: stretches without pauses, at least one; `hold`: what a speed is between samples; `actuation`: what drives
+    the playback, in words; `contradictions`: what of it no verdict can stand with; `group`: see `PlaybackFlight`;
+    `shares`: whether its commands are shares of the full speed of the rotors; `updated_hz`: how often the log says what
+    drives the playback, None for as often as there are samples; `begins`: stamp of the log's own clock at time 0, s;
+    `system`: what wrote the log.
     """
 
     name: str
@@ -171,15 +143,7 @@ class LoggedFlight:
 
 
 def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:
-    """Put the stretches of a flight one after another.
-
-    Parameters
-    ----------
-    parts : sequence of Signals
-        Of one sampling period and with the same signals, each with rotor speeds or a stated torque.
-    hold : {"linear", "previous"}
-        What a speed is between samples.
-    """
+    """Put the stretches of a flight one after another, of one period and with the same signals."""
     first = parts[0]
     thrust_known = first.rotor_speed is not None or first.stated_thrust is not None
     motion = MeasuredMotion(

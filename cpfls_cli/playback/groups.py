@@ -36,13 +36,7 @@ class Group(NamedTuple):
 
 @dataclass(frozen=True)
 class JointNumbers:
-    """The free numbers of all configurations: those of the vehicle of the config, then what others have of their own.
-
-    Attributes
-    ----------
-    groups : tuple of Group
-        Other configurations, if any.
-    """
+    """The free numbers of all configurations: those of the vehicle of the config, then what others have of theirs."""
 
     base: FreeNumbers
     groups: tuple[Group, ...] = ()

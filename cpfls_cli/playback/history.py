@@ -48,7 +48,7 @@ class Observer:
 
 
 def past_of(flight: PlaybackFlight, starts: IntArray, samples: int) -> tuple[IntArray, Array]:
-    """List the steps before each start, and which of them are in its stretch: earlier ones tell nothing of it.
+    """List the steps before each start, and which of them are in its stretch: earlier ones hold nothing of it.
 
     Parameters
     ----------
@@ -71,18 +71,9 @@ def past_of(flight: PlaybackFlight, starts: IntArray, samples: int) -> tuple[Int
 
 
 def missed_wrench(flight: PlaybackFlight, samples: IntArray, errors: Array, body: Body) -> Array:
-    """Turn the errors of single steps into the torque and force that must have acted beside the model's.
+    """Turn errors of single steps into the torque and force missed, shape (step, 6), N m and N, body frame.
 
-    Parameters
-    ----------
-    samples : array of int, shape (step,)
-        Where the steps begin.
-    errors : array, shape (step, 4, 3)
-        Of the steps, see `errors_of_runs`.
-
-    Returns
-    -------
-    array, shape (step, 6), N m and N, body frame
+    `samples` are where the steps begin, `errors` as of `errors_of_runs`, shape (step, 4, 3).
     """
     period, rotation = flight.motion.period, flight.motion.rotation[samples]
     torque = -errors[:, 3] @ body.inertia / period

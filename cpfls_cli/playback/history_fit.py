@@ -61,14 +61,8 @@ def find_history(
 ) -> Observer | None:
     """Fit the observer of a forecast; None where it lowers no error on parts of the flights kept aside.
 
-    Parameters
-    ----------
-    chosen : Judged
-        The structure of the forecast, fitted without each part: the observer is fitted to that, without the part too.
-    fitted : Fitted
-        The same, fitted to all flights.
-    flights : sequence of PlaybackFlight
-        Those that train, of the configuration of the config.
+    `chosen` is the structure fitted without each part, which its observer is fitted to, without the part too; `fitted`
+    the same, fitted to all flights.
     """
     parts, errors = parts_of(flights, settings), []
     for place, (part, without) in enumerate(zip(parts, chosen.without, strict=True)):
@@ -86,14 +80,8 @@ def find_history(
 def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: float) -> Observer:
     """Minimise the prediction error of a forecast by the numbers of its observer, over windows between given ones.
 
-    A forecast was fitted to the given ones, and misses less of them than of others: little would be left to observe.
-
-    Parameters
-    ----------
-    windows : sequence of FitWindows
-        That it was fitted to, of flights of the configuration of the config.
-    past_s : float, s
-        How much of the past is used.
+    The forecast was fitted to the given ones, and misses less of them than of others: little would be left to observe.
+    `past_s`: how much of the past is used, s.
     """
     at = _vehicle(fitted)
     begun = [_Begun.of(at, each, past_s) for each in side_by_side([_between(each) for each in windows])]
@@ -134,12 +122,8 @@ def _vehicle(fitted: FittedNumbers) -> VehicleAt:
 class _Begun(NamedTuple):
     """Windows side by side, and what is missed before them.
 
-    Attributes
-    ----------
-    terms : array, shape (step, run, 1 + 4 rotors)
-        Of the rotors.
-    missed : array, shape (run, step, 6), N m and N
-        By the model, of each step of the past; 0 where there is none.
+    `terms` of the rotors, shape (step, run, 1 + 4 rotors); `missed` by the model at each step of the past, shape (run,
+    step, 6), N m and N, 0 where there is none.
     """
 
     windows: SideBySide

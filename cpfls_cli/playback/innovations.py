@@ -36,12 +36,8 @@ _DRAWS = 999
 class Innovations(NamedTuple):
     """Quasi-differences of windows of runs; of each run those of the last windows.
 
-    Attributes
-    ----------
-    rows, predicted : list of array, shape (window, axis, column)
-        And what the past predicts of them.
-    kept : array, shape (axis, 1)
-        Share of the residual that lasts from one window to the later one.
+    `rows`, and what the past predicts of them: shape (window, axis, column); `kept`: share of the residual that lasts
+    from one window to the later one, shape (axis, 1).
     """
 
     rows: list[Array]

@@ -45,15 +45,7 @@ _HELD_M = 1.0
 
 
 class Run(NamedTuple):
-    """A flight, or a part of one that flies its path again and again.
-
-    Attributes
-    ----------
-    flight : int
-        Number of the flight that it is cut out of.
-    part : slice
-        Samples of that flight.
-    """
+    """A flight by its number, or the samples of a part of one that flies its path again and again."""
 
     flight: int
     part: slice
@@ -321,15 +313,10 @@ class Repeats:
 
 
 def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
-    """Find flights that fly the same path, and align them.
+    """Find flights of one sampling period that fly the same path, and align them; of each the longest stretch is taken.
 
     Velocities and changes of the rates are correlated over all shifts, or else the positions that were asked for; then
     rates piece by piece, and a straight line through the shifts is taken, so that clocks may drift.
-
-    Parameters
-    ----------
-    flights : sequence of PlaybackFlight
-        Of one sampling period; of each the longest stretch is taken.
     """
     found: tuple[dict[int, Array], ...] = tuple({} for _ in flights)
     likeness = {}

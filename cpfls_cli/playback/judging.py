@@ -38,12 +38,8 @@ def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> l
 
     Neighbours are kept aside together because flights of one kind usually stand side by side: what a model has to
     predict is a kind of flight that it has not seen. Pieces are taken of a single flight, and where a part turns about
-    an axis about which hardly anything turns in the others: no model can be asked for what nothing tells.
-
-    Raises
-    ------
-    InputError
-        If a flight shows nothing that a model predicts, or all are too short to keep a part aside.
+    an axis about which hardly anything turns in the others: no model can be asked for what nothing identifies.
+    `InputError` where a flight shows nothing that a model predicts, or all are too short.
     """
     flown = sum(len(flight) * flight.motion.period for flight in flights)
     most = min(settings.search_windows, _QUICK) if settings.quick else settings.search_windows
@@ -103,25 +99,12 @@ def _blocks(counts: Sequence[int]) -> list[IntArray]:
 
 @dataclass(frozen=True)
 class Outlook:
-    """Loss of free runs near values of numbers, to second order, by pieces of the flights.
+    """Loss of free runs near values of numbers, to second order, by pieces of the flights; sums, in scales.
 
     A model with fewer numbers has the others at where they are absent, and one with more has them there at first: both
     are predicted by the step that a fit would take from there, without each part and then judged on it. Errors of the
-    step make what is predicted too large rather than too small, as the loss grows by less than the square.
-
-    Attributes
-    ----------
-    values : array, shape (number,)
-    loss : array, shape (piece,)
-        Sums, as are gradient, shape (piece, number), and Hessian, shape (piece, number, number), both in scales.
-    count : array, shape (piece,)
-        Windows.
-    part : array of int, shape (piece,)
-        That is kept aside with the piece.
-
-    References
-    ----------
-    Rao 1948 (score test); Lawless and Singhal 1978 (subsets from one fit by its Hessian).
+    step make what is predicted too large rather than too small, as the loss grows by less than the square. Rao 1948
+    (score test); Lawless and Singhal 1978 (subsets from one fit by its Hessian).
     """
 
     free: JointNumbers

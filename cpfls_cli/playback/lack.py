@@ -34,14 +34,8 @@ _NOTHING = 1e-12
 class AxisLack(NamedTuple):
     """What a model lacks about or along one axis.
 
-    Attributes
-    ----------
-    share : array, shape (part,)
-        Of each part of the model, that the size has.
-    rest : float, N m or N
-        Size where no part gives anything.
-    memory : float, s
-        Time in which it falls to 37 %.
+    `share`: of each part of the model, that the size has; `rest`: size where no part gives anything, N m or N;
+    `memory`: time in which it falls to 37 %, s.
     """
 
     share: Array
@@ -115,25 +109,12 @@ class DrawnLack:
 def lack_of(
     power: Array, squares: Array, known: Array, process: GaussMarkov, memory_s: tuple[float, float]
 ) -> AxisLack:
-    """Find how large what a model lacks is, in the power of the residual.
+    """Find how large what a model lacks is, in the power of the residual, shape (piece, frequency).
 
-    On a piece it is ``known(w) + (r^2 + sum_k s_k^2 q_k) G(w; m)``: gusts and noise, and a Gauss-Markov process of
-    memory m with shares s_k of the parts, whose mean squares on the piece are q_k, and a rest.
-
-    Parameters
-    ----------
-    power : array, shape (piece, frequency)
-        Of the residual.
-    squares : array, shape (piece, part)
-        Mean square of each part as instruments predict it.
-    known : array, shape (frequency,)
-        Power of gusts and noise, which are not repeatable.
-    memory_s : tuple of float, s
-        Shortest and longest.
-
-    References
-    ----------
-    Kennedy and O'Hagan 2001 (discrepancy of a model).
+    On a piece it is ``known(w) + (r^2 + sum_k s_k^2 q_k) G(w; m)``: gusts and noise, which are not repeatable, and a
+    Gauss-Markov process of memory m with shares s_k of the parts, whose mean squares on the piece are q_k as
+    instruments predict them, shape (piece, part), and a rest. `memory_s`: shortest and longest. Kennedy and O'Hagan
+    2001 (discrepancy of a model).
     """
     largest = np.log(power.mean(axis=0).max() / process.alike.sum(axis=1).max())
     active = np.flatnonzero(squares.mean(axis=0) > _NOTHING * np.exp(largest))

@@ -92,26 +92,13 @@ class LoopBounds(NamedTuple):
 def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopBounds:
     """Bound the moments of inertia that the flights of a closed loop allow, in those of a model.
 
-    With ``t`` the model's torque and ``h`` the torque that its inertia takes along the motion, both in a band,
-    ``<t, h> / <h, h>`` and ``<t, t> / <t, h>`` are the factors by which torque on rotation and rotation on torque want
-    the inertia changed. A disturbance that the torque opposes and that turns the vehicle its own way leaves the true
-    factor between them. The torque is taken without slow actuation: a torque that fades by itself is how an autopilot
-    that cancels gusts looks.
-
-    Parameters
-    ----------
-    model : VehicleModel
-    flights : sequence of PlaybackFlight
-        With rotor speeds.
-
-    Returns
-    -------
-    LoopBounds
-        The widest of all bands in which motion stands above noise, with 95 % of the scatter over blocks.
-
-    References
-    ----------
-    Frisch 1934 (bounds by regression both ways); Forssell and Ljung 1999 (closed-loop identification revisited).
+    With ``t`` the model's torque and ``h`` the torque that its inertia takes along the motion, both in a band, ``<t, h>
+    / <h, h>`` and ``<t, t> / <t, h>`` are the factors by which torque on rotation and rotation on torque want the
+    inertia changed. A disturbance that the torque opposes and that turns the vehicle its own way leaves the true factor
+    between them. The torque is taken without slow actuation: a torque that fades by itself is how an autopilot that
+    cancels gusts looks. The widest bounds of all bands in which motion stands above noise, with 95 % of the scatter
+    over blocks. Frisch 1934 (bounds by regression both ways); Forssell and Ljung 1999 (closed-loop identification
+    revisited).
     """
     model = replace(model, response=replace(model.response, slow_roll_pitch=0.0, slow_yaw=0.0))
     found = bounds_between([_balanced(model, flight, part) for flight in flights for part in flight.stretches])

@@ -47,22 +47,11 @@ _TURNED, _PUSHED = 2.0, 0.5
 
 @dataclass(frozen=True)
 class Number:
-    """One number of a vehicle.
+    """One number of a vehicle, named by block and number, such as ``linear_damping.d_x``.
 
-    Attributes
-    ----------
-    name : str
-        Block and number, such as ``linear_damping.d_x``.
-    unit : str
-        Empty for a ratio, or the logarithm of one.
-    start : float
-        What is stated, or a small value where nothing is.
-    scale : float
-        Natural size of a change.
-    low, high : float
-        Physical bounds.
-    spread : float
-        Standard deviation of what is believed before the flights, in scales.
+    `unit` is empty for a ratio or its logarithm; `start` is what is stated, or a small value where nothing is; `scale`
+    the natural size of a change; `low` and `high` are physical bounds; `spread` is the standard deviation of what is
+    believed before the flights, in scales.
     """
 
     name: str
@@ -85,15 +74,7 @@ class Number:
 
 
 class Physical(NamedTuple):
-    """A number as people know it.
-
-    Attributes
-    ----------
-    positive : bool
-        Whether it cannot be below 0.
-    stated : bool
-        Whether a config states it.
-    """
+    """A number as people know it: whether it cannot be below 0, and whether a config states it."""
 
     value: float
     unit: str
@@ -173,14 +154,8 @@ def needs_velocity(block: str) -> bool:
 class FreeNumbers:
     """The numbers of a vehicle that are free, and what each adds to torque and force.
 
-    Attributes
-    ----------
-    vehicle : VehicleSettings
-        As stated.
-    chosen : tuple of str
-        Blocks, beside those of what is not known of the vehicle.
-    airflow : Airflow
-        Rules of the remainder, where it is among the blocks.
+    `chosen` are blocks beside those of what is not known of the vehicle; `airflow` are rules of the remainder, where it
+    is among them.
     """
 
     vehicle: VehicleSettings

@@ -24,15 +24,9 @@ from cpfls_cli.playback.windows import Runs as FlownRuns
 class Player:
     """A model made ready to be played back along one flight.
 
-    Attributes
-    ----------
-    rotor : array, shape (time, 1 + 4 rotors)
-        Terms of the rotors over each step.
-    along : array, shape (time, 6), N m and N, or None
-        What acts over each step on top: stated, or evaluated along the measured motion.
-    wind : tuple of float, m/s, world frame
-    observer : Observer or None
-        What runs know of the past; None: nothing but the state that they start from. Of constant inertia alone.
+    `rotor`: terms of the rotors over each step, shape (time, 1 + 4 rotors); `along`: what acts over each step on top,
+    stated or evaluated along the measured motion, shape (time, 6), N m and N; `wind` in m/s, world frame; `observer`:
+    what runs know of the past, of constant inertia alone; None: nothing but the state that they start from.
     """
 
     flown: Flown
@@ -207,19 +201,9 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
 
 
 def observed(player: Player, flight: PlaybackFlight, starts: IntArray) -> Array:
-    """Observe the disturbance at each start, from samples up to it alone.
+    """Observe the disturbance at each start from samples up to it alone, shape (run, 6), N m and N, body frame.
 
-    Parameters
-    ----------
-    player : Player
-        With an observer.
-    starts : array of int, shape (run,)
-        Ascending.
-
-    Returns
-    -------
-    array, shape (run, 6), N m and N, body frame
-        Where a stretch begins later than the past that is asked for, from what there is.
+    Starts ascend. Where a stretch begins later than the past that is asked for, it is observed from what there is.
     """
     observer = player.observer
     assert observer is not None
@@ -250,17 +234,8 @@ def still_runs(
 ) -> Runs:
     """Predict that the whole state stays what it was, or that velocity does and rates stay or fade.
 
-    Parameters
-    ----------
-    starts : array of int, shape (run,)
-    horizon : int
-        Steps.
-    moves : bool
-        Whether attitude and position follow the rates and the velocity.
-    fading_s : float, s
-        Time constant with which rates fade.
-    every : int
-        Samples of a step.
+    `moves`: attitude and position follow rates and velocity; rates fade with the time constant `fading_s`; `every`:
+    samples of a step.
     """
     motion = flight.motion
     velocity, rate, held = motion.velocity[starts], motion.rate[starts], motion.rotation[starts]

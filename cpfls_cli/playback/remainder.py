@@ -15,12 +15,8 @@ from cpfls_cli.vehicle.values import Functions, Value, dot, minus, plus, times
 class Airflow(NamedTuple):
     """Terms of a learned remainder over the direction of the airflow; empty without rules.
 
-    Attributes
-    ----------
-    breakpoints : array, shape (rules + 1,)
-        Peaks of the membership functions, share of a turn; empty for none.
-    order : int
-        Of the harmonics in each consequent; 0 for the seesaw.
+    `breakpoints`: peaks of the membership functions, shares of a turn, shape (rules + 1,); `order`: of the harmonics in
+    each consequent, 0 for the seesaw.
     """
 
     breakpoints: Array
@@ -58,10 +54,7 @@ class Remainder:
 def learned_wrench(learned: Remainder, coefficients: Any = None) -> Callable[[Instant, Numbers], Wrench]:
     """Make of a remainder what acts on a vehicle as an effect does.
 
-    Parameters
-    ----------
-    coefficients : array of values, shape (row, column, 2), or None
-        In the place of its own, with derivatives.
+    `coefficients`, shape (row, column, 2), take the place of its own, with derivatives.
     """
     rules, order, peaks = max(len(learned.breakpoints) - 1, 1), learned.harmonic_order, learned.breakpoints.tolist()
     given = learned.coefficients if coefficients is None else coefficients

@@ -72,22 +72,10 @@ def _terms_at_samples(speed: Array, period: float, hold: Hold, delay_s: Any, lag
 
 
 def rotor_terms_by_step(speed: Array, period: float, hold: Hold, delay_s: Any, lag_s: Any, slow_s: Any) -> Numbers:
-    """Evaluate the terms of the rotors over each step: means of acting speeds, their squares, accelerations, slowness.
+    """Evaluate the terms of the rotors over each step, shape (time, 1 + 4 rotors), of one stretch without pauses.
 
-    Parameters
-    ----------
-    speed : array, shape (time, rotor), rad/s
-        Of one stretch without pauses.
-    period : float, s
-    hold : {"linear", "previous"}
-        What a speed is between samples: a straight line, or what it was at the sample before.
-    delay_s, lag_s, slow_s : float or complex
-        As in `RotorResponse`, or one that carries a derivative; None for no slowness, which is left 0.
-
-    Returns
-    -------
-    array, shape (time, 1 + 4 rotors)
-        1, speeds, squared speeds, accelerations, and slow less present squared speeds.
+    1, means of the acting speeds, their squares, accelerations, and slow less present squared speeds. Delay, lag and
+    slowness as in `RotorResponse`, or one that carries a derivative; None for no slowness, which is left 0.
     """
     mean, end, start = lagged(delayed(speed, delay_s / period, hold), lag_s / period, hold)
     squared = mean**2

@@ -48,7 +48,7 @@ class PlaybackSettings(Settings):
         Doc("blocks that are not tried, such as inertia, an effect, remainder or remainder_force (docs/playback.md)"),
     ] = ()
     anyway: Annotated[
-        bool, Doc("search in logs that contradict themselves or are too slow to tell what is sought, too; --anyway")
+        bool, Doc("search in logs that contradict themselves or are too slow to identify what is sought, too; --anyway")
     ] = False
     groups: Annotated[
         tuple[GroupSettings, ...],

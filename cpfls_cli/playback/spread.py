@@ -47,7 +47,7 @@ POSITIVE = frozenset((*MOMENTS, THRUST, DRAG, "slow_actuation.slow_s"))
 
 _FEWEST, _AT_ONCE = 0.01, 1000
 """Share of draws that has to be of possible vehicles: with less the estimate itself is hardly one; and the fewest draws
-that tell such a share."""
+that identify such a share."""
 _OF_A_GROUP = ": "
 """In the names of numbers that only another configuration has."""
 _EDGE = 1e-9
@@ -142,7 +142,7 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
     Raises
     ------
     InputError
-        If one block tells the numbers, which tells nothing of how sure they are.
+        If one block identifies the numbers, which says nothing of how sure they are.
     ComputationError
         If fewer than one draw of a hundred is of a possible vehicle.
 
@@ -186,9 +186,9 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
 
 
 def require_sure(known: Estimates) -> None:
-    """Refuse numbers that one block tells."""
+    """Refuse numbers that one block alone identifies."""
     if known.blocks < 2:
-        raise InputError("its flights are too short to tell how sure its numbers are; find it in longer ones")
+        raise InputError("its flights are too short to show how sure its numbers are; find it in longer ones")
 
 
 def _of_a_body(model: VehicleModel, numbers: Sequence[FoundNumber]) -> tuple[VehicleModel, list[FoundNumber]]:

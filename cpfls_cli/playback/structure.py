@@ -152,19 +152,9 @@ class TriedStructure(NamedTuple):
 class Choice:
     """What a search for the structure came to.
 
-    Attributes
-    ----------
-    chosen : Judged
-        The one with the fewest numbers within one standard error of the best.
-    added, everything, nothing : Judged
-        Baselines: named effects added to the stated vehicle alone, all blocks, and the stated vehicle; None where the
-        search was stopped before.
-    front : tuple of Judged
-        Not dominated in error, numbers and condition number, by number.
-    evaluated : int
-        Structures that were judged.
-    complete : bool
-        Whether the search came to its end.
+    `chosen` has the fewest numbers within one standard error of the best. `added` (named effects added to the stated
+    vehicle alone), `everything` and `nothing` are baselines, None where the search was stopped before; `front` is not
+    dominated in error, numbers and condition number, by number; `evaluated` counts the structures judged.
     """
 
     chosen: Judged
@@ -332,14 +322,8 @@ def choose(
 ) -> Choice:
     """Search for the structure, from all blocks and from the stated vehicle, by what fits predict of other structures.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        As stated.
-    flights : sequence of PlaybackFlight
-        Training flights alone.
-    kept : mapping of Structure to Solution
-        Of the same search, stopped before; it goes on to the same end.
+    Flights are those that train; `kept` holds the solutions of the same search, stopped before: it goes on to the same
+    end.
     """
     blocks = tried_blocks(vehicle, flights, settings)
     bench = _Bench(vehicle, parts_of(flights, settings), progress, len(blocks), kept)
@@ -529,14 +513,7 @@ def fitted_to_all(
 ) -> tuple[Fitted, list[FitWindows]]:
     """Fit a structure to all training flights, those of other configurations as well, with windows close together.
 
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        As stated.
-    start : Fitted
-        The same structure on some of them.
-    groups : tuple of Group
-        Other configurations.
+    `start` is the same structure fitted to some of them.
     """
     windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
     known = start.free.named(start.values)

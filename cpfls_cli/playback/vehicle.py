@@ -1,4 +1,4 @@
-"""A whole vehicle found in flights: structure, numbers with intervals, and what the flights cannot tell apart."""
+"""A whole vehicle found in flights: structure, numbers with intervals, and what the flights cannot separate."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class FoundVehicle:
     choice: Choice | None = None
     """How it was chosen; in no file, as all that follows."""
     sources: Instruments | None = None
-    """All that tells how the flights were moved, apart from gusts."""
+    """All that identifies how the flights were moved, apart from gusts."""
     others: Mapping[str, VehicleModel] = field(default_factory=dict)
     """Other configurations, by name of the group."""
 
@@ -199,22 +199,9 @@ def carrying_weight(
 ) -> tuple[VehicleSettings, tuple[FoundNumber, ...]]:
     """Replace the guess of the thrust factor by what carries the weight; a guessed drag factor scales with it.
 
-    Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found;
-    without one either, or where it feels no lift, nothing tells thrust from weight, and the guess stays.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        As stated, with guesses of what is not known.
-    flights : sequence of PlaybackFlight
-        Of this configuration.
-
-    Returns
-    -------
-    VehicleSettings
-        With better guesses; a thrust factor that nothing tells in runs is no longer unknown to them.
-    tuple of FoundNumber
-        The thrust factor, where the accelerometer tells it.
+    Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found
+    and returned: it is no longer unknown to the runs. Without one either, or where it feels no lift, nothing tells
+    thrust from weight, and the guess stays.
     """
     if "thrust_factor" not in vehicle.unknown:
         return vehicle, ()
@@ -279,13 +266,7 @@ def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tup
 
 
 def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
-    """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that.
-
-    Parameters
-    ----------
-    spread : Uncertainty
-        Of this fit.
-    """
+    """Turn the numbers of a fit into physical ones, their intervals by the derivatives of that."""
     free, values = fitted.free, fitted.values
     physical = free.physical(values)
     stated = free.physical(free.starts)
@@ -308,13 +289,8 @@ def bodily(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Iterator
     Speeds that are partly noise state torques that turn nothing, and those that answer a gust turn nothing either: a
     fit then makes the body heavier, however narrow its intervals. All three moments and the drag factor share that. A
     moment that is more than the other two together, stated ones included, is not determined itself, and neither is what
-    no vehicle has: a centre of mass beyond the hubs, or a coefficient beyond all that a fit tries on such a vehicle,
-    which it comes to where it is counted by an inertia that is too large.
-
-    Parameters
-    ----------
-    vehicle : VehicleSettings
-        Whose mass and rotors say what can be.
+    no vehicle of this mass and these rotors has: a centre of mass beyond the hubs, or a coefficient beyond all that a
+    fit tries on such a vehicle, which it comes to where it is counted by an inertia that is too large.
     """
     hubs = np.array([rotor.position_m for rotor in vehicle.rotors])
     values = {number.name: number.value for number in numbers}
@@ -347,12 +323,8 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
 
     About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where
     the flights show the loop, or are not explained, nothing is determined but what carries the weight, for every effect
-    answers with it: the thrust factor, where no law of the rotors found beside it carries a part of the weight.
-
-    Parameters
-    ----------
-    loop : LoopBounds
-        In moments of inertia of the model whose numbers these are.
+    answers with it: the thrust factor, where no law of the rotors found beside it carries a part of the weight. The
+    bounds are in moments of inertia of the model whose numbers these are.
     """
     low, high = np.fmin(loop.low, 1.0), np.fmax(loop.high, 1.0)
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}
@@ -415,7 +387,7 @@ def estimate_correlation(fitted: Fitted, spread: Uncertainty) -> Array:
     """Correlate the estimates of numbers as people know them, shape (number, number)."""
     covariance = _covariance(fitted.free.physical, fitted, spread)
     deviation = np.sqrt(np.diag(covariance))
-    # Of a number on a bound no block tells anything, so that it goes with no other.
+    # A number on a bound is the same in all blocks, so that it correlates with no other.
     correlation = covariance / np.maximum(np.outer(deviation, deviation), np.finfo(float).tiny)
     np.fill_diagonal(correlation, 1.0)
     return np.asarray(correlation)

@@ -61,14 +61,8 @@ _RATE = _MOMENTUM
 class Turned(NamedTuple):
     """How bodies turn in the states of runs.
 
-    Attributes
-    ----------
-    rate : vector, rad/s
-        That has the momentum.
-    direct : vector, N m
-        Torque that the motion takes beyond the change of momentum.
-    exists : array of bool, shape (run,)
-        False where no body has the inertia.
+    `rate` is that which has the momentum, rad/s; `direct` the torque that the motion takes beyond the change of
+    momentum, N m; `exists` is False where no body has the inertia, shape (run,).
     """
 
     rate: Vector
@@ -79,12 +73,8 @@ class Turned(NamedTuple):
 class Turning(NamedTuple):
     """An inertia that depends on the attitude.
 
-    Attributes
-    ----------
-    momentum : callable
-        From rotations and rates, shapes (3, 3, run) and (3, run), to momenta.
-    turned : callable
-        From rotations and momenta, rows of the vectors along its first axis.
+    `momentum` takes rotations and rates, shapes (3, 3, run) and (3, run), to momenta; `turned` takes rotations and
+    momenta, rows of the vectors along its first axis.
     """
 
     momentum: Callable[[Array, Array], Array]
@@ -92,16 +82,10 @@ class Turning(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Derivatives of the accelerations of a vehicle.
+    """Derivatives of the accelerations of a vehicle by the components of a state and by so many numbers.
 
-    Attributes
-    ----------
-    numbers : int
-        That it is differentiated by, beside the components of a state.
-    places : sequence of tuple of int
-        Component of the state that each derivative moves, and what it is by: of `STATES`, then of the numbers.
-    values : callable
-        Gives them from velocity, rotation and rate; then see `Steps.arguments`.
+    `places`: the component of the state that each derivative moves, and what it is by, of `STATES`, then of the
+    numbers; `values` gives them from velocity, rotation and rate, then see `Steps.arguments`.
     """
 
     numbers: int
@@ -235,16 +219,9 @@ class Flown:
 
 
 class Stepped(NamedTuple):
-    """A step of runs.
+    """A step of runs: the state at its end, and velocity, rotation and rate at the begin, then in the middle.
 
-    Attributes
-    ----------
-    end : vector
-        State at the end.
-    passed : vector
-        Velocity, rotation and rate at the begin, then in the middle.
-    exist : tuple
-        Whether a body has the inertia there.
+    `exist` says whether a body has the inertia there.
     """
 
     end: Vector
@@ -368,17 +345,10 @@ def _rotor_motion(terms: Array) -> tuple[Array, Array, Array]:
 
 
 class _Path(NamedTuple):
-    """Where runs went.
+    """Where runs went, shapes (step + 1, 3, run) and (step + 1, 3, 3, run).
 
-    Attributes
-    ----------
-    position, velocity, rate : array, shape (step + 1, 3, run)
-    rotation : array, shape (step + 1, 3, 3, run)
-        At their samples; a run that diverged stays as it was before the step in which it did.
-    passed : list of vector
-        What each step passed, see `Stepped`; empty where not asked for.
-    diverged : array of int, shape (run,)
-        Step at which a run diverged; -1 for those that did not.
+    A run that diverged stays as it was before the step in which it did: `diverged`, -1 for those that did not. `passed`
+    is what each step passed, see `Stepped`; empty where not asked for.
     """
 
     position: Array
@@ -421,14 +391,7 @@ def _turn(turn: Vector, pairs: Value, diagonal: Value, skew: Value) -> Vector:
 def rotation_errors(measured: Array, predicted: Array) -> Array:
     """Compute the rotation vectors from measured to predicted attitudes, rad, body frame of the measured one.
 
-    Parameters
-    ----------
-    measured, predicted : array, shape (..., 3, 3, run)
-
-    Returns
-    -------
-    array, shape (..., 3, run)
-        Its length is the geodesic distance.
+    From shape (..., 3, 3, run) to (..., 3, run); the length is the geodesic distance.
     """
 
     def entry(i: int, j: int) -> Array:
@@ -454,10 +417,7 @@ _TINY = 1e-12
 class Loss(NamedTuple):
     """How errors are weighed: ``sum over signals of weight delta^2 (sqrt(1 + |e|^2 / delta^2) - 1)``.
 
-    Attributes
-    ----------
-    weight, delta : array, shape (horizon, 3) or (horizon, 3, run)
-        For velocity, attitude and rate.
+    Both have shape (horizon, 3) or (horizon, 3, run), for velocity, attitude and rate.
     """
 
     weight: Array
@@ -568,13 +528,7 @@ def errors_of_runs(flown: Flown, runs: Runs, steps: Steps) -> tuple[Array, IntAr
 
 
 class Leg(NamedTuple):
-    """Some of the runs, flown.
-
-    Attributes
-    ----------
-    part : slice
-        Which of all they are.
-    """
+    """Some of the runs, flown."""
 
     part: slice
     runs: Runs
@@ -614,22 +568,10 @@ def _gone(diverged: IntArray, horizon: int) -> BoolArray:
 
 
 def sums_of(legs: Iterable[Leg], slopes: Slopes, steps: Steps, loss: Loss, group: IntArray) -> tuple[Array, Array]:
-    """Sum the gradient and the Gauss-Newton Hessian of the loss of runs by the numbers.
+    """Sum gradient and Gauss-Newton Hessian of the loss of runs by the numbers, by the group of each run.
 
-    The gradient is exact: the derivative of a rotation's error vector differs from that of the rotation only across
-    the vector, and the loss depends on its length alone.
-
-    Parameters
-    ----------
-    slopes : Slopes
-        Of the vehicle that flew them.
-    group : array of int, shape (run,)
-        Which sum a run is added to.
-
-    Returns
-    -------
-    gradient : array, shape (group, number)
-    hessian : array, shape (group, number, number)
+    The gradient is exact: the derivative of a rotation's error vector differs from that of the rotation only across the
+    vector, and the loss depends on its length alone. Shapes (group, number) and (group, number, number).
     """
     numbers, groups, horizon = slopes.numbers, int(group.max(initial=0)) + 1, len(loss.weight)
     gradient, hessian = np.zeros((groups, numbers)), np.zeros((groups, numbers, numbers))
@@ -662,13 +604,7 @@ def _slices(count: int, most: int) -> Iterator[slice]:
 
 
 class _Tangents:
-    """Derivatives of the states of some runs at a time by the numbers, in arrays that are made once.
-
-    Attributes
-    ----------
-    most : int
-        Runs at a time.
-    """
+    """Derivatives of the states of some runs at a time by the numbers, in arrays that are made once."""
 
     def __init__(self, slopes: Slopes, leg: Leg, steps: Steps, most: int) -> None:
         self.most, self._slopes, self._runs = min(most, len(leg.path.diverged)), slopes, leg.runs

@@ -22,30 +22,17 @@ below half of the full set's any more."""
 
 
 class SmallestSingularValue:
-    """Maximise ``sigma_min`` of the chosen rows; their rank must be full.
-
-    Parameters
-    ----------
-    rows : array, shape (samples, 3, columns)
-    """
+    """Maximise ``sigma_min`` of the chosen rows, shape (samples, 3, columns); their rank must be full."""
 
     def __init__(self, rows: Array) -> None:
         self._rows = rows
 
     def next_sample(self, factor: TriangularFactor, available: BoolArray) -> int:
-        """Name the sample with the largest ``lambda_min(G + R_i^T R_i)``.
+        """Name the available sample with the largest ``lambda_min(G + R_i^T R_i)``.
 
-        Upper bounds for all samples come from the two lowest eigenvectors. The best few by the bound are
-        evaluated; better bounds then discard every sample that cannot reach the level found, and only the rest
-        are compared exactly. The result is the same as if all had been evaluated.
-
-        Parameters
-        ----------
-        available : array of bool, shape (samples,)
-
-        References
-        ----------
-        Paper, section 8, step 1; method.md, section 6.
+        Upper bounds for all samples come from the two lowest eigenvectors. The best few by the bound are evaluated;
+        better bounds then discard every sample that cannot reach the level found, and only the rest are compared
+        exactly. The result is the same as if all had been evaluated. Paper, section 8, step 1; method.md, section 6.
         """
         eigenvalues = factor.singular_values[::-1] ** 2
         vectors = factor.singular_vectors[:, ::-1]
@@ -62,16 +49,8 @@ class SmallestSingularValue:
 def smallest_eigenvalue_bound(eigenvalues: Array, projections: Array) -> Array:
     """Bound ``lambda_min(G + R_i^T R_i)`` from above, by its Rayleigh-Ritz value on two eigenvectors of G.
 
-    Parameters
-    ----------
-    eigenvalues : array, shape (columns,), ascending
-        Eigenvalues of G.
-    projections : array, shape (samples, 3, 2)
-        Rows of each sample along the two lowest eigenvectors; with one column, along the only one.
-
-    Returns
-    -------
-    array, shape (samples,)
+    The eigenvalues ascend; `projections` are the rows of each sample along the two lowest eigenvectors, shape (samples,
+    3, 2), or along the only one.
     """
     squares = np.einsum("nij,nij->nj", projections, projections)
     if projections.shape[2] == 1:
@@ -86,11 +65,7 @@ def smallest_eigenvalue_bound(eigenvalues: Array, projections: Array) -> Array:
 class OptimalDesign:
     """Keep ``K_i = R_i G^-1 R_i^T`` and ``M_i = R_i G^-2 R_i^T`` of every sample as the selection grows.
 
-    Parameters
-    ----------
-    rows : array, shape (samples, 3, columns)
-    optimality : {"A", "D"}
-        A minimises ``trace G^-1``, the sum of the parameters' variances; D maximises ``det G``.
+    A minimises ``trace G^-1``, the sum of the parameters' variances; D maximises ``det G``.
     """
 
     def __init__(self, rows: Array, optimality: str) -> None:
@@ -99,21 +74,11 @@ class OptimalDesign:
         self._steps = 0
 
     def next_sample(self, factor: TriangularFactor, available: BoolArray) -> int:
-        """Name the sample with the largest gain.
+        """Name the available sample with the largest gain.
 
-        The gain is ``trace((I + K_i)^-1 M_i)`` for A, the fall of ``trace G^-1``, and ``det(I + K_i)`` for D,
-        the factor by which ``det G`` grows.
-
-        Parameters
-        ----------
-        factor : TriangularFactor
-            Factor of the samples chosen so far, of full rank; all but the first call must follow a call whose
-            sample was added.
-        available : array of bool, shape (samples,)
-
-        References
-        ----------
-        method.md, section 6.
+        The gain is ``trace((I + K_i)^-1 M_i)`` for A, the fall of ``trace G^-1``, and ``det(I + K_i)`` for D, the
+        factor by which ``det G`` grows. The factor is of the samples chosen so far, of full rank; all but the first
+        call must follow a call whose sample was added. method.md, section 6.
         """
         if self._steps % _REFRESH_STEPS == 0:
             self._refresh(factor)
@@ -147,32 +112,12 @@ class OptimalDesign:
 
 
 def information_growth(K: Array) -> Array:
-    """Compute ``det(I + K_i)``, the factor by which a sample raises ``det G``.
-
-    Parameters
-    ----------
-    K : array, shape (samples, 3, 3)
-        ``R_i G^-1 R_i^T``.
-
-    Returns
-    -------
-    array, shape (samples,)
-    """
+    """Compute ``det(I + K_i)``, the factor by which a sample raises ``det G``."""
     return np.asarray(np.linalg.det(np.eye(3) + K))
 
 
 def variance_reduction(K: Array, M: Array) -> Array:
-    """Compute ``trace((I + K_i)^-1 M_i)``, by which a sample lowers ``trace G^-1``.
-
-    Parameters
-    ----------
-    K, M : array, shape (samples, 3, 3)
-        ``R_i G^-1 R_i^T`` and ``R_i G^-2 R_i^T``.
-
-    Returns
-    -------
-    array, shape (samples,)
-    """
+    """Compute ``trace((I + K_i)^-1 M_i)``, by which a sample lowers ``trace G^-1``."""
     inverse = np.linalg.inv(np.eye(3) + K)
     return np.asarray(np.einsum("nij,nij->n", inverse, M))
 
@@ -181,13 +126,8 @@ class PrintedRule:
     """Take the largest smallest singular value; where no sample raises it, raise the largest one most.
 
     The smallest one is that of the thin decomposition: of as many values as there are rows, up to the columns. While
-    rows are fewer, no sample can raise it, and the one that leaves it largest is taken, as long as that is not zero.
-
-    Parameters
-    ----------
-    rows : array, shape (samples, 3, columns)
-    rank_tolerance : float
-        Singular values below this fraction of the largest count as zero.
+    rows are fewer, no sample can raise it, and the one that leaves it largest is taken, as long as that is not zero,
+    which it is below the tolerance, a fraction of the largest.
     """
 
     def __init__(self, rows: Array, rank_tolerance: float) -> None:
@@ -199,12 +139,6 @@ class PrintedRule:
     def next_sample(self, factor: TriangularFactor, available: BoolArray) -> int:
         """Name the sample with the largest thin ``sigma_min``, else the one that raises ``sigma_max`` most.
 
-        Parameters
-        ----------
-        available : array of bool, shape (samples,)
-
-        References
-        ----------
         Paper, section 8, step 1.
         """
         rows = _ROWS * (1 + int(np.count_nonzero(~available)))
@@ -248,20 +182,8 @@ class PrintedRule:
 def largest_eigenvalue_bound(eigenvalues: Array, along: Array, lengths: Array) -> Array:
     """Bound ``lambda_max(G + R_i^T R_i)`` from above, by the 2x2 matrix of the norms of its blocks.
 
-    The blocks are the top eigenvector of G and everything orthogonal to it.
-
-    Parameters
-    ----------
-    eigenvalues : array, shape (columns,), descending
-        Eigenvalues of G.
-    along : array, shape (samples, 3)
-        Rows of each sample along the top eigenvector.
-    lengths : array, shape (samples,)
-        Squared Frobenius norm of each sample's rows.
-
-    Returns
-    -------
-    array, shape (samples,)
+    The blocks are the top eigenvector of G, whose eigenvalues descend, and everything orthogonal to it. `along`: rows
+    of each sample along it; `lengths`: squared Frobenius norm of each sample's rows.
     """
     inside = np.einsum("ni,ni->n", along, along)
     outside = np.clip(lengths - inside, 0.0, None)
@@ -277,10 +199,7 @@ Criterion = SmallestSingularValue | OptimalDesign | PrintedRule
 def make_criterion(space: RowSpace, name: CriterionName) -> Criterion:
     """Create the rule of a criterion that chooses samples one by one.
 
-    Parameters
-    ----------
-    name : {"sigma_min", "A", "D", "even", "paper-literal"}
-        For `even` the rule is never asked: the start is the whole choice.
+    That of `even` is never asked: the start is the whole choice.
     """
     if name == "paper-literal":
         return PrintedRule(space.rows, space.rank_tolerance)

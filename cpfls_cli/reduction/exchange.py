@@ -39,20 +39,11 @@ _GRAM_LIMIT = 1e6
 class Compound:
     """``log (trace G^p)^(1/p) + log (trace G^-p)^(1/p) - w log (det G)^(1/columns)``, to be made small.
 
-    The first two terms lie above ``log(lambda_max / lambda_min)`` by at most ``(2/p) log(columns)`` (K-optimality).
-    Alone they are also lowered by leaving out the samples that say most; the third (D-optimality) is the price of that.
-
-    Attributes
-    ----------
-    power : float
-        The exponent p: 1 weighs all directions, more weighs the extreme ones.
-    information : float
-        The weight w.
-
-    References
-    ----------
-    Ye, Zhou 2013: Minimizing the condition number to construct design points for polynomial regression models. Cook,
-    Wong 1994: On the equivalence of constrained and compound optimal designs.
+    The first two terms lie above ``log(lambda_max / lambda_min)`` by at most ``(2/p) log(columns)`` (K-optimality):
+    `power` p = 1 weighs all directions, more weighs the extreme ones. Alone they are also lowered by leaving out the
+    samples that say most; the third (D-optimality), of weight w `information`, is the price of that. Ye, Zhou 2013:
+    Minimizing the condition number to construct design points for polynomial regression models. Cook, Wong 1994: On the
+    equivalence of constrained and compound optimal designs.
     """
 
     power: float
@@ -66,26 +57,12 @@ class Compound:
         return float(smooth - self.information * np.mean(np.log(eigenvalues)))
 
     def merits(self, rows: Array, eigenvalues: Array, vectors: Array, *, chosen: bool) -> Array:
-        """Estimate by how much each sample lowers the criterion.
+        """Estimate by how much each sample lowers the criterion, from eigenvalues (ascending) and vectors of G.
 
-        With ``K = R G^-1 R^T`` the estimate is ``trace((I +- K)^-1 R G^-(p+1) R^T) / trace G^-p - trace(R G^(p-1)
-        R^T) / trace G^p +- w/columns log det(I +- K)``: plus for a sample to add, minus for one that is in. Its first
-        order is the derivative. The last term is exact, the first at p = 1: its inverse keeps a sample from being
+        With ``K = R G^-1 R^T`` the estimate is ``trace((I +- K)^-1 R G^-(p+1) R^T) / trace G^-p - trace(R G^(p-1) R^T)
+        / trace G^p +- w/columns log det(I +- K)``: plus for a sample to add, minus for one that is in G (`chosen`). Its
+        first order is the derivative. The last term is exact, the first at p = 1: its inverse keeps a sample from being
         credited with more than its three rows can do.
-
-        Parameters
-        ----------
-        rows : array, shape (samples, 3, columns)
-        eigenvalues : array, shape (columns,), ascending
-            Of the chosen samples' Gram matrix G.
-        vectors : array, shape (columns, columns)
-            Its eigenvectors.
-        chosen : bool
-            Whether these samples are in G.
-
-        Returns
-        -------
-        array, shape (samples,)
         """
         low = (eigenvalues / eigenvalues[0]) ** -self.power
         high = (eigenvalues / eigenvalues[-1]) ** self.power
@@ -101,15 +78,7 @@ class Compound:
 
 @dataclass(frozen=True)
 class Exchanged:
-    """Result of the exchanges.
-
-    Attributes
-    ----------
-    indices : array of int, shape (size,)
-        Chosen samples, ascending.
-    exchanges : int
-        Samples that were replaced.
-    """
+    """The samples chosen by exchanges, ascending, and how many were replaced."""
 
     indices: IntArray
     exchanges: int
@@ -118,27 +87,13 @@ class Exchanged:
 def exchange_samples(
     space: RowSpace, start: IntArray, size: int, information: float, target: float | None = None
 ) -> Exchanged:
-    """Choose samples of a small condition number: grow a start to the size, then exchange.
+    """Choose samples of a small condition number: grow a start of full rank to the size, then exchange.
 
-    Growing at most doubles the set at a time, by the samples of largest merit. An exchange replaces the samples of
-    least merit by as many outside of largest merit: a quarter of all at first, half as many whenever that does not
-    lower the criterion. The power of the criterion rises in steps, and with the last one no exchange that the merits
-    propose helps any more.
-
-    Parameters
-    ----------
-    start : array of int
-        Samples of full rank.
-    size : int
-        Most samples to choose.
-    information : float
-        Weight of the information kept, see `Compound`; 0 for the condition number alone.
-    target : float, optional
-        Stop growing at the first size that reaches this condition number.
-
-    References
-    ----------
-    Fedorov 1972: Theory of Optimal Experiments.
+    Growing at most doubles the set at a time, by the samples of largest merit, and stops at the first size that reaches
+    the target condition number. An exchange replaces the samples of least merit by as many outside of largest merit: a
+    quarter of all at first, half as many whenever that does not lower the criterion. The power of the criterion rises
+    in steps, and with the last one no exchange that the merits propose helps any more. `information`: see `Compound`; 0
+    for the condition number alone. Fedorov 1972: Theory of Optimal Experiments.
     """
     chosen = np.zeros(space.samples, dtype=bool)
     chosen[start] = True

@@ -13,12 +13,7 @@ from cpfls_cli.arrays import Array
 class TriangularFactor:
     """``T`` with ``T^T T = G``, the Gram matrix of the chosen rows, kept by QR as samples are added.
 
-    Parameters
-    ----------
-    columns : int
-        Length of a row.
-    rank_tolerance : float
-        Singular values below this fraction of the largest count as zero.
+    Singular values below the tolerance, a fraction of the largest, count as zero.
     """
 
     def __init__(self, columns: int, rank_tolerance: float) -> None:

@@ -21,33 +21,18 @@ _SCOUT_TOLERANCE = 1e-2
 
 
 def first_best(scores: Array, available: BoolArray) -> int:
-    """Find the lowest available index whose score is the largest one up to rounding.
-
-    Parameters
-    ----------
-    scores : array, shape (samples,)
-    available : array of bool, shape (samples,)
-    """
+    """Find the lowest available index whose score is the largest one up to rounding."""
     allowed = np.where(available, scores, -np.inf)
     best = allowed.max()
     return int(np.argmax(allowed >= best - TIE_TOLERANCE * abs(best)))
 
 
 def eigenvalues_below(eigenvalues: Array, projections: Array, shift: float) -> IntArray:
-    """Count the eigenvalues of ``diag(eigenvalues) + Z_i^T Z_i`` below a shift.
+    """Count the eigenvalues of ``diag(eigenvalues) + Z_i^T Z_i`` below a shift, for each sample.
 
     By Sylvester's law of inertia it is the count of ``eigenvalues`` below the shift less the count of negative
-    eigenvalues of the 3x3 matrix ``I + Z_i (diag(eigenvalues) - shift)^-1 Z_i^T``.
-
-    Parameters
-    ----------
-    eigenvalues : array, shape (columns,)
-    projections : array, shape (samples, 3, columns)
-        Z_i: rows of each sample in the eigenvectors' basis.
-
-    Returns
-    -------
-    array of int, shape (samples,)
+    eigenvalues of the 3x3 matrix ``I + Z_i (diag(eigenvalues) - shift)^-1 Z_i^T``, Z_i the rows of each sample in the
+    eigenvectors' basis.
     """
     distance = eigenvalues - shift
     # A shift on an eigenvalue moves off it by no more than that eigenvalue's own rounding, so nothing overflows.
@@ -68,23 +53,11 @@ def lazy_best(
 ) -> int:
     """Find the sample with the largest score, the lowest index among equals.
 
-    The best few by their bounds are evaluated; the level they reach discards most other samples by their
-    bounds, then by sharper bounds; only the rest are compared exactly.
-
-    Parameters
-    ----------
-    rows : array, shape (samples, 3, columns)
-    vectors : array, shape (columns, columns)
-        Basis in which samples are compared.
-    bounds : array, shape (samples,)
-        Upper bounds of the scores; minus infinity excludes a sample.
-    floor : float
-        A level that every score reaches.
-    exceeds : callable
-        Says of projections, array of shape (samples, 3, vectors), which samples' scores exceed a level. Given
-        the first few vectors only, it may err in favour of a sample, never against one.
-    bound_vectors : tuple of int
-        Counts of vectors for the sharper bounds.
+    The best few by their upper bounds, minus infinity for samples that are excluded, are evaluated; the level they
+    reach (`floor` is one that every score reaches) discards most other samples by their bounds, then by sharper bounds,
+    of so many of the basis `vectors`; only the rest are compared exactly. `exceeds` says of projections, shape
+    (samples, 3, vectors), which samples' scores exceed a level. Given the first few vectors only, it may err in favour
+    of a sample, never against one.
     """
     highest = float(bounds.max())
     count = min(_SCOUTS, int(np.count_nonzero(np.isfinite(bounds))))

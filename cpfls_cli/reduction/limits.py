@@ -21,10 +21,7 @@ _BATCH = 64
 def sample_limit(space: RowSpace, settings: ReductionSettings) -> int:
     """Return the most samples that may be chosen.
 
-    Raises
-    ------
-    SettingError
-        If the size is larger than the number of samples or too small for the rank.
+    `SettingError` where the size is larger than the number of samples or too small for the rank.
     """
     size = settings.size
     if size is None:
@@ -39,15 +36,7 @@ def sample_limit(space: RowSpace, settings: ReductionSettings) -> int:
 def starting_samples(space: RowSpace, criterion: CriterionName, limit: int) -> IntArray:
     """Choose the samples that a criterion begins with: of full rank, but for the printed rule and for `even`, all.
 
-    Parameters
-    ----------
-    limit : int
-        Most samples that may be chosen.
-
-    Raises
-    ------
-    SettingError
-        If the limit is too small for the rank.
+    `SettingError` where the most that may be chosen are too few for the rank.
     """
     if criterion == "even":
         return every_nth(space.samples, limit)
@@ -60,13 +49,7 @@ def starting_samples(space: RowSpace, criterion: CriterionName, limit: int) -> I
 
 
 def stop_reason(run: SelectionRun, settings: ReductionSettings, limit: int) -> StopReason | None:
-    """Return the limit that ends a selection, None while there is none.
-
-    Parameters
-    ----------
-    limit : int
-        Most samples that may be chosen.
-    """
+    """Return the limit that ends a selection, None while there is none."""
     target = settings.condition_number
     if target is not None and run.indices and at_most(run.factor.condition_number, target):
         return "condition-number"
@@ -82,17 +65,8 @@ def _too_few(space: RowSpace, needed: int) -> SettingError:
 def rank_growing_start(space: RowSpace) -> IntArray:
     """Choose samples by the part of their rows that the chosen ones do not span, until the full rank is spanned.
 
-    The sample taken adds the most rank, three at best; among those, it is the one whose smallest added
-    singular value ``sigma_k(R_i (I - U U^T))`` is largest, where U is a basis of the span so far.
-
-    Returns
-    -------
-    array of int
-        Samples in the order of selection.
-
-    References
-    ----------
-    method.md, section 6.
+    The sample taken adds the most rank, three at best; among those, it is the one whose smallest added singular value
+    ``sigma_k(R_i (I - U U^T))`` is largest, where U is a basis of the span so far. method.md, section 6.
     """
     basis = np.zeros((space.rank, 0))
     # At least one sample has this much left in any direction that is missing.

@@ -18,15 +18,10 @@ StopReason = Literal["size", "condition-number", "all-samples", "pool"]
 
 @dataclass(frozen=True)
 class Subset:
-    """Samples of a regressor and how well they determine its parameters.
+    """Samples of a regressor and how well they determine its parameters; fields as described at `Selection`.
 
-    Other fields are described at `Selection`.
-
-    Attributes
-    ----------
-    condition_number : float
-        Largest over smallest singular value of the chosen samples, over as many singular values as the full
-        set's rank; infinite when the subset has a smaller rank.
+    The condition number is over as many singular values as the full set's rank; infinite when the subset has a smaller
+    rank.
     """
 
     criterion: str
@@ -119,13 +114,7 @@ class Selection:
 
 
 class SelectionRun:
-    """Samples chosen so far, their factor and the trace.
-
-    Parameters
-    ----------
-    start : array of int
-        Samples to choose before the criterion is asked.
-    """
+    """Samples chosen so far, from those before the criterion is asked on, their factor and the trace."""
 
     def __init__(self, space: RowSpace, criterion: Criterion, start: IntArray) -> None:
         self._space, self._criterion, self._start = space, criterion, start

@@ -39,20 +39,8 @@ class Spectrum:
 class Survey(Spectrum):
     """Number of samples and row space of a regressor, found in one pass.
 
-    Attributes
-    ----------
-    chunks : Chunks
-        Starts another pass over the same regressor.
-    samples : int
-        Number of samples.
-    parameters : int
-        Columns of the regressor.
-    basis : array, shape (parameters, rank)
-        Orthonormal basis of the row space.
-    singular_values : array, shape (rank,), descending
-        Kept singular values of all samples.
-    rank_tolerance : float
-        Singular values below this fraction of the largest count as zero.
+    `chunks` starts another pass; `basis` of the row space is orthonormal, shape (parameters, rank); the kept singular
+    values of all samples descend, those below the tolerance, a fraction of the largest, count as zero.
     """
 
     chunks: Chunks
@@ -94,17 +82,7 @@ def survey(chunks: Chunks, rank_tolerance: float) -> Survey:
 
 
 def project(rows: Array, vectors: Array) -> Array:
-    """Multiply every sample's rows with the same vectors, in one matrix product.
-
-    Parameters
-    ----------
-    rows : array, shape (samples, 3, columns)
-    vectors : array, shape (columns, vectors)
-
-    Returns
-    -------
-    array, shape (samples, 3, vectors)
-    """
+    """Multiply every sample's rows with the same vectors, in one matrix product, to shape (samples, 3, vectors)."""
     product: Array = rows.reshape(-1, rows.shape[2]) @ vectors
     return product.reshape(len(rows), 3, -1)
 
@@ -167,16 +145,7 @@ def _require_shape(chunk: Array, columns: int | None) -> int:
 class RowSpace(Spectrum):
     """Samples of a regressor, expressed in an orthonormal basis of the row space of all its samples.
 
-    Attributes
-    ----------
-    rows : array, shape (samples, 3, rank)
-        ``Q V_r``: the same nonzero singular values as Q, for every subset of samples.
-    singular_values : array, shape (rank,), descending
-        Kept singular values of all samples.
-    parameters : int
-        Columns of Q.
-    rank_tolerance : float
-        Singular values below this fraction of the largest count as zero.
+    `rows`: ``Q V_r``, the same nonzero singular values as Q, for every subset of samples; the rest as at `Survey`.
     """
 
     rows: Array
@@ -196,11 +165,5 @@ class RowSpace(Spectrum):
 
 
 def space_of(surveyed: Survey, rows: Array) -> RowSpace:
-    """Place samples in the row space of a surveyed regressor.
-
-    Parameters
-    ----------
-    rows : array, shape (samples, 3, rank)
-        Some or all of its samples, projected.
-    """
+    """Place some or all samples, projected, in the row space of a surveyed regressor."""
     return RowSpace(rows, surveyed.singular_values, surveyed.parameters, surveyed.rank_tolerance)

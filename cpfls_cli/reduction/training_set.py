@@ -30,21 +30,9 @@ def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | No
     """Choose samples one by one, each the best next one by the criterion, or all of them by exchanges.
 
     All criteria but `even` and the printed rule begin with the fewest samples that reach the full rank. Samples chosen
-    by exchanges are returned, and traced, in the order in which the criterion D takes them.
-
-    Parameters
-    ----------
-    progress : callable, optional
-        Called with the samples chosen and the most there can be.
-
-    Raises
-    ------
-    SettingError
-        If the size is larger than the number of samples or too small for the rank.
-
-    References
-    ----------
-    Paper, section 8, eq. (19); method.md, section 6.
+    by exchanges are returned, and traced, in the order in which the criterion D takes them. `SettingError` where the
+    size is larger than the number of samples or too small for the rank. Paper, section 8, eq. (19); method.md, section
+    6.
     """
     limit = sample_limit(space, settings)
     start = starting_samples(space, settings.criterion, limit)
@@ -55,13 +43,7 @@ def choose(space: RowSpace, settings: ReductionSettings, progress: Progress | No
 
 
 def check_space(space: RowSpace, settings: ReductionSettings) -> None:
-    """Refuse what `choose` would refuse, without the work of choosing.
-
-    Raises
-    ------
-    SettingError
-        See `choose`.
-    """
+    """Refuse what `choose` would refuse, without the work of choosing."""
     starting_samples(space, settings.criterion, sample_limit(space, settings))
 
 
@@ -88,42 +70,20 @@ def _one_by_one(run: SelectionRun, limit: int, settings: ReductionSettings, prog
 
 @dataclass(frozen=True)
 class Pool:
-    """Samples held in memory out of all those surveyed.
-
-    Attributes
-    ----------
-    indices : array of int, shape (pool,)
-        Which samples they are, ascending.
-    space : RowSpace
-        Their rows.
-    """
+    """Samples held in memory out of all those surveyed: which they are, ascending, and their rows."""
 
     indices: IntArray
     space: RowSpace
 
 
 def draw_pool(surveyed: Survey, size: int, rng: np.random.Generator) -> Pool:
-    """Hold all samples where they fit, else draw some without replacement by their leverage, in one pass.
+    """Hold all samples where they fit, else draw `size` without replacement by their leverage, in one pass.
 
-    The leverage ``h_i = trace(R_i (Q^T Q)^-1 R_i^T)`` says how much of what all samples determine rests on sample
-    i: one that alone determines a direction has 1 or more. Sample i gets the key ``log(u_i) / h_i`` with u_i
-    uniform, and the largest keys are kept.
-
-    Parameters
-    ----------
-    size : int
-        Samples to hold at most.
-    rng : numpy.random.Generator
-        One number per sample is drawn, in order, and none where all samples fit.
-
-    Raises
-    ------
-    ComputationError
-        If the samples drawn do not determine all that the whole regressor determines.
-
-    References
-    ----------
-    Efraimidis, Spirakis 2006: Weighted random sampling with a reservoir.
+    The leverage ``h_i = trace(R_i (Q^T Q)^-1 R_i^T)`` says how much of what all samples determine rests on sample i:
+    one that alone determines a direction has 1 or more. Sample i gets the key ``log(u_i) / h_i`` with u_i uniform, one
+    drawn for each in order, none where all fit, and the largest keys are kept. `ComputationError` where the samples
+    drawn do not determine all that the whole regressor determines. Efraimidis, Spirakis 2006: Weighted random sampling
+    with a reservoir.
     """
     if surveyed.samples <= size:
         rows = np.concatenate(list(surveyed.projected()))
@@ -228,13 +188,7 @@ def _pool(surveyed: Survey, settings: ReductionSettings, rng: np.random.Generato
 
 
 def pool_of(surveyed: Survey, wanted: IntArray) -> Pool:
-    """Hold the rows of some samples of all.
-
-    Parameters
-    ----------
-    wanted : array of int, shape (samples,)
-        Ascending.
-    """
+    """Hold the rows of some samples of all, by ascending indices."""
     blocks, first = [], 0
     for rows in surveyed.projected():
         begin, end = np.searchsorted(wanted, [first, first + len(rows)])

@@ -42,26 +42,21 @@ MOTION = 6
 class Program(NamedTuple):
     """What is computed of each sample, as numbers of lines.
 
-    Attributes
-    ----------
-    partitions : array of int, shape (partitions + 1, 5)
-        Line of the antecedent, membership functions, rules, first inner breakpoint, first line or -1 where one
-        function always fires. The last one stands for no partition.
-    columns : array of int, shape (active, 7)
-        Columns that are not zero at a sample: the one of the first rule; by roll and by pitch partition, which of the
-        two functions fires, and columns from one rule to the next.
-    sums : array of int, shape (sums, 6)
-        Line that two products are added up in, a negative one of columns, factor, and the lines multiplied.
-    moves : array of int, shape (moves, 11)
-        Inputs with inner breakpoints: partition, columns from one of its rules to the next, the same of the other
-        input; functions of that which fire, their first line; first column, features, their first row in `features`;
-        ends of the sums by the breakpoint on the left and by that on the right.
-    features : array of int, shape (features, 3)
-        Lines of value, slope by roll and slope by pitch; -1 for what is zero.
-    once : int
-        Sums that do not belong to a move.
-    moved : int
-        First line of derivatives by breakpoints.
+    `partitions`, 5 columns: line of the antecedent, membership functions, rules, first inner breakpoint, first line or
+    -1 where one function always fires; the last one stands for no partition.
+
+    `columns`, 7 columns, those that are not zero at a sample: the one of the first rule; by roll and by pitch
+    partition, which of the two functions fires, and columns from one rule to the next.
+
+    `sums`, 6 columns: line that two products are added up in, a negative one of columns, factor, and the lines
+    multiplied; `once` of them do not belong to a move.
+
+    `moves`, 11 columns, inputs with inner breakpoints: partition, columns from one of its rules to the next, the same
+    of the other input; functions of that which fire, their first line; first column, features, their first row in
+    `features`; ends of the sums by the breakpoint on the left and by that on the right.
+
+    `features`: lines of value, slope by roll and slope by pitch, -1 for what is zero; `moved`: first line of
+    derivatives by breakpoints.
     """
 
     partitions: IntArray
@@ -388,12 +383,8 @@ def _add_up(
 ) -> None:
     """Go through a chunk, run by run of samples that fire the same rules, and add up what is asked for.
 
-    Parameters
-    ----------
-    models : tuple of array
-        Coefficients, shape (models, parameters), and dense weights, shape (models, dense).
-    sums : tuple of array
-        See what calls this. Shapes (sums, n, n), (sums, parameters, m) and (dense, m), changed in place.
+    `models`: coefficients, shape (models, parameters), and dense weights, shape (models, dense); `sums`, see what calls
+    this, of shapes (sums, n, n), (sums, parameters, m) and (dense, m), are changed in place.
     """
     coefficients, dense_weights = models
     square, cross, dense_cross = sums
@@ -446,13 +437,7 @@ def motion_lines(rate: Array, acceleration: Array, dense: Array) -> Array:
 
 
 def runs_of(table: Table, breakpoints: Array, inputs: Array) -> Runs:
-    """Put samples in the order of the cells that all breakpoints cut roll and pitch into, those of one in that of time.
-
-    Parameters
-    ----------
-    breakpoints : array, shape (partitions, most functions)
-    inputs : array, shape (lines, samples)
-    """
+    """Put samples in the order of the cells that all breakpoints cut roll and pitch into, those of one by time."""
     partitions, cell, cells = table.program.partitions[:-1], np.zeros(inputs.shape[1], np.int64), 1
     antecedents, functions = partitions[:, _ANTECEDENT], partitions[:, _FUNCTIONS]
     place = np.arange(breakpoints.shape[1])
@@ -526,21 +511,10 @@ def add_gram(
     gram: Array,
     moment: Array,
 ) -> None:
-    """Add ``Q^T Q`` and ``Q^T dense`` of the samples of a chunk to sums by label.
+    """Add ``Q^T Q`` and ``Q^T dense`` of the samples of a chunk, by its runs, to sums by label, in place.
 
-    Parameters
-    ----------
-    breakpoints : array, shape (partitions, most functions)
-    runs : Runs
-        Of the chunk, by these breakpoints.
-    scale : array, shape (3,)
-        Factor of the rows about each axis.
-    label : array of int, shape (samples,)
-        Sum that a sample adds to.
-    gram : array, shape (sums, parameters, parameters)
-        Changed in place. An entry off the diagonal is meant as the sum of it and its mirror image.
-    moment : array, shape (sums, parameters, dense)
-        Changed in place.
+    `scale`: factor of the rows about each axis; `gram`: an entry off the diagonal is meant as the sum of it and its
+    mirror image.
     """
     _sums(_GRAM, table, breakpoints, chunk, runs, scale, label, (_NOTHING, _NOTHING), (gram, moment, _NOTHING))
 
@@ -557,22 +531,9 @@ def add_errors(
     square: Array,
     largest: Array,
 ) -> None:
-    """Add the squared residuals ``dense D - Q c`` of a chunk by label, and find the largest of all.
+    """Add the squared residuals ``dense D - Q c`` of a chunk by label, and find the largest of all, in place.
 
-    Parameters
-    ----------
-    table, breakpoints, chunk, runs, scale
-        See `add_gram`.
-    label : array of int, shape (samples,)
-        Sum that a sample adds to.
-    coefficients : array, shape (models, parameters)
-        c of several models.
-    dense_weights : array, shape (models, dense)
-        D.
-    square : array, shape (sums, models)
-        Sums of squares over samples and axes, changed in place.
-    largest : array, shape (sums, models)
-        Largest absolute residuals, changed in place.
+    Of several models, with coefficients c and dense weights D; over samples and axes. The rest as of `add_gram`.
     """
     models, sums = (coefficients, dense_weights), (square[:, :, None], largest[:, :, None], _NOTHING)
     _sums(_ERRORS, table, breakpoints, chunk, runs, scale, label, models, sums)
@@ -590,20 +551,10 @@ def add_combined(
     back: Array,
     dense_back: Array,
 ) -> None:
-    """Add the products of residuals ``Y = dense D - Q c`` of a chunk for several c.
+    """Add the products of residuals ``Y = dense D - Q c`` of a chunk for several c, in place.
 
-    Parameters
-    ----------
-    table, breakpoints, chunk, runs, scale
-        See `add_gram`.
-    coefficients : array, shape (models, parameters)
-    dense_weights : array, shape (models, dense)
-    square : array, shape (models, models)
-        ``Y^T Y``, upper triangle, changed in place.
-    back : array, shape (parameters, 1)
-        Q^T times the first residual, changed in place.
-    dense_back : array, shape (dense, 1)
-        The dense columns times the first residual, changed in place.
+    `square`: ``Y^T Y``, upper triangle; `back`, `dense_back`: Q^T, and the dense columns, times the first residual. The
+    rest as of `add_gram`.
     """
     label, models = np.zeros(chunk.inputs.shape[1], np.int64), (coefficients, dense_weights)
     _sums(_COMBINED, table, breakpoints, chunk, runs, scale, label, models, (square[None], back[None], dense_back))
@@ -621,24 +572,11 @@ def add_moved(
     dense_cross: Array,
     square: Array,
 ) -> None:
-    """Add the products of the residual and of its derivatives by the inner breakpoints at fixed coefficients.
+    """Add the products of the residual and of its derivatives by the inner breakpoints at fixed coefficients, in place.
 
-    The residual is ``r = dense D - Q c`` and its derivatives are ``-M``; all products are with ``[M, r]``.
-
-    Parameters
-    ----------
-    table, breakpoints, chunk, runs, scale
-        See `add_gram`.
-    coefficients : array, shape (parameters,)
-        c.
-    dense_weights : array, shape (dense,)
-        D.
-    cross : array, shape (parameters, inner breakpoints + 1)
-        ``Q^T [M, r]``, changed in place.
-    dense_cross : array, shape (dense, inner breakpoints + 1)
-        ``dense^T [M, r]``, changed in place.
-    square : array, shape (inner breakpoints + 1, inner breakpoints + 1)
-        ``[M, r]^T [M, r]``, upper triangle, changed in place; entries mean the sum with their mirror images.
+    The residual is ``r = dense D - Q c`` and its derivatives are ``-M``; all products are with ``[M, r]``: `cross` is
+    ``Q^T [M, r]``, `dense_cross` ``dense^T [M, r]``, `square` ``[M, r]^T [M, r]``, upper triangle, whose entries mean
+    the sum with their mirror images. The rest as of `add_gram`.
     """
     label, models = np.zeros(chunk.inputs.shape[1], np.int64), (coefficients[None], dense_weights[None])
     _sums(_MOVED, table, breakpoints, chunk, runs, scale, label, models, (square[None], cross[None], dense_cross))

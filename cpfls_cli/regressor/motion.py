@@ -49,17 +49,9 @@ class Motion:
 class Carrier:
     """Factors with which one inertia function enters the torque.
 
-    With E the symmetric matrix that has ones in the function's places, a function f(q) there gives the torque
-    ``E qdd f + E qd (df/dt) - 1/2 (qd^T E qd) grad f``: the Christoffel form of equations (3) and (4).
-
-    Attributes
-    ----------
-    acceleration : array, shape (samples, 3)
-        E qdd.
-    rate : array, shape (samples, 3)
-        E qd.
-    energy : array, shape (samples,)
-        qd^T E qd / 2.
+    With E the symmetric matrix that has ones in the function's places, a function f(q) there gives the torque ``E qdd f
+    + E qd (df/dt) - 1/2 (qd^T E qd) grad f``: the Christoffel form of equations (3) and (4). `acceleration` is E qdd,
+    `rate` E qd, `energy` qd^T E qd / 2.
     """
 
     acceleration: Array
@@ -70,8 +62,6 @@ class Carrier:
 def carrier(function: InertiaFunction, motion: Motion) -> Carrier:
     """Evaluate the factors of an inertia function along a motion.
 
-    References
-    ----------
     method.md section 2: ``tau = J qdd + (dJ/dt) qd - 1/2 grad_q (qd^T J qd)``.
     """
     places = np.zeros((3, 3))

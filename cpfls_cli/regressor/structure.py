@@ -85,17 +85,7 @@ class StructureSettings(Settings):
 
 @dataclass(frozen=True)
 class Partition:
-    """One fuzzy partition of a model.
-
-    Attributes
-    ----------
-    function : str
-        Inertia function that it serves.
-    input : int
-        0 roll, 1 pitch.
-    functions : int
-        Number of membership functions.
-    """
+    """One fuzzy partition of a model, of an inertia function over an input: 0 roll, 1 pitch."""
 
     function: str
     input: int

@@ -103,7 +103,7 @@ class Sources:
     settings: ReportSettings
 
     trajectories, flights, selections = _OfFormat("trajectory"), _OfFormat("flight"), _OfFormat("selection")
-    models, sweeps = _OfFormat("identified"), _OfFormat("sweep")
+    models = _OfFormat("identified")
     replays, responses, twins = _OfFormat("replay"), _OfFormat("response"), _OfFormat("twin")
     gains, vehicles, extensions = _OfFormat("gains"), _OfFormat("vehicle"), _OfFormat("extended")
     disagreements, diagnoses = _OfFormat("disagreement"), _OfFormat("diagnosis")
@@ -111,7 +111,7 @@ class Sources:
 
     @property
     def gap(self) -> list[Source]:
-        """Everything that the gap workflow wrote, answers before their grounds."""
+        """Everything that the gap workflow wrote, answers before their evidence."""
         return [*self.diagnoses, *self.extensions, *self.disagreements]
 
     @property

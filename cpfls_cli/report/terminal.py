@@ -114,16 +114,9 @@ def _widest(lines: Iterable[str]) -> int:
 
 
 def _drawn(table: Table, colour: bool, *, unbroken: bool = False, words: bool = True, excess: int = 0) -> RichTable:
-    """Lay out a table.
+    """Lay out a table, too wide by `excess` columns, which its sentences give.
 
-    Parameters
-    ----------
-    unbroken : bool
-        Whether all but sentences stand on one line; numbers always do.
-    words : bool
-        Whether words stay whole.
-    excess : int
-        Columns by which it is too wide, which its sentences give.
+    `unbroken`: all but sentences stand on one line, as numbers always do; `words`: words stay whole.
     """
     drawn = _grid(colour, header=any(table.header))
     cells = [[STRUCK.sub(r"\1", visible(cell.text)) for cell in row] for row in table.cells]

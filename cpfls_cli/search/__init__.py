@@ -1,1 +1,1 @@
-"""Searches that leave checkpoints and go on from them, one or a sweep of them."""
+"""Searches that leave checkpoints and go on from them."""

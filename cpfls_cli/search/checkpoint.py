@@ -1,4 +1,4 @@
-"""What a stopped search or sweep leaves beside its output, and whether a command may go on from it."""
+"""What a stopped search leaves beside its output, and whether a command may go on from it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,6 @@ from cpfls_cli.store import Origin, format_name, read, write
 
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.vehicle_model import Vehicle
-    from cpfls_cli.identification.replicates import Sweep
 
 T = TypeVar("T")
 Genes = np.ndarray[Any, np.dtype[np.uint16]]
@@ -74,7 +73,7 @@ class SearchState:
     """An unfinished search: everything that its next generation depends on."""
 
     FORMAT: ClassVar = "cpfls/checkpoint"
-    MADE_BY: ClassVar = "identify or sweep"
+    MADE_BY: ClassVar = "identify"
 
     generation: int = about("generations bred; 0: initial population, -1: not even that")
     generator: str = about("state of the random generator, one for all subpopulations, as JSON; null at -1")
@@ -134,12 +133,8 @@ def _nothing(genes: IntArray, objectives: Array) -> Evaluated:
 class StoppedSearch:
     """What a stopped search leaves behind.
 
-    Attributes
-    ----------
-    state : EvolutionState or None
-        After its last generation; None if not even the initial population was evaluated.
-    unfinished : Unfinished
-        What was evaluated of the generation after it.
+    `state`: after its last generation, None if not even the initial population was evaluated; `unfinished`: what was
+    evaluated of the generation after it.
     """
 
     state: EvolutionState | None
@@ -161,19 +156,13 @@ def _same_origin(one: Origin, other: Origin) -> bool:
 
 @dataclass(frozen=True)
 class KeptFile:
-    """A file beside the output from which a stopped command can go on.
-
-    Attributes
-    ----------
-    header : Origin
-        Of the command that is run now: its config, seed and inputs.
-    """
+    """A file beside the output from which a stopped command can go on; the origin is of the command that is run now."""
 
     path: Path
     header: Origin
     WORK: ClassVar[str]
     SUFFIX: ClassVar[str]
-    OUTPUT: ClassVar[type[IdentifiedModel | Sweep | Vehicle]]
+    OUTPUT: ClassVar[type[IdentifiedModel | Vehicle]]
 
     @classmethod
     def beside(cls, output: Path, header: Origin) -> Self:

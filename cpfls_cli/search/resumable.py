@@ -98,13 +98,7 @@ class Watch:
 
 @dataclass(frozen=True)
 class Resumable:
-    """One search and its checkpoint.
-
-    Attributes
-    ----------
-    stopped : StoppedSearch or None
-        Where to go on, or None to start.
-    """
+    """One search, its checkpoint, and where to go on; None to start."""
 
     checkpoint: Checkpoint
     stopped: StoppedSearch | None

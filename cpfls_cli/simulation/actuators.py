@@ -31,27 +31,14 @@ _LOWEST_VOLTAGE = 0.05
 class Mixer:
     """Allocate a wrench; where a rotor cannot follow, yaw gives way first, and the rest is clipped.
 
-    Attributes
-    ----------
-    inverse : array, shape (4, rotor)
-        Squared speeds for one unit of thrust and of each torque.
-    limit : float, rad^2/s^2
-        Largest squared speed.
+    `inverse`: squared speeds for one unit of thrust and of each torque; `limit`: largest squared speed, rad^2/s^2.
     """
 
     inverse: Array
     limit: float
 
     def mixed(self, wrench: Vector, functions: Functions = SYMBOLS) -> tuple[Value, Value]:
-        """Find rotor speeds for a wrench, thrust in N and torque in N m.
-
-        Returns
-        -------
-        speed : value by rotor, rad/s
-            What is possible.
-        demand : value by rotor, rad^2/s^2
-            Squared speeds that the wrench asks for, whether possible or not.
-        """
+        """Find speeds that are possible for thrust and torque (N, N m), rad/s, and squared speeds that they ask for."""
         by_rotor = transposed(self.inverse.tolist())
         upright = functions.rotors(dot(wrench[:3], own[:3]) for own in by_rotor)
         yaw = functions.rotors(times(wrench[3], own[3]) for own in by_rotor)
@@ -70,10 +57,7 @@ class Mixer:
 def mixer(vehicle: VehicleSettings) -> Mixer:
     """Invert the allocation of a vehicle.
 
-    Raises
-    ------
-    ComputationError
-        If the rotors cannot produce thrust, roll, pitch and yaw independently.
+    `ComputationError` where the rotors cannot produce thrust, roll, pitch and yaw independently.
     """
     units = np.eye(4)
     inverse = rotor_demand(vehicle, units[:, 0], units[:, 1:]).squared_speed
@@ -84,16 +68,8 @@ def mixer(vehicle: VehicleSettings) -> Mixer:
 class Battery:
     """Voltage as a share of the full battery, ``V = 1 - use t / T - load (P / P_hover - 1)`` with P ~ sum w_i^3.
 
-    Attributes
-    ----------
-    use : float
-        Share lost by the end of the flight.
-    load : float
-        Share lost under twice the hover power.
-    duration : float, s
-        T.
-    hover_cubed : float, rad^3/s^3
-        Sum of the cubed rotor speeds in hover.
+    `use`: share lost by the end of the flight, at T = `duration` s; `load`: share lost under twice the hover power;
+    `hover_cubed`: sum of the cubed rotor speeds in hover, rad^3/s^3.
     """
 
     use: float
@@ -109,20 +85,11 @@ class Battery:
 
 
 class Rotors(NamedTuple):
-    """Rotors in the middle of a step, each a value by rotor but for the voltage.
+    """Rotors in the middle of a step, each a value by rotor but for the voltage, a share of the full battery.
 
-    Attributes
-    ----------
-    lagged : rad/s
-        The command after the lag.
-    measured : rad/s
-        Speed that is logged: at the end of the chain.
-    speed, acceleration : rad/s and rad/s^2
-        What acts: the same, or later where the model of a whole vehicle says so.
-    slow : rad^2/s^2
-        Squared speed that slow actuation has come to; 0 without any.
-    voltage : value
-        Share of the full battery.
+    `lagged`: command after the lag, rad/s; `measured`: speed that is logged, at the end of the chain; `speed`,
+    `acceleration`: what acts, the same or later where the model of a whole vehicle says so; `slow`: squared speed that
+    slow actuation has come to, rad^2/s^2, 0 without any.
     """
 
     lagged: Value
@@ -137,16 +104,9 @@ class Rotors(NamedTuple):
 class Actuators:
     """First-order lag, then the links of effects, then what the battery leaves, then the response of a whole vehicle.
 
-    Attributes
-    ----------
-    lag : float, s
-        Time constant behind the command.
-    acting : tuple of (Actuation, mapping of str to float)
-        What effects do between command and rotors, with their values.
-    response : RotorResponse
-        Of the model of a whole vehicle, behind the speed that is logged.
-    start : array, shape (rotor,), rad/s
-        At which the rotors have long turned before the first step.
+    `lag`: time constant behind the command, s; `acting`: what effects do between command and rotors, with their values;
+    `response`: behind the speed that is logged; `start`: speeds at which the rotors have long turned before the first
+    step, rad/s.
     """
 
     lag: float
@@ -192,16 +152,7 @@ def actuators(
     speed: Array,
     duration: float,
 ) -> Actuators:
-    """Build the actuator chain of a vehicle with its effects.
-
-    Parameters
-    ----------
-    response : RotorResponse
-        Behind the speeds that are logged.
-    speed : array, shape (rotor,), rad/s
-        At the start.
-    duration : float, s
-    """
+    """Build the actuator chain of a vehicle with its effects, from rotor speeds at the start on."""
     acting = [(one.effect.actuation, one.values) for one in effects.ordered if one.effect.actuation is not None]
     lags = [each.lag(values) for each, values in acting if each.lag is not None]
     hover = len(vehicle.rotors) * hover_speed(vehicle) ** 3

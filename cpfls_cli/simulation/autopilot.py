@@ -54,17 +54,7 @@ class Planned(NamedTuple):
 
 
 def plan_of(planned: Mapping[str, Array], time: Array, at: Array) -> list[Flat]:
-    """Interpolate a planned motion by cubic splines, as `Planned` arranges it.
-
-    Parameters
-    ----------
-    planned : mapping of str to array
-        `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
-        (time, 3) each.
-    time : array, shape (time,), s
-    at : array, shape (step,), s
-        Times asked for.
-    """
+    """Interpolate a planned motion (as `fly` takes it) by cubic splines, as `Planned` arranges it."""
     from scipy.interpolate import CubicSpline
 
     names = ("position", "velocity", "acceleration", "attitude", "attitude_rate", "attitude_acceleration")
@@ -77,8 +67,6 @@ def plan_of(planned: Mapping[str, Array], time: Array, at: Array) -> list[Flat]:
 class Autopilot:
     """Thrust and torque that a planned motion asks for.
 
-    References
-    ----------
     Lee, Leok and McClamroch 2010, Geometric tracking control of a quadrotor UAV on SE(3).
     """
 
@@ -135,13 +123,7 @@ class Autopilot:
 
 
 def upright(pull: Vector, yaw: Value, functions: Functions = SYMBOLS) -> tuple[Vector, ...]:
-    """Orient a body whose z axis points along the pull, with a given yaw, rad.
-
-    Returns
-    -------
-    tuple of vector
-        Its x, y and z axes, world frame.
-    """
+    """Orient a body whose z axis points along the pull, with a given yaw, rad: its axes in the world frame."""
     up = scaled(1 / functions.sqrt(dot(pull, pull)), pull)
     # By the definition of yaw the x axis lies in the vertical plane of the heading, however the body rolls.
     forward = cross((minus(0, functions.sin(yaw)), functions.cos(yaw), 0), up)
@@ -153,10 +135,7 @@ def upright(pull: Vector, yaw: Value, functions: Functions = SYMBOLS) -> tuple[V
 class PlanPilot:
     """The autopilot that knows the vehicle, with its mixer; it answers at once, in the middle of each step.
 
-    Attributes
-    ----------
-    plan : list of tuple of float
-        At the start, then in the middle of each step.
+    The plan is at the start, then in the middle of each step.
     """
 
     autopilot: Autopilot
@@ -186,18 +165,8 @@ def asked(
 ) -> dict[str, Array]:
     """Give what the autopilot asked for along a flight: of its position loop the plan, of its attitude loop the target.
 
-    Parameters
-    ----------
-    time, planned
-        As `fly` takes them.
-    state : array, shape (time, state)
-        Of the flight, at the samples of the plan.
-
-    Returns
-    -------
-    dict of str to array, shape (time, 3), m, m/s, rad
-        ``position`` and ``velocity`` in the world frame; ``attitude`` as roll, pitch, yaw, within half a turn of those
-        that are flown; of an autopilot's own law ``thrust`` too, shape (time,), N.
+    By name, at the samples of the plan: position and velocity in the world frame, m and m/s; attitude as roll, pitch,
+    yaw, rad, within half a turn of those that are flown; of an autopilot's own law thrust too, N.
     """
     autopilot = Autopilot(vehicle, settings)
     plan = [Planned.of(row) for row in plan_of(planned, time, time)]

@@ -53,15 +53,9 @@ _REMEDY = "fly more gently, make the effects smaller, or change the frequencies 
 
 @dataclass(frozen=True)
 class Clock:
-    """Steps of the integration between the samples of the plan.
+    """Steps of the integration between the samples of the plan, so many for each.
 
-    Attributes
-    ----------
-    parts : int
-        Steps from sample to sample.
-    step : float, s
-    instants : array, shape (1 + step,), s
-        The start, then the middle of each step.
+    `instants`: the start, then the middle of each step, s.
     """
 
     parts: int
@@ -80,13 +74,7 @@ def clock_of(time: Array, settings: ClosedLoopSettings) -> Clock:
 
 
 def between(middles: Array) -> Array:
-    """Interpolate values from the middles of steps to their ends linearly.
-
-    Parameters
-    ----------
-    middles : array, shape (step, ...)
-        Those of the ends have the shape (1 + step, ...).
-    """
+    """Interpolate values from the middles of steps to their ends, one more, linearly."""
     if len(middles) < 2:
         return np.concatenate([middles, middles])
     ends = 2 * middles[0] - middles[1], 2 * middles[-1] - middles[-2]
@@ -128,17 +116,8 @@ class Loop:
 
     The middle of a step is reached with the derivative of the step before, so that the rule is of second order. All of
     a step is traced into plain Python, but for the law of another autopilot and for an inertia that depends on the
-    attitude, which are evaluated apart and given to it.
-
-    Attributes
-    ----------
-    model : VehicleModel or None
-    state, change : array, shape (state,)
-        At the start, and its derivative.
-    push : array, shape (step, 6), N m and N, body frame, or None
-        Of gusts, in the middle of each step.
-    lacking : DrawnLack or None
-        What the model lacks, drawn for the steps.
+    attitude, which are evaluated apart and given to it. `state`, `change`: at the start, and its derivative; `push`: of
+    gusts, in the middle of each step, N m and N, body frame; `lacking`: what the model lacks, drawn for the steps.
     """
 
     pilot: Pilot
@@ -210,16 +189,8 @@ def _evenly(instant: Instant) -> Instant:
 class SimulatedMotion:
     """The simulated motion at the samples of the plan.
 
-    Attributes
-    ----------
-    state, change : array, shape (time, state)
-        State of the plant and its derivative.
-    command, lagged, speed : array, shape (time, rotor), rad/s
-        Command, command after the lag, and rotor speed.
-    voltage : array, shape (time,)
-        Share of the full battery.
-    demand : array, shape (time, rotor), rad^2/s^2
-        Squared speeds that the autopilot asked for, not clipped.
+    State of the plant and its derivative; command, command after the lag, and rotor speed, rad/s; voltage as a share of
+    the full battery; `demand`: squared speeds that the autopilot asked for, not clipped, rad^2/s^2.
     """
 
     state: Array
@@ -242,30 +213,13 @@ def fly(
     push: Array | None = None,
     noise: GyroscopeNoise | None = None,
 ) -> SimulatedMotion:
-    """Integrate a closed-loop flight along a planned motion.
+    """Integrate a closed-loop flight along a planned motion, sampled uniformly.
 
-    Parameters
-    ----------
-    time : array, shape (time,), s
-        Uniform.
-    planned : mapping of str to array
-        `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
-        (time, 3) each.
-    model : VehicleModel or None
-        In place of the vehicle, as far as its table of weights gives it.
-    effects : SimulatedEffects
-        That the autopilot does not know.
-    progress : callable
-        Takes steps done and steps in all.
-    push : array, shape (step, 6), N m and N, body frame, or None
-        Torque and force of gusts in the middle of each step of `clock_of`.
-    noise : GyroscopeNoise or None
-        In the loop of an autopilot of `settings.autopilot` that is not `cpfls`.
-
-    Raises
-    ------
-    ComputationError
-        If the plan is not sampled uniformly, or the vehicle leaves the path or overturns.
+    `planned`: `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
+    (time, 3) each; `model`: in place of the vehicle, as far as its table of weights gives it; `effects`: that the
+    autopilot does not know; `progress`: called with steps done and steps in all; `push`: torque and force of gusts in
+    the middle of each step of `clock_of`, N m and N, body frame; `noise`: in the loop of an autopilot of
+    `settings.autopilot` that is not `cpfls`. `ComputationError` where the vehicle leaves the path or overturns.
     """
     clock = clock_of(time, settings)
     autopilot, mix = Autopilot(vehicle, settings), mixer(vehicle)
@@ -293,14 +247,8 @@ def fly(
 class Setpoints:
     """What an autopilot's own law is asked for, time first; a setpoint stays until the next.
 
-    Attributes
-    ----------
-    attitude : array, shape (time, 3), rad, or None
-        Roll, pitch, yaw; None where rates alone are asked for.
-    body_rate : array, shape (time, 3), rad/s, body frame, or None
-        Asked beside what the attitude asks for; None for none.
-    thrust : array, shape (time,)
-        Share of the full thrust, in the units of the law.
+    `attitude`: roll, pitch, yaw, rad, None where rates alone are asked for; `body_rate`: beside what that asks for,
+    rad/s; `thrust`: share of the full thrust, in the units of the law.
     """
 
     attitude: Array | None
@@ -324,25 +272,10 @@ def fly_setpoints(
 ) -> SimulatedMotion:
     """Integrate the law of `settings.autopilot` and a vehicle along setpoints of attitude or rate and thrust.
 
-    Parameters
-    ----------
-    time : array, shape (time,), s
-        Uniform.
-    start : array, shape (12,)
-        Position and velocity in the world, roll, pitch, yaw, body rate: m, m/s, rad, rad/s.
-    model, effects, push, noise
-        As `fly` takes them.
-    speed : array, shape (rotor,), rad/s, or None
-        Of the rotors at the start; None for what the first thrust asks of them.
-    injected : array, shape (step, 3), or None
-        Added to the commands about the body axes at each step of `clock_of`, shares of the full ones.
-    lacking : DrawnLack or None
-        What the model lacks, drawn for the steps of `clock_of`.
-
-    Raises
-    ------
-    ComputationError
-        If time is not sampled uniformly, or the vehicle overturns.
+    `start`: position and velocity in the world, roll, pitch, yaw, body rate, m, m/s, rad, rad/s; `speed`: of the rotors
+    at the start, None for what the first thrust asks of them; `injected`: added to the commands about the body axes at
+    each step of `clock_of`, shares of the full ones; the rest as `fly` takes it. `ComputationError` where time is not
+    sampled uniformly, or the vehicle overturns.
     """
     law = settings.law
     if law is None:
@@ -409,13 +342,7 @@ def _loop(
 
 
 class LostVehicleError(ComputationError):
-    """A vehicle that no autopilot holds any more.
-
-    Attributes
-    ----------
-    sample : int
-        At which it was seen.
-    """
+    """A vehicle that no autopilot holds any more, seen at a sample."""
 
     def __init__(self, message: str, sample: int) -> None:
         super().__init__(message)

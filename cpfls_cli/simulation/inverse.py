@@ -162,25 +162,12 @@ def single_axis_torque(vehicle: VehicleSettings) -> Array:
 
 
 def collective_thrust(vehicle: VehicleSettings, body_torque: Array, acceleration: Array | None) -> Array:
-    """Compute the total thrust along body z.
+    """Compute the total thrust along body z, N, from body torque and acceleration in the world, None where it is held.
 
-    In flight it is ``m |a + g e3|``. A vehicle that is held at its centre of mass has it free: it is then the
-    smallest at which the torque asks no rotor to turn backwards, as every rotor of a lone thrust turns forwards.
-
-    Parameters
-    ----------
-    body_torque : array, shape (time, 3), N m, body frame
-    acceleration : array, shape (time, 3), m/s^2, world frame, or None
-        None where the vehicle is held.
-
-    Returns
-    -------
-    array, shape (time,), N
-
-    Raises
-    ------
-    ComputationError
-        If the rotors cannot produce thrust, roll, pitch and yaw independently, or a torque is not finite.
+    In flight it is ``m |a + g e3|``. A vehicle that is held at its centre of mass has it free: it is then the smallest
+    at which the torque asks no rotor to turn backwards, as every rotor of a lone thrust turns forwards.
+    `ComputationError` where the rotors cannot produce thrust, roll, pitch and yaw independently, or a torque is not
+    finite.
     """
     if acceleration is not None:
         specific_force = acceleration + np.array([0.0, 0.0, vehicle.gravity_m_s2])

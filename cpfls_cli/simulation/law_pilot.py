@@ -22,13 +22,7 @@ from cpfls_cli.vehicle.values import Each, Value, Vector
 
 @dataclass(frozen=True)
 class GyroscopeNoise:
-    """White noise of the gyroscope, which the law answers.
-
-    Attributes
-    ----------
-    std : float, rad/s
-        At each step of the law.
-    """
+    """White noise of the gyroscope, which the law answers, by its standard deviation at each step of the law, rad/s."""
 
     std: float
     rng: np.random.Generator
@@ -37,14 +31,8 @@ class GyroscopeNoise:
 class Asked(NamedTuple):
     """What a law is asked for.
 
-    Attributes
-    ----------
-    attitude : nine floats, or None
-        Body to world, row by row; None where rates are asked for.
-    body_rate : three floats, rad/s, body frame
-        Added to what the attitude asks for.
-    thrust : float
-        Share of the full thrust, in the units of the law.
+    `attitude`: body to world, row by row, None where rates are asked for; `body_rate`: added to what the attitude asks
+    for, rad/s, body frame; `thrust`: share of the full thrust, in the units of the law.
     """
 
     attitude: Flat | None
@@ -54,18 +42,11 @@ class Asked(NamedTuple):
 
 @dataclass
 class LawPilot:
-    """A control law between what is asked and the rotors.
+    """A control law between what is asked and the rotors, one step of it for every so many of the integration.
 
-    Attributes
-    ----------
-    asked : callable
-        From steps of the integration done so far and the state to what is asked.
-    every : int
-        Steps of the integration for one of the law.
-    held : tuple of float
-        Commanded speeds in rad/s, then demanded squared speeds in rad^2/s^2, until the next step of the law.
-    injected : array, shape (step, 3), or None
-        Added to the commands about the body axes, shares of the full ones, to measure the loop.
+    `asked`: from steps of the integration done so far and the state to what is asked; `held`: commanded speeds in
+    rad/s, then demanded squared speeds in rad^2/s^2, until the next step of the law; `injected`: added to the commands
+    about the body axes, shares of the full ones, to measure the loop.
     """
 
     controller: Controller
@@ -152,14 +133,9 @@ def law_pilot(
     noise: GyroscopeNoise | None = None,
     injected: Array | None = None,
 ) -> LawPilot:
-    """Set up a law in flight.
+    """Set up a law in flight, with rotors at a speed until the first command acts.
 
-    Parameters
-    ----------
-    step : float, s
-        Of the integration; the law takes the number of steps that is nearest to its period.
-    speed : array, shape (rotor,), rad/s
-        Of the rotors until the first command acts.
+    `step` is that of the integration, s; the law takes the number of steps that is nearest to its period.
     """
     every = max(round(law.period / step), 1)
     held = (*speed.tolist(), *(speed**2).tolist())

@@ -175,17 +175,7 @@ def _as_logged(
 
 
 def noise_std(name: str, values: Array, settings: SimulationSettings) -> Array:
-    """Combine the noise of each channel: absolute and relative noise are independent of each other.
-
-    Parameters
-    ----------
-    values : array, shape (time, ...)
-
-    Returns
-    -------
-    array, shape (...)
-        Standard deviation of each channel.
-    """
+    """Combine absolute and relative noise of each channel, independent of each other, to its standard deviation."""
     absolute = {str(key): value for key, value in settings.noise.items()}.get(name, 0.0)
     relative = {str(key): value for key, value in settings.relative_noise.items()}.get(name, 0.0)
     if relative == 0.0:

@@ -23,13 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SimulatedEffect:
-    """An effect with a value for each of its coefficients and shapes.
-
-    Attributes
-    ----------
-    values : mapping of str to float
-        Coefficients, then shapes, in the units of the catalogue.
-    """
+    """An effect with a value for each of its coefficients, then shapes, in the units of the catalogue."""
 
     effect: Effect
     values: Mapping[str, float]

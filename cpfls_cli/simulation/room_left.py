@@ -55,12 +55,7 @@ def hover_squared(vehicle: VehicleSettings) -> Array:
 class RotorLoad:
     """Largest shares that a motion takes of what rotors may do beside control, which is `ROTOR_SHARE` of all.
 
-    Attributes
-    ----------
-    fast : float
-        Of the square of the largest speed.
-    slow : float
-        Of the way down from the squared speed of hovering to rest.
+    `fast`: of the square of the largest speed; `slow`: of the way down from the squared speed of hovering to rest.
     """
 
     fast: float

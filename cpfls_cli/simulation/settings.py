@@ -79,13 +79,7 @@ class ClosedLoopSettings(Settings):
     deviation_max_m: Annotated[float, Gt(0), Doc("distance from the path at which the flight is given up, m")] = 50.0
 
     def __post_init__(self) -> None:
-        """Refuse parameters that the autopilot has not.
-
-        Raises
-        ------
-        SettingError
-            If there is no such parameter, or no autopilot to have it.
-        """
+        """Refuse parameters that the autopilot has not, or parameters without an autopilot."""
         if self.autopilot == "cpfls" and self.autopilot_parameters:
             raise SettingError("autopilot_parameters", "are those of px4 and others; name one as closed_loop.autopilot")
         try:
@@ -124,13 +118,9 @@ class SimulationSettings(Settings):
     closed_loop: Annotated[ClosedLoopSettings, Doc("for mode closed-loop")] = ClosedLoopSettings()
 
     def __post_init__(self) -> None:
-        """Refuse what a mode cannot do.
+        """Refuse what a mode cannot do: effects, gusts, or noise of sensors that it lacks.
 
-        Raises
-        ------
-        SettingError
-            If effects, gusts, or noise of sensors that it lacks, are asked of a mode, or noise both of body and of
-            generalised torque, of which one follows from the other.
+        Nor does it take noise both of body and of generalised torque, of which one follows from the other.
         """
         for key in ("noise", "relative_noise"):
             self._check_noise(key, {str(name) for name in getattr(self, key)})

@@ -278,18 +278,13 @@ def compared(
     simulated: Array,
     instrument: Callable[[Array], Array | None],
 ) -> dict[str, TwinChannel]:
-    """Compare a simulated vehicle with a flight by channel, in time and by frequency.
+    """Compare a simulated vehicle with a flight by channel, shape (time, channel), in time and by frequency.
 
-    By frequency both answer the same setpoints, through the same windows and instruments: what differs beyond the
-    random error is the simulator's error, whatever gusts there were. A difference in time is also that of gusts and
-    noise: from what the responses differ by, and from the spectrum of the setpoints, follows how much of it the
-    setpoints bring about; the rest is its floor.
-
-    Parameters
-    ----------
-    measured, simulated : array, shape (time, channel)
-    instrument : callable
-        From a setpoint, shape (time,), to what moves the vehicle from outside, as `Stretch` takes it, or None.
+    By frequency both answer the same setpoints, through the same windows and instruments (`instrument` takes a setpoint
+    to what moves the vehicle from outside, as `Stretch` takes it): what differs beyond the random error is the
+    simulator's error, whatever gusts there were. A difference in time is also that of gusts and noise: from what the
+    responses differ by, and from the spectrum of the setpoints, follows how much of it the setpoints bring about; the
+    rest is its floor.
     """
     cut = windows(flight)
 

@@ -79,7 +79,7 @@ def read_ardupilot(file: Path) -> SimulatorModel:
     body = of_one_body(
         mass,
         [*(each for each in moments if each is not None), none, none, none],
-        "motorN_position is from the centre of mass: move all motors by as much the other way",
+        "the motors are where its frame has them: write motorN_position of each, the other way by as much",
     )
     rotors = _rotors(numbers, round(motors.value), mass.value, size.value, notes)
     return SimulatorModel(file.stem, "ardupilot", (body,), rotors, CANNOT, tuple(notes), (file,), of_commands=True)
@@ -109,7 +109,8 @@ def _rotors(numbers: Numbers, count: int, mass: float, size: float, notes: list[
         )
     lift, command = mass * _GRAVITY / count, _hover_command(hover.value, expo.value)
     share = low.value + command * (high.value - low.value)
-    hubs = np.array([_hub(numbers, motor, size, given=all(places)) for motor in range(1, count + 1)])
+    stated = [_place(numbers, motor) if all(places) else () for motor in range(1, count + 1)]
+    hubs = np.array([_hub(motor, size, place) for motor, place in enumerate(stated, 1)])
     room = _THRUST_NUMBER * _AIR * room_between(hubs) ** 4 / (4 * pi**2)
     words = "Commands of 0 to 1 count as speeds of 0 to this, as propellers of this size turn; any number will do"
     speed = numbers.get("rotor_speed_max_rad_s") or Stated(float(f"{sqrt(lift / room) / share:.2g}"), words)
@@ -135,8 +136,9 @@ def _rotors(numbers: Numbers, count: int, mass: float, size: float, notes: list[
             speed_max=speed,
             most=most,
             turn=yaw,
+            place=place,
         )
-        for motor, (hub, yaw) in enumerate(zip(hubs, yaws, strict=True), 1)
+        for motor, (hub, yaw, place) in enumerate(zip(hubs, yaws, stated, strict=True), 1)
     )
 
 
@@ -149,11 +151,16 @@ def _yaw(numbers: Numbers, motor: int, count: int) -> Stated:
     return Stated(turn, f"{numbers.file.name}: no motor{motor}_yaw, for which the frame has its own")
 
 
-def _hub(numbers: Numbers, motor: int, size: float, *, given: bool) -> list[float]:
-    """Give the place of a motor, x forward, y left, z up."""
-    if given:
-        x, y, z = (each.value for each in numbers.row(f"motor{motor}_position", count=3))
-        return [x, -y, -z]
+def _place(numbers: Numbers, motor: int) -> tuple[Stated, ...]:
+    """Give the stated place of a motor, x forward, y left, z up."""
+    place = numbers.row(f"motor{motor}_position", count=3)
+    return tuple(replace(own, value=sign * own.value, scale=sign) for own, sign in zip(place, (1, -1, -1), strict=True))
+
+
+def _hub(motor: int, size: float, place: tuple[Stated, ...]) -> list[float]:
+    """Give the place of a motor, that of its frame where none is stated."""
+    if place:
+        return [own.value for own in place]
     x, y, _ = AUTOPILOTS["ardupilot"].cross[motor - 1]
     return [x * size * sqrt(0.5), y * size * sqrt(0.5), 0.0]
 

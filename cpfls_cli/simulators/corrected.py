@@ -9,7 +9,8 @@ Of the effects that `gap` names, those whose formula is the simulator's become n
 - ``rotor_mismatch``: thrust of single rotors, by the pattern that was found, and their yaw torque with it; what
   clockwise rotors drag more than they lift is their ratio of torque to thrust. ``drag_factor_error``: that of all.
   Where the file has one number for rotors that differ, only what is common to all is put into it.
-- ``com_offset``: the centre of the heaviest link moves so that that of the vehicle does.
+- ``com_offset``: the centre of the heaviest link moves so that that of the vehicle does; where places of rotors are
+  from the centre of mass they all move the other way.
 - ``products_of_inertia``, ``rotor_drag``, ``motor_lag``: as they are. ``rolling_moment`` is positive for rotors that
   turn counter-clockwise and negative for others, since the plugin's formula has no sign of the turn.
 
@@ -98,7 +99,7 @@ _NOT_STATED = {
     "sdf": "it has no place in the motor plugin",
     "urdf": "the file states none; write kf and km into <properties>, as gym-pybullet-drones reads them, or scale the "
     "forces and torques that you apply",
-    "mjcf": "controls are thrusts and torques; scale what makes controls of speeds, or gear or gainprm of its actuator",
+    "mjcf": "controls are newtons, so no number of the file is wrong: put the factor on what makes controls of speeds",
     "ardupilot": "the motors are those of the frame; write motorN_position and motorN_yaw of each",
     "crazyflie": "the header has thrust by the volts of a motor, and that by speed is the model's; logs with motor.m1 "
     "to m4 and pm.vbat, without speeds, show it",
@@ -202,7 +203,7 @@ class _Corrections:
         """Put a number in the place of the stated one, where that is outside the interval."""
         new, low, high = (stated.written(each) for each in found)
         low, high, name = min(low, high), max(low, high), stated.name or name
-        before, text = stated.written(stated.value), f"{new:.4g}"
+        before, text = stated.written(stated.value), f"{new:z.4g}"
         if stated.power < 0 and stated.value:
             # What the number is the reciprocal of is the other way round.
             words = words.replace("{share}", _share(found.value / stated.value))
@@ -530,10 +531,10 @@ def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found)
     for index, axis in enumerate("xyz"):
         if f"inertia_{axis}" in numbers:
             factor = _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
-            if axis == "z" and not made.of.model.states_inertia and made.of.states_ratio:
-                # Of the two whose ratio shows, the file has this one.
+            if axis == "z" and made.of.states_ratio and all(rotor.thrust is None for rotor in made.rotors):
+                # Of the two whose ratio shows, this one is a guess in most files that know no speeds.
                 other = _Found(*(1.0 / each for each in (factor.value, factor.high, factor.low)))
-                words = "yaw torque over thrust of {whom} is {share}, by its ratio to the inertia about z of the model"
+                words = "yaw torque over thrust of {whom} is {share}, by its ratio to the inertia about z"
                 _as_found(made, "ratio", [other] * len(made.rotors), words, other)
                 continue
             _inertia(made, {index: factor.times(made.vehicle.inertia_kg_m2[index])})
@@ -577,6 +578,8 @@ def _products(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
 
 def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     model, body = made.of.model, made.of.model.heaviest
+    if made.rotors and all(rotor.place for rotor in made.rotors):
+        return _around_centre(made, numbers)
     share, whom = model.mass_kg / body.mass.value, body.name or "the vehicle"
     place, moved = [each.value for each in body.place] or [0.0] * 3, False
     for axis, name in enumerate("xyz"):
@@ -584,7 +587,7 @@ def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
         if own is None:
             continue
         found = _Found.of(own).times(share).plus(place[axis])
-        words = f"centre of mass of the vehicle is {1e3 * abs(own.value):.3g} mm {_WAYS[axis][int(own.value < 0)]}"
+        words = _moved(own.value, axis)
         if not _straight(body.link):
             if found.contradicts(place[axis], made.wider):
                 made.elsewhere.append(f"{words}: {body.inertia_at} states it in other axes; change it there")
@@ -598,6 +601,28 @@ def _centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     if moved and body.node is not None:
         empty, text = body.node.first("pose"), f"{' '.join(f'{each:.4g}' for each in place)} 0 0 0"
         made.put(empty or body.node, text if empty else f"<pose>{text}</pose>")
+    return True
+
+
+def _moved(offset: float, axis: int) -> str:
+    return f"centre of mass of the vehicle is {1e3 * abs(offset):.3g} mm {_WAYS[axis][int(offset < 0)]}"
+
+
+def _around_centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
+    """Move all rotors the other way, whose places are from the centre of mass."""
+    for axis, name in enumerate("xyz"):
+        own = numbers.get(f"c_{name}")
+        if own is None:
+            continue
+        moved, words = _Found.of(own).times(-1.0), f"{_moved(own.value, axis)}, and {{whom}} from there"
+        if all(axis < len(rotor.place) for rotor in made.rotors):
+            # All of them or none: an expression for several numbers has no place for one.
+            whole = all(each.span is not None for rotor in made.rotors for each in rotor.place)
+            for index, rotor in enumerate(made.rotors):
+                place = rotor.place[axis] if whole else replace(rotor.place[axis], span=None)
+                made.replace(place.name, place, moved.plus(place.value), words, f"M{index + 1}", None)
+        elif moved.contradicts(0.0, made.wider):
+            made.elsewhere.append(f"{_moved(own.value, axis)}: the format has no number for it")
     return True
 
 

@@ -91,6 +91,10 @@ def _rotors(numbers: Numbers, name: str, weight: float) -> tuple[tuple[Rotor, ..
             lag_down=_lag(dynamics[2:], hover),
             drag=drag,
             turn=mixing[2][index],
+            place=tuple(
+                replace(own, value=sign * length * own.value, scale=sign / length)
+                for own, sign in ((mixing[1][index], -1.0), (mixing[0][index], 1.0))
+            ),
         )
         for index in range(count)
     )

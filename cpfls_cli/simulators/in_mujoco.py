@@ -86,11 +86,15 @@ def fly_mujoco(model: Any, course: Course, controls: Controls, *, lags: bool) ->
 
 
 class _Body(NamedTuple):
-    """Where the body with the free joint is in the arrays of MuJoCo, and its centre of mass in its frame, m."""
+    """Where the body with the free joint is in the arrays of MuJoCo, and its centre of mass in its frame, m.
+
+    A rate times `lever` is the velocity of the centre by turning, as the cross product is.
+    """
 
     place: slice
     move: slice
     centre: Array
+    lever: Array
 
     @classmethod
     def of(cls, model: Any) -> _Body:
@@ -101,14 +105,14 @@ class _Body(NamedTuple):
         (joint,) = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
         body, place, move = (int(own[joint]) for own in (model.jnt_bodyid, model.jnt_qposadr, model.jnt_dofadr))
         centre = data.xmat[body].reshape(3, 3).T @ (data.subtree_com[body] - data.xpos[body])
-        return cls(slice(place, place + 7), slice(move, move + 6), centre)
+        return cls(slice(place, place + 7), slice(move, move + 6), centre, np.cross(np.eye(3), centre))
 
     def put(self, data: Any, state: State) -> None:
         """Start from a state of the centre of mass."""
         import mujoco
 
         mujoco.mju_mat2Quat(quaternion := np.empty(4), state.rotation.ravel())
-        velocity = state.velocity - state.rotation @ np.cross(state.rate, self.centre)
+        velocity = state.velocity - state.rotation @ (state.rate @ self.lever)
         data.qpos[self.place] = *(state.position - state.rotation @ self.centre), *quaternion
         data.qvel[self.move] = *velocity, *state.rate
 
@@ -120,7 +124,7 @@ class _Body(NamedTuple):
         mujoco.mju_quat2Mat(turned := np.empty(9), place[3:])
         rotation = turned.reshape(3, 3)
         velocity, rate = moves[:3], moves[3:]
-        moved = velocity + rotation @ np.cross(rate, self.centre)
+        moved = velocity + rotation @ (rate @ self.lever)
         return State(place[:3] + rotation @ self.centre, moved, rotation, rate)
 
 

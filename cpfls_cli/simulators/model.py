@@ -82,6 +82,8 @@ class Rotor:
         Of thrust by the volts of a motor: a coefficient of it, with which the others go.
     turn : Stated or None
         Where its spin stands.
+    place : tuple of Stated
+        x, y, z of its hub, m, as far as they are stated from the centre of mass; empty where they are not.
     node : Node or None
         The element that holds its numbers, to put something into.
     """
@@ -102,6 +104,7 @@ class Rotor:
     drag: Stated | None = None
     rolling: Stated | None = None
     turn: Stated | None = None
+    place: tuple[Stated, ...] = ()
     node: Node | None = None
 
     @property

@@ -41,7 +41,7 @@ def read_rotorpy(file: Path) -> SimulatorModel:
     body = of_one_body(
         numbers.need(name, "mass"),
         [numbers.need(name, entry) for entry in _ENTRIES],
-        "rotor_pos is from the centre of mass: move all rotors by as much the other way",
+        "rotor_pos is from the centre of mass",
     )
     effects = {
         effect: {own: _or_zero(numbers, name, key) for own, key in known.rotorpy.items()}
@@ -84,6 +84,7 @@ def _rotors(numbers: Numbers, name: str) -> tuple[Rotor, ...]:
                 lag_down=lag,
                 drag=_or_zero(numbers, name, "k_d"),
                 turn=direction,
+                place=tuple(hub),
             )
         )
     return tuple(found)

@@ -22,21 +22,11 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.document import Stated
-from cpfls_cli.simulators.formats import as_stated
+from cpfls_cli.simulators.formats import FORMATS, as_stated
 from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 
-_PROGRAMS = {
-    "sdf": "Gazebo",
-    "urdf": "gym-pybullet-drones",
-    "mjcf": "MuJoCo",
-    "rotorpy": "RotorPy",
-    "ardupilot": "ArduPilot's SITL",
-    "crazyflow": "crazyflow",
-    "crazyflie": "the Crazyflie's firmware",
-    "vehicle": "cpfls",
-}
 _BESIDES = {
     "lag_up": ("time constant", "s"),
     "drag": ("drag of a rotor", "N s^2/(m rad)"),
@@ -99,7 +89,7 @@ class VehicleOf:
     @property
     def program(self) -> str:
         """Whose file it is."""
-        return _PROGRAMS[self.model.format]
+        return next((each.program for each in FORMATS if each.name == self.model.format), "cpfls")
 
     @property
     def centre(self) -> list[float]:
@@ -223,10 +213,13 @@ def of_log(
             notes.append("rotors are in the order of the log, whose motors are numbered another way than the file's")
         spins, turned = _spins(model, airframe, order)
         warnings += turned
-    if like is None or model.speed_max is not None:
+    if like is None:
         speed, where = _speed(model, proposal)
     else:
+        # What a log lets one guess is another number for each log, and no other vehicle.
         speed, where = like.rotor_speed_max_rad_s, "Of the model that gives what the file leaves open"
+        if (stated := model.speed_max) is not None:
+            where = f"Of the model that gives other numbers; the file states {stated.value:g} ({stated.where})"
     mass = model.mass_kg if mass_kg is None else mass_kg
     by_speed = not model.of_commands or proposal is None or proposal.share_of_speed
     given, short = mass_kg is not None, _short([mass])[0]

@@ -1,4 +1,4 @@
-"""What a search that was stopped leaves beside its output, as `identify` and `sweep` keep it."""
+"""What a search that was stopped leaves beside its output, as `identify` keeps it."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from cpfls_cli.stage import Run, stage
 
 @stage(SearchState, title="Unfinished search", study=True)
 def checkpoint(run: Run) -> SearchState:
-    """Leave it: those commands do."""
+    """Leave it: that command does."""
     raise NotImplementedError(run.output)

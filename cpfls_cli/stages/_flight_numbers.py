@@ -40,10 +40,7 @@ def first_of_each(contradictions: Sequence[str]) -> list[str]:
 def of_other_vehicles(stated: Sequence[tuple[str, Mapping[str, str]]], *, anyway: bool) -> list[str]:
     """Refuse flights whose logs say that they are of different vehicles, or warn of them where that is asked for.
 
-    Parameters
-    ----------
-    stated : sequence of (str, mapping of str to str)
-        Flights and what their logs state of their vehicles; those that state nothing are passed over.
+    Flights that state nothing of their vehicles are passed over.
     """
     (first, own), *others = [each for each in stated if each[1]] or [("", {})]
     warnings = []
@@ -60,10 +57,7 @@ def of_other_vehicles(stated: Sequence[tuple[str, Mapping[str, str]]], *, anyway
 def of_other_autopilots(flights: Sequence[FlightNumbers], *, thrusts: bool) -> tuple[list[str], list[str]]:
     """List where logs state another board, version or range of outputs, and whose shares of thrust that touches.
 
-    Parameters
-    ----------
-    thrusts : bool
-        Whether shares of thrust are compared; of commands they are shares of what full throttle stands for.
+    `thrusts`: whether shares of thrust are compared; of commands they are shares of what full throttle stands for.
     """
     (first, own), *others = [each for each in stated_by(flights) if each[1]] or [("", {})]
     unlike, ranges = [], []

@@ -17,15 +17,7 @@ CSV, PX4, ARDUPILOT = "csv", "px4", "ardupilot"
 
 @dataclass(frozen=True)
 class Mission:
-    """Files for autopilots that are asked for.
-
-    Attributes
-    ----------
-    forms : tuple of str
-        Some of csv, px4, ardupilot.
-    home : Home or None
-        Place of the path on earth, for a mission.
-    """
+    """Files for autopilots that are asked for (csv, px4, ardupilot), and the place of the path on earth."""
 
     forms: tuple[str, ...] = ()
     home: Home | None = None

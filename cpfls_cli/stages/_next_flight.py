@@ -53,17 +53,7 @@ _OPEN = (GapVerdict.NOT_EXCITED, GapVerdict.NO_GAP)
 
 @dataclass(frozen=True)
 class Case:
-    """What is to be separated, from which flights on.
-
-    Attributes
-    ----------
-    questions : tuple of Question
-    flights : tuple of WeakFlight
-        That are there already.
-    logging : Logging
-    notes : tuple of str
-        What a user should know of it.
-    """
+    """What is to be separated, from which flights on, and what a user should know of it."""
 
     questions: tuple[Question, ...]
     flights: tuple[WeakFlight, ...]

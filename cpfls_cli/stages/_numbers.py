@@ -31,17 +31,8 @@ def cautions_in(path: Path) -> tuple[str, ...]:
 def with_numbers(job: J, command: str, model: Path | None, *, whole: bool = False) -> J:
     """Take what a config leaves open from a model of a whole vehicle, or from guesses that are asked for.
 
-    What speaks against the model, or makes guesses of the numbers, goes with what the job writes.
-
-    Parameters
-    ----------
-    whole : bool
-        Whether the command needs none of the open numbers: its model has its own.
-
-    Raises
-    ------
-    ConfigError
-        If nobody says what the config leaves open.
+    What speaks against the model, or makes guesses of the numbers, goes with what the job writes. `whole`: the command
+    needs none of the open numbers, its model has its own. `ConfigError` where nobody says them.
     """
     given = None if model is None or is_vehicle(model) or not model.is_file() else model
     if given is not None and is_model(given):
@@ -55,13 +46,7 @@ def with_numbers(job: J, command: str, model: Path | None, *, whole: bool = Fals
 
 
 def with_numbers_of(job: J, found: Path) -> J:
-    """Take what a config leaves open from a vehicle that was found, of a command that takes no model.
-
-    Raises
-    ------
-    InputError
-        If it is no vehicle that was found.
-    """
+    """Take what a config leaves open from a vehicle that was found, of a command that takes no model."""
     if not (is_found(found)):
         raise InputError(f"--model {found}: is not a vehicle that `cpfls vehicle` found")
     open_ = [name.replace("_", " ") for name in job.study.vehicle.unknown]
@@ -85,13 +70,7 @@ def why_no_body_found(job: Job, found: Path) -> str:
 
 
 def to_fly(job: Job, output: Path | None = None) -> Command:
-    """Give the command that plans flights that tell more, or what to fly by hand where the autopilot flies no file.
-
-    Parameters
-    ----------
-    output : Path or None
-        For the plan; None for `mission.h5`.
-    """
+    """Give the command that plans flights that show more, or what to fly by hand where the autopilot flies no file."""
     formats = log_formats(job.inputs)
     if formats and formats <= FLOWN_BY_HAND:
         return f"fly {BY_HAND}"

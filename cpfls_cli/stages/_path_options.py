@@ -145,17 +145,7 @@ def require_no_room(box: str | None, height: float | None) -> None:
 
 @dataclass(frozen=True)
 class Added:
-    """Options of repeats and excitations; None where one is not given.
-
-    Attributes
-    ----------
-    axes, band : str or None
-        With commas between; band in Hz.
-    size : float or None
-        Degrees.
-    hover : float or None
-        Duration at one place, s.
-    """
+    """Options of repeats and excitations, None where one is not given: band in Hz, size in degrees, hover in s."""
 
     repeat: int | None = None
     axes: str | None = None

@@ -20,6 +20,7 @@ from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.config.unknown import is_of_guesses
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.recordings import FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
@@ -27,10 +28,11 @@ from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, before_after
 from cpfls_cli.gap.diagnose import diagnose as diagnose_flights
+from cpfls_cli.gap.naming.causes import of_thrust
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.whole_vehicle import known_already
 from cpfls_cli.pages.disturbance import axis_words
-from cpfls_cli.pages.effects import intervals_drawn, of_thrust, wrong_numbers
+from cpfls_cli.pages.effects import intervals_drawn, wrong_numbers
 from cpfls_cli.pages.gap import (
     AXES,
     BEFORE,
@@ -157,7 +159,8 @@ def _wrong(r: Diagnosis, source: Source) -> tuple[int, list[str]]:
     taken = "the guess" if guessed else "the vehicle that was found"
     found, by_place = wrong_numbers(r.effects), dict[str, list[str]]()
     of_model = "model" in source.header.inputs and r.base.vehicle != source.vehicle
-    follow = [name for name in of_thrust(r.effects) if name in found]
+    numbers = [number for each in r.effects if each.name == VEHICLE_NUMBERS.name for number in each.numbers]
+    follow = of_thrust(numbers)
     said = {name: words for name, words in found.items() if name not in follow}
     if follow:
         shows = joined([found[name].partition(" ")[0] for name in follow])
@@ -263,15 +266,7 @@ def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOpti
 
 
 def next_command(job: Job, found: Diagnosis, named: Command, unnamed: Command, diagnosis: Path) -> Command:
-    """Give the command that goes on by the verdict.
-
-    Parameters
-    ----------
-    named, unnamed : Command
-        For a gap with a name, and for one without.
-    diagnosis : Path
-        Where the verdict is written.
-    """
+    """Give the command that goes on by the verdict: for a gap with a name, or for one without."""
     if found.contradictions:
         return to_correct(job)
     match found.verdict:
@@ -296,14 +291,8 @@ def learned_from(
 ) -> Diagnosis:
     """Take the flights of a disagreement, and those that its model learned from, as inputs of a diagnosis.
 
-    Parameters
-    ----------
-    held_out : sequence of InputFile
-        Of these it is said where the model has learned from them.
-    model : str
-        Name of the disagreement that the model is of.
-    of : str
-        Name of the diagnosis among the results of the run.
+    Of those held out it is said where the model has learned from them; `model` and `of` name the disagreement that the
+    model is of, and the diagnosis among the results of the run.
     """
     run.take_also({**flights, **as_inputs(MODEL_FLIGHT, learned)}, of)
     hashes = [(file.name, (file.sha256,)) for file in held_out]

@@ -1,4 +1,4 @@
-"""Show the effects that a model can miss, and the flights that tell them apart."""
+"""Show the effects that a model can miss, and the flights that distinguish them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Shown:
     needs: tuple[str, ...] = about("signals that it needs beside rates and torque", "signal")
     seen_in: str = about("where it is seen")
     excitation: str = about("flight that shows it")
-    rivals: Mapping[str, str] = about("what looks like it, and how to tell the two apart")
+    rivals: Mapping[str, str] = about("what looks like it, and how to distinguish the two")
     source: str = about("where the formula is from")
 
 

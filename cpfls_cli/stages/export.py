@@ -56,7 +56,10 @@ FormatOption = Annotated[
 NameOption = Annotated[
     str | None,
     typer.Option(
-        "--name", metavar="NAME", help="Prefix of the names in C, name in JSON and XML; default: from the name of FILE."
+        "--name",
+        metavar="NAME",
+        help="Prefix of the names in C, name in JSON and XML, but not for PyFlyt and Webots; default: from the name of "
+        "FILE.",
     ),
 ]
 VIEWERS = {"mcap": ".mcap", "csv": ".csv"}
@@ -65,6 +68,7 @@ ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()} | VIEWERS
 # What an autopilot states is no whole vehicle, so it is asked for by name.
 _BY_SUFFIX = {form: ending for form, ending in ENDINGS.items() if form in VIEWERS or not FORMS[form].lacks}
 # What the module imports beside the standard library: under such a name it would import itself.
+_NAMED_AS_FILES = {"pyflyt": "a model of PyFlyt", "webots": "a PROTO of Webots"}
 _IMPORTED = ("casadi", "jax", "numpy", "pegasus", "rotorpy")
 
 
@@ -225,8 +229,9 @@ def _prefix_of(output: Path, form: str, name: str | None) -> str:
     """Choose the prefix of the names in source code."""
     if name is None:
         return identifier(output.stem)
-    if ENDINGS[form] == ".py":
-        raise InputError(f"--name {name}: a Python module is named after its file; leave --name out, or rename -o")
+    whole = "a Python module" if ENDINGS[form] == ".py" else _NAMED_AS_FILES.get(form)
+    if whole is not None:
+        raise InputError(f"--name {name}: {whole} is named after its file; leave --name out, or rename -o")
     return checked_identifier(name)
 
 

@@ -20,7 +20,14 @@ from cpfls_cli.gap.extended import extend as refitted
 from cpfls_cli.gap.extended import plain
 from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
 from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, in_roles
-from cpfls_cli.gap.whole_vehicle import on_top_of, require_body, whole_vehicle, with_known_wrench
+from cpfls_cli.gap.whole_vehicle import (
+    above_thrust,
+    on_top_of,
+    require_body,
+    thrust_put_in,
+    whole_vehicle,
+    with_known_wrench,
+)
 from cpfls_cli.pages.effects import intervals_drawn
 from cpfls_cli.pages.gap import sizes_drawn
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
@@ -86,13 +93,20 @@ def extended(
     """Put the effects that a diagnosis names into a model; refused where the held-out gap does not shrink."""
     gusty_floor = diagnosis.gap.floor if diagnosis.gusts else None
     named = named_effects(diagnosis), diagnosis.audit
-    extension = refitted(training, held, *named, study.gap, base.fuzzy, gusty_floor)
-    stated = base.vehicle
-    whole, given = (on_top_of(base, whole_vehicle(each, stated)) for each in (extension.model, plain(base.fuzzy)))
+    others = *named, study.gap, base.fuzzy, gusty_floor
+    extension, vehicle = refitted(training, held, *others), base.vehicle
+    by_speed = all(each.signals.rotor_speed is not None for each in (*training, *held))
+    lifting = thrust_put_in(extension, vehicle) if by_speed else vehicle
+    if lifting != vehicle:
+        moved = replace(base, vehicle=lifting)
+        again = refitted(with_known_wrench(training, moved), with_known_wrench(held, moved), *others, extension)
+        extension, vehicle = above_thrust(again, extension, lifting)
+    whole = on_top_of(base, whole_vehicle(extension.model, vehicle))
+    given = on_top_of(base, whole_vehicle(plain(base.fuzzy), base.vehicle))
     if diagnosis.air is not None and diagnosis.gusts:
         whole = replace(whole, gusts=diagnosis.air.gusts)
-    require_body(extension.model, stated)
+    require_body(extension.model, vehicle)
     played = played_pairs(held, whole, given, rates_fade(training, study.gap.horizon_s))
     playback = PlaybackChange.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))
     missing = left_out(whole, whole.unsimulated, held, study.gap.horizon_s)
-    return Extended.of(extension, stated, whole, playback, missing)
+    return Extended.of(extension, vehicle, whole, playback, missing)

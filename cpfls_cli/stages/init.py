@@ -391,12 +391,7 @@ def _flight_names(logs: Sequence[Path]) -> list[str]:
 
 
 def _require_possible(stated: Stated) -> None:
-    """Refuse numbers that no vehicle has, before a log is read; by its arms it is taken for a quadrotor.
-
-    Raises
-    ------
-    ConfigError
-    """
+    """Refuse numbers that no vehicle has, before a log is read; by its arms it is taken for a quadrotor."""
     arm, moments = _or_nan(stated.arm_m), stated.inertia_kg_m2 or (nan,)
     known = {
         "mass": _or_nan(stated.mass_kg),

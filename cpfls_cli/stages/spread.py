@@ -1,4 +1,4 @@
-"""Draw vehicles from what the flights of one tell, for simulators that fly many: .yaml, .json or .npz."""
+"""Draw vehicles from what flights leave possible, for simulators that fly many: .yaml, .json or .npz."""
 
 from __future__ import annotations
 

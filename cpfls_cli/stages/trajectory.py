@@ -72,18 +72,10 @@ _MOST_SAMPLES = 1_000_000
 
 @dataclass(frozen=True)
 class Flight:
-    """A path as it is to be flown.
+    """A path as it is to be flown, all runs of it.
 
-    Attributes
-    ----------
-    planned : PlannedRotation
-        All runs of it.
-    at : callable
-        Samples it anew, two runs at most, for a look between its samples.
-    excitation : Excitation or None
-        Of a held vehicle, where the path is optimised.
-    excited : Excited or None
-        What is added to the setpoints.
+    `at` samples it anew, two runs at most, for a look between its samples; `excitation`: of a held vehicle, where the
+    path is optimised; `excited`: what is added to the setpoints.
     """
 
     planned: PlannedRotation

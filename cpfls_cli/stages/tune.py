@@ -305,14 +305,9 @@ def _changed(gains: TunedGains, flight: LogFlight, filters: Sequence[Change]) ->
 
 @dataclass(frozen=True)
 class _Log:
-    """What a log, or a flight that was imported from one, holds of its autopilot.
+    """What a log, or a flight that was imported from one, holds of its autopilot, and its body rate, rad/s.
 
-    Attributes
-    ----------
-    time : array, shape (time,), s
-    rate : array, shape (time, 3), rad/s
-    column : str
-        The one that holds the body rate about x.
+    `column`: the one that holds the body rate about x.
     """
 
     name: str

@@ -244,11 +244,7 @@ def _remainder(r: Vehicle, figure: Figure) -> None:
 def remainder_curves(r: Vehicle) -> tuple[Array, Array, Array]:
     """Evaluate the remainder, and the effects that have a name, over the direction of flight.
 
-    Returns
-    -------
-    direction : array, shape (73,), degrees
-        0 ahead, 90 left.
-    learned, named : array, shape (73, 6), N m and N
+    Directions are in degrees, 0 ahead, 90 left; torque and force in N m and N.
     """
     model, direction = r.model, np.linspace(-180.0, 180.0, 73)
     angle = np.radians(direction)
@@ -333,7 +329,7 @@ def vehicle(
 def next_commands(
     job: Job, made: Vehicle, flights: Sequence[Path], held_out: Sequence[Path]
 ) -> tuple[Sequence[str | Path], ...]:
-    """Give the commands that show what was found, and that judge it, plan what would tell more, or hand it over."""
+    """Give the commands that show what was found, judge it, plan flights that identify more, or hand it over."""
     config, name = job.config, job.output.stem
     page = ("cpfls", "report", config, job.output, "-o", job.output.with_suffix(".html"))
     # No flight that is planned says more before the logs are faster.
@@ -363,14 +359,7 @@ def _config_copy(run: Run, copy: Path | None, made: Vehicle) -> dict[Path, str]:
 def _what_can_come(
     run: Run, flights: Sequence[LoggedFlight], training: Sequence[LoggedFlight]
 ) -> tuple[PlaybackSettings, tuple[str, ...]]:
-    """Refuse logs that contradict themselves, and seek no more than slow ones can tell; first a word of it.
-
-    Returns
-    -------
-    PlaybackSettings
-    tuple of str
-        What to say beside the answer.
-    """
+    """Refuse logs that contradict themselves, and seek no more than slow ones can identify; a warning first."""
     settings, wrong = run.study.playback, contradictions_of(flights)
     if wrong and not settings.anyway:
         raise InputError("\n".join(map(contradicted, wrong)) + f"\n{NOTHING_COMES}")

@@ -43,14 +43,7 @@ def along(time: Array, motion: Array, heading: Array, gravity: float) -> dict[st
 
 
 def rotation_samples(time: Array, motion: RotationMotion, heading: Array) -> dict[str, Array]:
-    """Arrange the samples of a rotation by their names in a `PlannedRotation`.
-
-    Parameters
-    ----------
-    time : array, shape (time,), s
-    heading : array, shape (3, time), rad and s
-        Yaw, its rate and its acceleration.
-    """
+    """Arrange the samples of a rotation by their names in a `PlannedRotation`; heading as of `uniform_heading`."""
     return {
         "time": time,
         "yaw": heading[0],
@@ -64,26 +57,10 @@ def rotation_samples(time: Array, motion: RotationMotion, heading: Array) -> dic
 def flat_attitude(time: Array, translation: Array, heading: Array, gravity: float) -> RotationMotion:
     """Derive roll and pitch from acceleration and yaw, and their derivatives from jerk and snap.
 
-    ``phi = asin((ax sin psi - ay cos psi) / |f|)``, ``theta = atan2(ax cos psi + ay sin psi, az + g)`` with
-    ``f = a + g e3``.
-
-    Parameters
-    ----------
-    time : array, shape (time,), s
-    translation : array, shape (3, time, 3), world frame, z up
-        Acceleration in m/s^2, jerk in m/s^3, snap in m/s^4.
-    heading : array, shape (3, time)
-        Yaw in rad, its rate in rad/s, its acceleration in rad/s^2.
-    gravity : float, m/s^2
-
-    Raises
-    ------
-    ComputationError
-        If the thrust vanishes, reverses between two samples, or points where the pitch is undefined.
-
-    References
-    ----------
-    Equation (18) in its physical form, method.md section 3.
+    ``phi = asin((ax sin psi - ay cos psi) / |f|)``, ``theta = atan2(ax cos psi + ay sin psi, az + g)`` with ``f = a + g
+    e3``: equation (18) in its physical form, method.md section 3. `translation`: acceleration, jerk and snap in the
+    world frame, z up, shape (3, time, 3), m and s; `heading`: yaw and two derivatives, shape (3, time), rad and s.
+    `ComputationError` where the thrust vanishes, reverses between two samples, or points where the pitch is undefined.
     """
     force = translation + np.array([[[0.0, 0.0, gravity]], [[0.0] * 3], [[0.0] * 3]])
     _refuse_free_fall(time, force[0], gravity)
@@ -146,57 +123,19 @@ def _refuse_sideways(time: Array, tilted: Array, gravity: float) -> None:
 
 
 def uniform_heading(time: Array, turn: float, duration: float) -> Array:
-    """Compute a yaw that turns at a constant rate.
-
-    Parameters
-    ----------
-    time : array, shape (time,), s
-    turn : float, rad
-    duration : float, s
-
-    Returns
-    -------
-    array, shape (3, time), rad and s
-        Yaw, its rate and its acceleration.
-    """
+    """Compute a yaw that turns at a constant rate, with its rate and acceleration, shape (3, time), rad and s."""
     rate = turn / duration
     return np.stack([rate * time, np.full_like(time, rate), np.zeros_like(time)])
 
 
 def stretched_heading(time: Array, turn: float, profile: BaseProfile, duration: float) -> Array:
-    """Compute a yaw that turns from rest to rest with the shape of a move, stretched in time.
-
-    Parameters
-    ----------
-    time : array, shape (time,), s
-    turn : float, rad
-    profile : BaseProfile
-        Whose shape the turn has.
-    duration : float, s
-
-    Returns
-    -------
-    array, shape (3, time), rad and s
-        Yaw, its rate and its acceleration.
-    """
+    """Compute a yaw that turns from rest to rest with the shape of a move, stretched in time, as `uniform_heading`."""
     unit = covering(1.0, profile.period, profile.holds).stretched(duration)
     return np.asarray(turn * unit.sample(time).T[:3])
 
 
 def heading_of_legs(time: Array, legs: Sequence[Leg]) -> Array:
-    """Compute a yaw that turns from point to point during the legs.
-
-    Parameters
-    ----------
-    time : array, shape (time,), s
-    legs : sequence of Leg
-        With a yaw each.
-
-    Returns
-    -------
-    array, shape (3, time), rad and s
-        Yaw, its rate and its acceleration.
-    """
+    """Compute a yaw that turns from point to point during the legs, which have one each, as `uniform_heading`."""
     heading = np.zeros((3, len(time)))
     heading[0] = _yaw(legs[0])[0]
     for leg, samples in samples_of_legs(legs, time):

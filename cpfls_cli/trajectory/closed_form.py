@@ -41,20 +41,7 @@ _WAVE = np.array(
 
 
 def spans_of(period: float | Array, holds: Array) -> Array:
-    """Compute the spans from period and holds.
-
-    Parameters
-    ----------
-    period : float or array, shape (moves,), s
-        P.
-    holds : array, shape (4,) or (4, moves), s
-        Holds of snap, jerk, acceleration and velocity.
-
-    Returns
-    -------
-    array, shape (5,) or (5, moves), s
-        T1 to T5.
-    """
+    """Compute the spans T1 to T5, s, from period P and holds of snap, jerk, acceleration and velocity."""
     spans = np.empty((5, *holds.shape[1:]))
     spans[0] = period
     # A sum that overflows is infinite, and reported by the caller.
@@ -65,39 +52,17 @@ def spans_of(period: float | Array, holds: Array) -> Array:
 
 
 def holds_of(spans: Array) -> Array:
-    """Compute the holds from the spans, the inverse of `spans_of`.
-
-    Parameters
-    ----------
-    spans : array, shape (5, moves), s
-
-    Returns
-    -------
-    array, shape (4, moves), s
-    """
+    """Compute the holds from the spans, the inverse of `spans_of`."""
     holds = spans[1:] - np.cumsum(spans, axis=0)[:-1]
     holds[holds <= _NO_HOLD * spans[1:]] = 0.0
     return holds
 
 
 def peaks_of(displacement: float | Array, spans: Array) -> Array:
-    """Compute the peak of every derivative.
+    """Compute the largest absolute displacement, velocity, acceleration, jerk, snap, crackle and pop, m and s.
 
-    Parameters
-    ----------
-    displacement : float or array, shape (moves,), m
-        Of any sign.
-    spans : array, shape (5,) or (5, moves), s
-        The first of them may be zero; what rises in no time has a derivative without bound.
-
-    Returns
-    -------
-    array, shape (7,) or (7, moves), m and s
-        Largest absolute displacement, velocity, acceleration, jerk, snap, crackle and pop.
-
-    References
-    ----------
-    Section 7 of the paper; method.md section 3.
+    The first of the spans may be zero; what rises in no time has a derivative without bound. Section 7 of the paper;
+    method.md section 3.
     """
     peaks = np.zeros((7, *spans.shape[1:]))
     peaks[0] = np.abs(displacement)
@@ -110,21 +75,7 @@ def peaks_of(displacement: float | Array, spans: Array) -> Array:
 
 
 def sample(displacement: float, spans: Array, time: Array) -> Array:
-    """Evaluate a move and its derivatives.
-
-    Parameters
-    ----------
-    displacement : float, m
-    spans : array, shape (5,), s
-        T1 to T5.
-    time : array, shape (time,), s
-        Any order.
-
-    Returns
-    -------
-    array, shape (time, 7), m and s
-        Displacement, velocity, acceleration, jerk, snap, crackle, pop.
-    """
+    """Evaluate a move at any times: displacement, velocity, acceleration, jerk, snap, crackle, pop, shape (time, 7)."""
     if np.all(time[1:] >= time[:-1]):
         return _ascending(displacement, spans, time).T
     order = np.argsort(time, kind="stable")
@@ -163,13 +114,8 @@ def _fill(motion: Array, piece: _Piece, time: Array, origin: float, direction: f
 class _Piece:
     """A wave or a hold, as functions of the fraction tau of its length.
 
-    Attributes
-    ----------
-    start, length : float, s
-    coefficients : array, shape (5, 8)
-        Of displacement to snap: the powers of tau from 0 to 5, then sine and cosine of 2 pi tau.
-    crackle, pop : float
-        ``crackle (1 - cos)`` and ``pop sin``; zero in a hold.
+    `coefficients` of displacement to snap, shape (5, 8): the powers of tau from 0 to 5, then sine and cosine of 2 pi
+    tau; ``crackle (1 - cos)`` and ``pop sin``, zero in a hold.
     """
 
     start: float
@@ -187,27 +133,14 @@ class _Piece:
     def mirrored(self, parity: Array, displacement: float) -> _Piece:
         """Mirror this piece into the second half of the move, with its time reversed.
 
-        Parameters
-        ----------
-        parity : array, shape (7,)
-            Sign of each derivative of the mirror image.
-        displacement : float, m
-            Of the whole move.
+        `parity`: sign of each derivative of the mirror image; `displacement`: of the whole move.
         """
         coefficients = self.coefficients * parity[:5, np.newaxis]
         coefficients[0, 0] += displacement
         return replace(self, coefficients=coefficients, crackle=parity[5] * self.crackle, pop=parity[6] * self.pop)
 
     def evaluate(self, tau: Array, motion: Array) -> None:
-        """Evaluate displacement to pop in place.
-
-        Parameters
-        ----------
-        tau : array, shape (time,)
-            Fractions of the piece.
-        motion : array, shape (7, time)
-            To write to; holds zeros.
-        """
+        """Evaluate displacement to pop at fractions of the piece in place, into zeros of shape (7, time)."""
         is_wave = self.crackle != 0
         degree = 5 if is_wave else 4
         for order, row in enumerate(self.coefficients):

@@ -139,13 +139,7 @@ def _check_moves(settings: TrajectorySettings) -> None:
 
 
 def check_peaks(profile: BaseProfile, key: str) -> None:
-    """Refuse a move whose displacement vanishes or whose derivatives overflow.
-
-    Parameters
-    ----------
-    key : str
-        Setting that made it so.
-    """
+    """Refuse a move whose displacement vanishes or whose derivatives overflow, by the setting that made it so."""
     if not profile.displacement:
         raise SettingError(
             key, f"with period_s = {profile.period:g} makes a move too short for floating-point numbers; raise it"
@@ -167,14 +161,7 @@ def check_samples(duration: float, sample_time: float) -> None:
 
 
 def check_duration(moves: int, needed: float, duration: float) -> None:
-    """Refuse a duration that the moves do not fit into.
-
-    Parameters
-    ----------
-    needed : float, s
-        By all of them.
-    duration : float, s
-    """
+    """Refuse a duration that the moves do not fit into."""
     if needed > duration * (1 + 1e-12):
         words = f"{moves} moves take" if moves > 1 else "the move takes"
         raise SettingError("duration_s", f"{words} {needed:g} s; raise it, or set it to null for as long as they take")

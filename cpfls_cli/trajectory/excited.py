@@ -161,16 +161,7 @@ def _of_axis(settings: ExciteSettings, number: int, time: Array, duration: float
 def lines_of(settings: ExciteSettings, number: int, duration: float) -> IntArray:
     """List the periods in the duration of the waves of one axis: all in the band, dealt out among the axes in turn.
 
-    Parameters
-    ----------
-    number : int
-        Of the axis among those excited.
-    duration : float, s
-
-    Raises
-    ------
-    SettingError
-        If there are too few for a multisine.
+    `number` is that of the axis among those excited; `SettingError` where there are too few for a multisine.
     """
     low, high = settings.band_hz
     lines: IntArray = np.arange(ceil(low * duration - 1e-9), int(high * duration + 1e-9) + 1)
@@ -186,21 +177,10 @@ def lines_of(settings: ExciteSettings, number: int, duration: float) -> IntArray
 
 
 def multisine(order: IntArray, duration: float, time: Array, lift: int = 0) -> Array:
-    """Evaluate a sum of cosines of amplitudes as 1/f, with phases of a low crest factor.
+    """Evaluate a sum of cosines of amplitudes as 1/f, with phases of a low crest factor, and six derivatives.
 
-    Parameters
-    ----------
-    order : array of int, shape (line,)
-        Periods in the duration, ascending.
-    duration : float, s
-    time : array, shape (time,), s
-    lift : int
-        How often it is integrated.
-
-    Returns
-    -------
-    array, shape (7, time)
-        The signal, of peak 1 before it is integrated, and six derivatives.
+    `order`: periods in the duration, ascending; `lift`: how often it is integrated, after its peak was made 1. Shape
+    (7, time).
     """
     amplitude = 1.0 / order
     phase = _phases(tuple(order.tolist()))
@@ -218,12 +198,10 @@ def multisine(order: IntArray, duration: float, time: Array, lift: int = 0) -> A
 def _phases(order: tuple[int, ...]) -> Array:
     """Choose phases of a low crest factor: Schroeder's, improved by clipping the peaks and keeping the amplitudes.
 
-    References
-    ----------
     Schroeder 1970, Synthesis of low-peak-factor signals and binary sequences with low autocorrelation, IEEE
-    Transactions on Information Theory 16: ``phase_k = -2 pi sum_(j < k) (k - j) p_j`` for shares of power p.
-    Van der Ouderaa, Schoukens and Renneboog 1988, Peak factor minimization using a time-frequency domain swapping
-    algorithm, IEEE Transactions on Instrumentation and Measurement 37.
+    Transactions on Information Theory 16: ``phase_k = -2 pi sum_(j < k) (k - j) p_j`` for shares of power p. Van der
+    Ouderaa, Schoukens and Renneboog 1988, Peak factor minimization using a time-frequency domain swapping algorithm,
+    IEEE Transactions on Instrumentation and Measurement 37.
     """
     lines = np.array(order)
     count = _RESOLUTION * order[-1]
@@ -250,21 +228,10 @@ def _period(order: IntArray, duration: float) -> Array:
 
 
 def sweep(settings: ExciteSettings, length: float, time: Array, lift: int = 0) -> Array:
-    """Evaluate a sine whose frequency goes through the band, with an amplitude as 1/f.
+    """Evaluate a sine whose frequency goes through the band in `length` s, amplitude as 1/f, and six derivatives.
 
-    Parameters
-    ----------
-    length : float, s
-        From the lowest to the highest frequency.
-    time : array, shape (time,), s
-        Since its beginning.
-    lift : int
-        How often it is integrated, as a wave of the frequency at each time is: 0 or 2.
-
-    Returns
-    -------
-    array, shape (7, time)
-        The signal, of peak 1 at the lowest frequency before it is integrated, and six derivatives.
+    Time is since its beginning; `lift`: how often it is integrated, as a wave of the frequency at each time is, 0 or 2,
+    after its peak at the lowest frequency was made 1. Shape (7, time).
     """
     low, high = settings.band_hz
     inside = np.clip(time, 0.0, length)

@@ -22,16 +22,9 @@ Synchronisation = Literal["straight-line", "each-axis"]
 class MoveInSpace:
     """One move from rest to rest, wherever and whenever it begins.
 
-    Attributes
-    ----------
-    profiles : tuple of BaseProfile
-        One along a straight line; one for each axis that moves where every axis is planned by itself. All take
-        the same time.
-    directions : array, shape (profiles, 3)
-        World vector that one metre of each profile moves along.
-    limited_by : tuple of str
-        Derivatives that reach their limit on any axis, or ``period`` where none does; empty where the move was not
-        planned under limits.
+    One profile along a straight line, or one for each axis that moves where every axis is planned by itself, all of the
+    same time; `directions`: world vector that one metre of each profile moves along; `limited_by`: derivatives that
+    reach their limit on any axis, or ``period`` where none does, empty where the move was not planned under limits.
     """
 
     profiles: tuple[BaseProfile, ...]
@@ -74,19 +67,7 @@ class Leg(MoveInSpace):
 
 
 def evaluate_legs(legs: Sequence[Leg], time: Array) -> Array:
-    """Evaluate position and its six derivatives along a path.
-
-    Parameters
-    ----------
-    legs : sequence of Leg
-        In the order of time.
-    time : array, shape (time,), s
-        Ascending.
-
-    Returns
-    -------
-    array, shape (7, time, 3), m and s
-    """
+    """Evaluate position and its six derivatives along a path at ascending times, shape (7, time, 3), m and s."""
     motion = np.zeros((7, len(time), 3))
     motion[0] = legs[0].start
     for leg, samples in samples_of_legs(legs, time):
@@ -100,16 +81,7 @@ def evaluate_legs(legs: Sequence[Leg], time: Array) -> Array:
 def samples_of_legs(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, slice]]:
     """Assign the samples to the legs, so that the work grows with the samples and not with samples times legs.
 
-    Parameters
-    ----------
-    time : array, shape (time,), s
-        Ascending.
-
-    Yields
-    ------
-    leg : Leg
-    samples : slice
-        From its beginning to that of the next one; it is at rest at the end of them.
+    A slice goes from the beginning of a leg to that of the next one: it is at rest at the end of them.
     """
     firsts = np.searchsorted(time, [*(leg.begin for leg in legs), np.inf])
     for leg, first, after in zip(legs, firsts[:-1], firsts[1:], strict=True):
@@ -119,17 +91,9 @@ def samples_of_legs(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, sli
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """Timing of a move: by its period and holds, or the shortest that its limits allow.
+    """Timing of a move: by its period and holds, or the shortest that its limits allow, where the period may be None.
 
-    Attributes
-    ----------
-    coordination : {"straight-line", "each-axis"}
-    period : float or None, s
-        None where the limits choose it.
-    holds : Holds
-        Where there are no limits.
-    measure : {"along-path", "per-axis"}
-        How long a displacement is, and what a limit that is one number for all axes holds for.
+    `measure`: how long a displacement is, and what a limit that is one number for all axes holds for.
     """
 
     limits: LimitSettings
@@ -140,19 +104,7 @@ class Timing:
 
 
 def unit_of(vector: Array, measure: Measure) -> tuple[float, Array]:
-    """Split a vector into its length, in a measure, and the vector of length 1.
-
-    Parameters
-    ----------
-    vector : array, shape (3,)
-        Not zero.
-    measure : {"along-path", "per-axis"}
-
-    Returns
-    -------
-    length : float
-    direction : array, shape (3,)
-    """
+    """Split a vector, not zero, into its length, in a measure, and the vector of length 1."""
     # Divided by the largest component first, so that no square overflows.
     largest = float(np.abs(vector).max())
     unit = vector / largest
@@ -161,17 +113,9 @@ def unit_of(vector: Array, measure: Measure) -> tuple[float, Array]:
 
 
 def move_in_space(vector: Array, timing: Timing) -> MoveInSpace:
-    """Plan the move over a displacement.
+    """Plan the move over a displacement in the world, m, not zero.
 
-    Parameters
-    ----------
-    vector : array, shape (3,), m, world frame
-        Not zero.
-
-    Raises
-    ------
-    SettingError
-        If there is no smooth move under the limits; it names the key of the section `trajectory`.
+    `SettingError` names the key of the section `trajectory` where there is no smooth move under the limits.
     """
     length, direction = unit_of(vector, timing.measure)
     if not timing.limits.given:
@@ -200,21 +144,9 @@ def _smooth(moves: tuple[Move, ...], directions: Array) -> MoveInSpace:
 
 
 def synchronised(displacements: Array, limits: Limits, period: float | None = None) -> tuple[Move, ...]:
-    """Plan the shortest move of every axis, all stretched in time to the duration of the slowest.
+    """Plan the shortest move of every axis, all stretched in time to the duration of the slowest, of a given period.
 
-    Parameters
-    ----------
-    displacements : array, shape (axes,), m
-        Of any sign; an axis may stay where it is.
-    limits : Limits
-        One of each for all axes, or one for each axis.
-    period : float, s, optional
-        P, of the slowest axis.
-
-    Raises
-    ------
-    SettingError
-        If a displacement is not finite, or a limit or the period is not greater than zero; it names the key.
+    An axis may stay where it is. `SettingError` names the key of what is not finite, or not greater than zero.
     """
     alone = plan_moves(displacements, limits, period)
     taken = np.where(alone.outcome == MoveOutcome.SOLVED, alone.duration, 0.0)

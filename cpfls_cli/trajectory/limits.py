@@ -21,10 +21,7 @@ _Limit = _Positive | tuple[_Positive, _Positive, _Positive] | None
 class Limits:
     """Largest absolute value allowed to each derivative of a move, in m and s; infinite where there is none.
 
-    Attributes
-    ----------
-    velocity, acceleration, jerk, snap, crackle, pop : float or array, shape (moves,)
-        Derivatives one to six; an array gives every move its own limit.
+    An array gives every move its own limit.
     """
 
     velocity: float | Array = np.inf
@@ -40,18 +37,7 @@ class Limits:
             require_positive(field.name, getattr(self, field.name), "leave it out for no limit")
 
     def broadcast(self, moves: int) -> Array:
-        """Broadcast the limits to all moves.
-
-        Returns
-        -------
-        array, shape (6, moves)
-            In the order of the attributes.
-
-        Raises
-        ------
-        SettingError
-            If the length of a limit is neither one nor the number of moves.
-        """
+        """Broadcast the limits to all moves, shape (6, moves); `SettingError` where a length fits neither."""
         return np.stack([broadcast_to_moves(field.name, getattr(self, field.name), moves) for field in fields(self)])
 
 
@@ -59,15 +45,7 @@ LIMIT_NAMES = tuple(field.name for field in fields(Limits))
 
 
 def require_positive(key: str, value: float | Array, remedy: str) -> None:
-    """Refuse values that are not greater than zero.
-
-    Parameters
-    ----------
-    key : str
-        Name of the value, for the message.
-    remedy : str
-        What else could be done about it, for the message.
-    """
+    """Refuse values that are not greater than zero, with their name and what else could be done about it."""
     values = np.atleast_1d(np.asarray(value, dtype=np.float64))
     wrong = ~(values > 0)
     if wrong.any():
@@ -75,21 +53,7 @@ def require_positive(key: str, value: float | Array, remedy: str) -> None:
 
 
 def broadcast_to_moves(key: str, value: float | Array, moves: int) -> Array:
-    """Broadcast one value to all moves, or check that there is one for each.
-
-    Parameters
-    ----------
-    value : float or array, shape (moves,)
-
-    Returns
-    -------
-    array, shape (moves,)
-
-    Raises
-    ------
-    SettingError
-        If the length is neither one nor the number of moves.
-    """
+    """Broadcast one value to all moves; `SettingError` where it is neither one nor one for each."""
     values = np.asarray(value, dtype=np.float64)
     if values.shape not in ((), (1,), (moves,)):
         raise SettingError(key, f"has shape {values.shape} for {moves} moves; give one value, or one for each move")

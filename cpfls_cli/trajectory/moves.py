@@ -55,16 +55,9 @@ _WORDS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Move:
-    """A planned rest-to-rest move along a line.
+    """A planned rest-to-rest move along a line, and the names of the limits that it reaches.
 
-    Attributes
-    ----------
-    profile : BaseProfile
-        At rest, in no time, where there is no solution.
-    duration : float, s
-        Infinite where there is no solution.
-    active : tuple of str
-        Names of the limits that the move reaches.
+    Where there is no solution it is at rest, in no time, and its duration infinite.
     """
 
     profile: BaseProfile
@@ -80,23 +73,11 @@ class Move:
 
 @dataclass(frozen=True, kw_only=True)
 class Moves:
-    """Planned rest-to-rest moves, one for each displacement; they are the last axis.
+    """Planned rest-to-rest moves, one for each displacement; they are the last axis. All in m and s.
 
-    Attributes
-    ----------
-    displacement : array, shape (moves,), m
-    period : array, shape (moves,), s
-        Length P of one wave of the pop.
-    holds : array, shape (4, moves), s
-        Of snap, jerk, acceleration and velocity.
-    peaks : array, shape (7, moves), m and s
-        Largest absolute displacement, velocity, acceleration, jerk, snap, crackle and pop.
-    duration : array, shape (moves,), s
-        Infinite where there is no solution.
-    active : array, shape (6, moves), bool
-        Which limits are reached: velocity, acceleration, jerk, snap, crackle, pop.
-    outcome : array, shape (moves,)
-        Values of `MoveOutcome`.
+    `period`: length P of one wave of the pop; `holds` of snap, jerk, acceleration and velocity; `peaks`: largest
+    absolute displacement to pop; `duration`: infinite where there is no solution; `active`: which limits are reached,
+    of velocity to pop; `outcome`: values of `MoveOutcome`.
     """
 
     displacement: Array
@@ -129,17 +110,7 @@ class Moves:
 
 
 def moves_of(displacement: Array, spans: Array, bounds: Array, outcome: IntArray) -> Moves:
-    """Build moves from their spans.
-
-    Parameters
-    ----------
-    displacement : array, shape (moves,), m
-    spans : array, shape (5, moves) or (5, 1), s
-    bounds : array, shape (6, moves)
-        Limits.
-    outcome : array, shape (moves,)
-        Values of `MoveOutcome`; what is not solved rests.
-    """
+    """Build moves from their spans, limits and outcomes; what is not solved rests."""
     moving = outcome == MoveOutcome.SOLVED
     exact = np.where(moving, spans, 0.0)
     holds = holds_of(exact)
@@ -157,29 +128,12 @@ def moves_of(displacement: Array, spans: Array, bounds: Array, outcome: IntArray
 
 
 def plan_moves(displacement: Array, limits: Limits, period: float | Array | None = None) -> Moves:
-    """Plan the shortest moves under limits, all at once.
+    """Plan the shortest moves under limits, all at once; a negative displacement moves backwards.
 
-    Minimise ``16 P + 8 Ts + 4 Tj + 2 Ta + Tv`` over A, P and the holds, with the displacement covered and no
-    derivative above its limit.
-
-    Parameters
-    ----------
-    displacement : array, shape (moves,), m
-        Of any sign; a negative one moves backwards.
-    limits : Limits
-        One of each for all moves, or one for each move; those that are left out do not limit.
-    period : float or array, shape (moves,), s, optional
-        The paper's parameter P; chosen where it is not given. With crackle and pop not limited the choice is 0,
-        and the snap jumps.
-
-    Raises
-    ------
-    SettingError
-        If a displacement is not finite, or a limit or the period is not greater than zero; it names the key.
-
-    References
-    ----------
-    Section 7 of the paper; method.md section 3.
+    Minimise ``16 P + 8 Ts + 4 Tj + 2 Ta + Tv`` over A, P and the holds, with the displacement covered and no derivative
+    above its limit. The paper's parameter P is chosen where it is not given: 0 with crackle and pop not limited, and
+    the snap jumps. `SettingError` names the key of what is not finite, or not greater than zero. Section 7 of the
+    paper; method.md section 3.
     """
     covered = _finite(displacement)
     bounds = limits.broadcast(len(covered))
@@ -224,32 +178,14 @@ def _outcome(displacement: Array, bounds: Array, spans: Array, period: float | A
 
 
 def _shortest_spans(displacement: Array, limits: Array, period: Array | None) -> Array:
-    """Compute the spans of the shortest move of the family.
+    """Compute the spans T1 to T5, s, of the shortest move of the family; zero where nothing limits what is below.
 
-    Let ``S_k(x)`` be the shortest time in which derivative k (1 snap, 2 jerk, 3 acceleration, 4 velocity,
-    5 displacement) rises to x. It grows no faster than x, so that what is below is best raised as far as its
-    limit allows: if ``x >= L_m K (2 K)^n 2^(n (n - 1) / 2)``, with ``K = S_m(L_m)``, ``n = k - m - 1`` and the
-    highest such m, derivative m is held at its limit, nothing above is held, and
-    ``x = L_m t (K + t)^n 2^(n (n - 1) / 2)`` with the spans ``t, K + t, 2 (K + t), 4 (K + t)`` above m. If there
-    is no such m, nothing is held at all.
-
-    Parameters
-    ----------
-    displacement : array, shape (moves,), m
-        Greater than zero.
-    limits : array, shape (6, moves)
-        On velocity, acceleration, jerk, snap, crackle, pop; infinite where there is none.
-    period : array, shape (moves,), s, or None
-        P, where it is not to be chosen.
-
-    Returns
-    -------
-    array, shape (5, moves), s
-        T1 to T5; zero where nothing limits the derivative below.
-
-    References
-    ----------
-    Section 7 of the paper; the derivation is in docs/trajectory.md.
+    Let ``S_k(x)`` be the shortest time in which derivative k (1 snap, 2 jerk, 3 acceleration, 4 velocity, 5
+    displacement) rises to x. It grows no faster than x, so that what is below is best raised as far as its limit
+    allows: if ``x >= L_m K (2 K)^n 2^(n (n - 1) / 2)``, with ``K = S_m(L_m)``, ``n = k - m - 1`` and the highest such
+    m, derivative m is held at its limit, nothing above is held, and ``x = L_m t (K + t)^n 2^(n (n - 1) / 2)`` with the
+    spans ``t, K + t, 2 (K + t), 4 (K + t)`` above m. If there is no such m, nothing is held at all. P is chosen where
+    it is None. Section 7 of the paper; the derivation is in docs/trajectory.md.
     """
     velocity, acceleration, jerk, snap, crackle, pop = limits
     with np.errstate(over="ignore", divide="ignore", invalid="ignore", under="ignore"):

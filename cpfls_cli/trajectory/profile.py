@@ -15,10 +15,7 @@ from cpfls_cli.trajectory.closed_form import peaks_of, sample, spans_of
 class Holds:
     """Time for which each derivative stays at its peak, s.
 
-    Attributes
-    ----------
-    snap, jerk, acceleration, velocity : float, s
-        Duration of each hold; a move holds snap 8 times, jerk 4 times, acceleration twice, velocity once.
+    A move holds snap 8 times, jerk 4 times, acceleration twice, velocity once.
     """
 
     snap: float = 0.0
@@ -29,13 +26,7 @@ class Holds:
 
 @dataclass(frozen=True, kw_only=True)
 class Peaks:
-    """Largest absolute value of every derivative of a move, in m and s.
-
-    Attributes
-    ----------
-    displacement, velocity, acceleration, jerk, snap, crackle, pop : float
-        Derivatives zero to six of the displacement.
-    """
+    """Largest absolute value of every derivative of a move, in m and s."""
 
     displacement: float
     velocity: float
@@ -53,20 +44,9 @@ _DERIVATIVES = tuple(field.name for field in fields(Peaks))
 class BaseProfile:
     """A rest-to-rest move with pop ``+-A (2 pi / P) sin(2 pi t / P)`` in sixteen intervals, and holds between.
 
-    Attributes
-    ----------
-    amplitude : float, m/s^5
-        A; the crackle is ``A (1 - cos(2 pi t / P))``. Infinite where P is zero, so that the snap jumps.
-    period : float, s
-        P, the length of one interval.
-    holds : Holds
-        Pauses between the intervals, during which snap, jerk, acceleration or velocity stays at its peak.
-    displacement : float, m
-        Follows from the amplitude where it is not given; `covering` gives both.
-
-    References
-    ----------
-    Section 7 of the paper; method.md section 3.
+    The amplitude A is in m/s^5; the crackle is ``A (1 - cos(2 pi t / P))``. It is infinite where the period P, the
+    length of one interval in s, is zero, so that the snap jumps. The displacement follows from the amplitude where it
+    is not given; `covering` gives both. Section 7 of the paper; method.md section 3.
     """
 
     amplitude: float
@@ -119,14 +99,7 @@ class BaseProfile:
     def stretched(self, duration: float) -> BaseProfile:
         """Cover the same displacement in another time, with the same shape.
 
-        Parameters
-        ----------
-        duration : float, s
-
-        Returns
-        -------
-        BaseProfile
-            Its derivative n is smaller by the ratio of the durations to the power of n.
+        Derivative n is smaller by the ratio of the durations to the power of n.
         """
         factor = duration / self.duration
         holds = Holds(**{name: factor * hold for name, hold in asdict(self.holds).items()})
@@ -134,19 +107,9 @@ class BaseProfile:
 
 
 def covering(displacement: float, period: float, holds: Holds) -> BaseProfile:
-    """Choose the amplitude that covers a displacement exactly.
+    """Choose the amplitude that covers a displacement exactly; infinite where the period is too short for any number.
 
-    Parameters
-    ----------
-    displacement : float, m
-        A negative one moves backwards.
-    period : float, s
-        May be zero, if a hold is not.
-
-    Returns
-    -------
-    BaseProfile
-        Of infinite amplitude where the period is too short for any number.
+    A negative displacement moves backwards; the period may be zero, if a hold is not.
     """
     reached = _product(spans_of(period, np.array(astuple(holds))))
     unbounded = math.copysign(math.inf, displacement) if displacement else 0.0

@@ -55,11 +55,11 @@ class RotationSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class NextFlightSettings(Settings):
-    """Describe the flight that tells rivals apart: what to tell, and the space that it may use."""
+    """Describe the flight that distinguishes rivals: which, and the space that it may use."""
 
     to_tell: Annotated[
         tuple[str, ...],
-        Doc("effects to tell apart (`cpfls effects`); one alone: to show; none: those that the diagnosis leaves open"),
+        Doc("effects to distinguish (`cpfls effects`); one alone: to show; none: those that the diagnosis leaves open"),
     ] = ()
     box_m: Annotated[
         tuple[_Length, _Length, _Length],
@@ -121,7 +121,7 @@ class TrajectorySettings(Settings):
         Doc(
             "cube-diagonal: to and fro along (1, 1, 1); straight: along `direction`; waypoints: from point to point; "
             "hover: at one place; "
-            "next-flight: what tells rivals of a diagnosis apart, harmonics from rest to rest; "
+            "next-flight: what distinguishes rivals of a diagnosis, harmonics from rest to rest; "
             "full-rotation, optimised: held at its centre of mass, turns through complete circles, at random or as "
             "conditions the model of `identification` best"
         ),

@@ -65,16 +65,7 @@ class AskedMargins:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A parameter with the value that is proposed.
-
-    Attributes
-    ----------
-    parameter : Parameter
-    value : float
-        Inside its documented range, in multiples of its step.
-    wanted : float
-        Before it was brought inside the range.
-    """
+    """A parameter with the value proposed, in its range and multiples of its step, and the one wanted before."""
 
     parameter: Parameter
     value: float
@@ -251,15 +242,9 @@ def _torque(plant: AxisPlant) -> float:
 
 @dataclass(frozen=True)
 class _Search:
-    """The search for the gains of one axis.
+    """The search for the gains of one axis, by a law with filters, limits and gains as they are.
 
-    Attributes
-    ----------
-    law : Law
-        With filters, limits and gains as they are, and as factor on all of them 1.
-    loudest : float
-        Most jitter of the command.
-    leads : tuple of float
+    As factor on all of these gains 1; `loudest`: most jitter of the command.
     """
 
     law: Law

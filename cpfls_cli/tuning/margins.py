@@ -43,15 +43,10 @@ class Margins:
 
 @dataclass(frozen=True)
 class AxisLoops:
-    """Loops of one axis with one plant or several.
+    """Loops of one axis with one plant or several, by frequency.
 
-    Attributes
-    ----------
-    frequency : array, shape (frequency,), Hz
-    rate : array, shape (..., frequency)
-        Gain of the rate loop alone, as it flies where rates are asked for.
-    command, angle : array, shape (..., frequency)
-        With the angle loop around it, cut at the command, and at the measured angle.
+    `rate`: gain of the rate loop alone, as it flies where rates are asked for; `command`, `angle`: with the angle loop
+    around it, cut at the command, and at the measured angle.
     """
 
     frequency: Array
@@ -94,34 +89,30 @@ def axis_loops(law: Law, axis: int, moved: Numbers, frequency: Array) -> AxisLoo
 
 
 def margins(frequency: Array, loop: Numbers) -> Margins:
-    """Compute the margins of a loop from its gains, shape (frequency,); gain and phase by python-control.
+    """Compute the margins of a loop from its gains, shape (frequency,).
 
-    References
-    ----------
     P. Seiler, A. Packard, P. Gahinet, An Introduction to Disk Margins, IEEE Control Systems 40(5), 2020.
     """
-    from control import FRD, stability_margins
-
     stable = bool(is_stable(frequency, loop))
-    system = FRD(loop, 2 * np.pi * frequency)
-    gain, phase, _, _, crossover, _ = (float(each) for each in stability_margins(system))
-    in_db = abs(20 * np.log10(gain)) if np.isfinite(gain) and gain > 0 else _MOST_DB
+    gain, phase, crossover = (float(each) for each in crossing_margins(frequency, loop))
     return Margins(
-        gain_db=min(in_db, _MOST_DB) if stable else nan,
-        phase_deg=min(abs(phase), _MOST_DEG) if stable else nan,
+        gain_db=min(gain, _MOST_DB) if stable else nan,
+        phase_deg=min(phase, _MOST_DEG) if stable else nan,
         disk_deg=float(np.degrees(2 * np.arctan(disk_of(loop) / 2))) if stable else 0.0,
-        crossover_hz=crossover / (2 * np.pi),
+        crossover_hz=crossover,
     )
 
 
 def crossing_margins(frequency: Array, loop: Numbers) -> tuple[Array, Array, Array]:
     """Find the margins of stable loops, shape (..., frequency), where their gain is 1 and where they turn it round.
 
+    Between two frequencies decibels, phase and the logarithm of the frequency are interpolated.
+
     Returns
     -------
     gain_db, phase_deg, crossover_hz : array, shape (...)
         The least change of gain and of phase that makes a loop unstable, infinite where none does, and the frequency at
-        which its gain is 1 with that phase.
+        which its gain is 1 with that phase, not a number where it never is.
     """
     decibels, turns = 20 * np.log10(np.abs(loop)), np.unwrap(np.angle(loop), axis=-1) / (2 * np.pi) - 0.5
 
@@ -136,8 +127,10 @@ def crossing_margins(frequency: Array, loop: Numbers) -> tuple[Array, Array, Arr
     gain = np.abs(at_crossing(turns, whole, decibels)).min(axis=-1)
     turned = at_crossing(decibels, np.zeros_like(whole), turns)
     phase = np.where(np.isfinite(turned), np.abs(turned - np.round(np.where(np.isfinite(turned), turned, 0))), np.inf)
-    at = np.take_along_axis(frequency[:-1] * np.ones_like(phase), phase.argmin(axis=-1)[..., None], axis=-1)[..., 0]
-    return gain, 360 * phase.min(axis=-1), at
+    found = phase.argmin(axis=-1)[..., None]
+    at = np.exp(at_crossing(decibels, np.zeros_like(whole), np.log(frequency)))
+    at = np.take_along_axis(at, found, axis=-1)[..., 0]
+    return gain, 360 * phase.min(axis=-1), np.where(np.isfinite(at), at, nan)
 
 
 def disk_of(loop: Numbers) -> Array:
@@ -166,13 +159,7 @@ def is_stable(frequency: Array, loop: Numbers) -> BoolArray:
 
 @dataclass(frozen=True)
 class StepAnswer:
-    """Answer to a step of the asked angle about each axis, in parts of it.
-
-    Attributes
-    ----------
-    time : array, shape (time,), s
-    angle : array, shape (time, 3)
-    """
+    """Answer to a step of the asked angle about each axis, in parts of it, shape (time, 3)."""
 
     time: Array
     angle: Array

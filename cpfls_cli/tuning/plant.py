@@ -115,19 +115,10 @@ class HoverPlant:
 
 
 def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, rotor_lag: float) -> HoverPlant:
-    """Linearise a vehicle in hover by the machine that flies it.
+    """Linearise a vehicle in hover, or a model in its place, by the machine that flies it.
 
-    Parameters
-    ----------
-    model : VehicleModel or None
-        In place of the vehicle.
-    rotor_lag : float, s
-        Of speeds behind commands, where the model does not say.
-
-    Raises
-    ------
-    ComputationError
-        If full thrust does not carry the weight.
+    `rotor_lag`: of speeds behind commands, s, where the model does not say. `ComputationError` where full thrust does
+    not carry the weight.
     """
     held, effects = with_effects(model, SimulatedEffects())
     flown = vehicle if held is None else held.vehicle

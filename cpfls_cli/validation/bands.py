@@ -138,15 +138,10 @@ def _batches(samples: int) -> Iterator[slice]:
 
 
 def definite_share(model: InertiaFunctions, draws: Draws) -> float | None:
-    """Compute the share of draws whose D(q) is positive definite at the centres of all cells that training visited.
+    """Compute the share of draws whose D(q) is positive definite at the centres of all cells visited; None without any.
 
     Cells within 17 degrees of a vertical pitch are left out, as they are from the windows replayed: there the smallest
     eigenvalue of every body falls with the square of cos(pitch), and all noise is larger.
-
-    Returns
-    -------
-    float or None
-        Share of all draws; None where no such cell was visited.
     """
     attitude = cell_centres(model.visited)
     attitude = attitude[np.abs(np.cos(attitude[:, 1])) >= CLEAR]

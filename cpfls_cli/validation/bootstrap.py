@@ -33,20 +33,10 @@ _MOST_PRODUCTS = 20_000_000
 
 @dataclass(frozen=True)
 class BlockScores:
-    """Least squares ``(A^T A + P) x = A^T tau`` by block.
+    """Least squares ``(A^T A + P) x = A^T tau`` by block b, with residuals r_b.
 
-    Attributes
-    ----------
-    gram : array, shape (blocks, parameters, parameters)
-        ``A_b^T A_b`` of each block.
-    score : array, shape (blocks, parameters)
-        ``A_b^T r_b`` of its residuals.
-    penalty : array, shape (parameters,)
-        Diagonal of P.
-    parameters : array, shape (parameters,)
-        x.
-    power : float, optional
-        Of the correction for what the fit has followed of the noise.
+    `gram`: ``A_b^T A_b``, shape (blocks, parameters, parameters); `score`: ``A_b^T r_b``, shape (blocks, parameters);
+    `penalty`: diagonal of P; `parameters`: x; `power`: of the correction for what the fit has followed of the noise.
     """
 
     gram: Array
@@ -74,12 +64,7 @@ class BlockScores:
         return np.asarray(weights @ np.einsum("bij,bj->bi", vectors, along) @ half.T)
 
     def with_penalty(self, penalty: Array, rank_tolerance: float) -> BlockScores:
-        """Solve the same least squares with another penalty.
-
-        Parameters
-        ----------
-        penalty : array, shape (parameters,)
-        """
+        """Solve the same least squares with another penalty."""
         half = replace(self, penalty=penalty)._half_inverse(rank_tolerance)
         # The scores add up to P x: taken from there, parameters without a penalty do not move by rounding.
         step = half @ (half.T @ ((self.penalty - penalty) * self.parameters))
@@ -154,46 +139,31 @@ def bootstrap(
 ) -> Draws:
     """Draw parameters by a wild bootstrap over contiguous blocks of samples.
 
-    The parameters x of the model solve ``(A^T A + P) x = A^T tau``. A draw adds
+    The parameters x of the model solve ``(A^T A + P) x = A^T tau``. A draw adds ``(A^T A + P)^-1 sum_b w_b (1 - A_b^T
+    A_b (A^T A + P)^-1)^(-3/4) A_b^T r_b``, r_b the residuals of block b and w_b standard normal. Drawing whole blocks
+    keeps whatever correlation the noise has within them; a block that is not drawn would leave parameters undetermined,
+    so blocks are weighted and not drawn with replacement. Residuals are smaller than the noise by what the fit has
+    followed of it, which the power undoes: -1/2 (CR2) gives the variance of white noise without bias, but the bands of
+    attitudes that few blocks speak of are then too narrow, -1 (CR3, the jackknife) gives bands that are too wide;
+    benchmarks/band_coverage.py.
 
-        (A^T A + P)^-1 sum_b w_b (1 - A_b^T A_b (A^T A + P)^-1)^(-3/4) A_b^T r_b,
-
-    r_b the residuals of block b and w_b standard normal. Drawing whole blocks keeps whatever correlation the noise has
-    within them; a block that is not drawn would leave parameters undetermined, so blocks are weighted and not drawn
-    with replacement. Residuals are smaller than the noise by what the fit has followed of it, which the power undoes:
-    -1/2 (CR2) gives the variance of white noise without bias, but the bands of attitudes that few blocks speak of are
-    then too narrow, -1 (CR3, the jackknife) gives bands that are too wide; benchmarks/band_coverage.py.
-
-    A ridge pulls the parameters towards a rigid body, most where the samples say least. What it hides cannot be told
+    A ridge pulls the parameters towards a rigid body, most where the samples say least. What it hides cannot be seen
     from the parameters that it has shrunk, so the band of a model with a ridge does not lean on it: the sum above is
     taken under the weakest ridge that has a meaning, P_1, with the residuals r_b that it leaves, and to it are added
-
-        (A^T A + P_1)^-1 P_1 z  and  0.75 u (x_1 - x),
-
-    x_1 its parameters, z and u standard normal. P_1 is the mean squared residual of a row: it takes fuzzy parameters
-    for normal numbers of variance 1, each of which alone would make a torque as large as the flight has. The first
-    term is what that leaves open: of directions that the samples do not determine the whole of it, of determined
-    ones nothing. The second is the bias of the model, as far as the flight shows it.
+    ``(A^T A + P_1)^-1 P_1 z`` and ``0.75 u (x_1 - x)``, x_1 its parameters, z and u standard normal. P_1 is the mean
+    squared residual of a row: it takes fuzzy parameters for normal numbers of variance 1, each of which alone would
+    make a torque as large as the flight has. The first term is what that leaves open: of directions that the samples do
+    not determine the whole of it, of determined ones nothing. The second is the bias of the model, as far as the flight
+    shows it.
 
     Partitions and ridge weight are held at the model's. Without a ridge, what the samples do not determine stays where
     it is, at the smallest norm: there a band is what the structure does at attitudes that were not visited, not what
     the vehicle does. The same holds of a fuzzy part that the ridge switched off.
 
-    Parameters
-    ----------
-    evaluator : Evaluator
-        Of the data that the model was identified from.
-    training : TorqueSource
-        The whole training part, which the blocks divide.
-    fit : Fit
-        Gives the ridge.
-
-    References
-    ----------
-    Cameron, Gelbach and Miller, Review of Economics and Statistics 90 (2008), 414 (wild bootstrap by cluster);
-    Bell and McCaffrey, Survey Methodology 28 (2002), 169 (CR2, CR3); Nychka, Journal of the American Statistical
-    Association 83 (1988), 1134, and Marra and Wood, Scandinavian Journal of Statistics 39 (2012), 53 (bands that hold
-    their truth because the variance of what is left open contains the bias).
+    Cameron, Gelbach and Miller, Review of Economics and Statistics 90 (2008), 414 (wild bootstrap by cluster); Bell and
+    McCaffrey, Survey Methodology 28 (2002), 169 (CR2, CR3); Nychka, Journal of the American Statistical Association 83
+    (1988), 1134, and Marra and Wood, Scandinavian Journal of Statistics 39 (2012), 53 (bands that hold their truth
+    because the variance of what is left open contains the bias).
     """
     columns = RIGID + len(model.coefficients)
     blocks = time_blocks(training, settings.block_s, _MOST_PRODUCTS // columns**2)

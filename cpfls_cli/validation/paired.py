@@ -29,17 +29,11 @@ _LOST = 10.0
 
 @dataclass(frozen=True)
 class Comparison:
-    """Errors of a model beside those of a rival.
+    """Mean squared errors of a model beside those of a rival.
 
-    Attributes
-    ----------
-    ours, theirs : float
-        Mean squared errors.
-    ratio : float
-        ``ours / theirs``; 1 where they differ by no more than rounding, infinite where theirs alone are rounding.
-    lower, higher : bool
-        Whether ours are lower, or higher, by more than chance: so is the mean over all blocks, and the mean logarithm
-        of the ratio by block is outside its 95 % interval about 0.
+    Ratio ``ours / theirs`` is 1 where they differ by no more than rounding, infinite where theirs alone are rounding.
+    Ours are lower, or higher, by more than chance: so is the mean over all blocks, and the mean logarithm of the ratio
+    by block is outside its 95 % interval about 0.
     """
 
     ours: float
@@ -51,22 +45,11 @@ class Comparison:
 
 
 def compare_errors(ours: Array, theirs: Array, size: float) -> Comparison:
-    """Compare mean squared errors by Student's test of the paired logarithms.
+    """Compare mean squared errors of the same blocks by Student's test of the paired logarithms.
 
     Logarithms, since errors differ from block to block by orders of magnitude, and one bad block should neither decide
-    nor, by the scatter that it makes, hide that all the others agree.
-
-    Parameters
-    ----------
-    ours, theirs : array, shape (blocks,)
-        Of the same blocks.
-    size : float
-        Mean square of what is predicted; errors below 1e-18 of it are rounding.
-
-    Returns
-    -------
-    Comparison
-        Neither lower nor higher with fewer than four blocks, which can prove nothing.
+    nor, by the scatter that it makes, hide that all the others agree. Errors below 1e-18 of the mean square of what is
+    predicted, `size`, are rounding. Fewer than four blocks can prove nothing.
     """
     if len(ours) == 0:
         return Comparison(float("nan"), float("nan"), 1.0, False, False, 0)
@@ -90,36 +73,16 @@ def _block_means(errors: Array, block: IntArray) -> Array:
 
 
 def block_count(errors: Array) -> int:
-    """Count the contiguous blocks, independent of each other, that errors can be cut into.
+    """Count the contiguous blocks, 1 to 20, independent of each other, that errors of samples can be cut into.
 
     Each block has 20 samples at least, and four correlation times of the errors.
-
-    Parameters
-    ----------
-    errors : array, shape (samples, signals)
-        In the order of time.
-
-    Returns
-    -------
-    int
-        1 to 20.
     """
     longest = max(_SHORTEST_BLOCK, _CORRELATION_TIMES * correlation_time(errors[:_MOST_SAMPLES]))
     return min(max(len(errors) // longest, 1), MOST_COMPARED)
 
 
 def correlation_time(signals: Array) -> int:
-    """Find the first lag at which the autocorrelation of every signal has fallen to 1/e.
-
-    Parameters
-    ----------
-    signals : array, shape (samples, signals)
-
-    Returns
-    -------
-    int
-        Samples; 0 where nothing varies.
-    """
+    """Find the first lag, in samples, at which the autocorrelation of every signal is down to 1/e; 0 for constants."""
     if len(signals) == 0:
         return 0
     centred = signals - np.mean(signals, axis=0)
@@ -130,18 +93,7 @@ def correlation_time(signals: Array) -> int:
 
 
 def mean_missing_torque(source: TorqueSource, torque: Callable[[Motion], Array]) -> Array:
-    """Average the body torque that a model misses, measured minus predicted, away from a vertical pitch.
-
-    Parameters
-    ----------
-    torque : callable
-        Predicts the generalised torque of a motion.
-
-    Returns
-    -------
-    array, shape (3,), N m, body frame
-        0 where the pitch is vertical throughout.
-    """
+    """Average the body torque that a model misses, measured minus predicted, N m, away from a vertical pitch."""
     total, count = np.zeros(3), 0
     for data in source.chunks():
         missing = _upright(data, data.torque - torque(data.motion))
@@ -157,14 +109,7 @@ def _upright(data: TorqueData, torque: Array) -> Array:
 
 
 def with_constant(torque: Callable[[Motion], Array], constant: Array) -> Callable[[Motion], Array]:
-    """Add a constant body torque to the predictions of a model.
-
-    Parameters
-    ----------
-    torque : callable
-        Predicts the generalised torque of a motion.
-    constant : array, shape (3,), N m, body frame
-    """
+    """Add a constant body torque, N m, to the generalised torque that a model predicts of a motion."""
 
     def predicted(motion: Motion) -> Array:
         everywhere = np.broadcast_to(constant, (len(motion), 3))
@@ -176,18 +121,10 @@ def with_constant(torque: Callable[[Motion], Array], constant: Array) -> Callabl
 def compare_torque(
     source: TorqueSource, ours: Callable[[Motion], Array], theirs: Callable[[Motion], Array]
 ) -> Comparison:
-    """Compare the errors of body torque over contiguous blocks of held-out data.
+    """Compare the errors of body torque over contiguous blocks of a held-out part, as many as `block_count` grants.
 
-    There are as many blocks as `block_count` grants the errors. Errors are scaled by the root mean square of the
-    torque about each axis, so that the smallest counts as much as the largest, and left out near a pitch of +-90
-    degrees, as in `Score.r2_body`.
-
-    Parameters
-    ----------
-    source : TorqueSource
-        One held-out part.
-    ours, theirs : callable
-        Predict the generalised torque of a motion.
+    Errors are scaled by the root mean square of the torque about each axis, so that the smallest counts as much as the
+    largest, and left out near a pitch of +-90 degrees, as in `Score.r2_body`.
     """
     scale = _scale(source)
     chunks = (
@@ -215,23 +152,9 @@ def _scale(source: TorqueSource) -> Array:
 
 
 def compare_windows(ours: Array, theirs: Array, size: float, block: IntArray) -> Comparison:
-    """Compare the errors of windows that do not overlap, block by block.
+    """Compare mean squared errors of windows that do not overlap, by the block of each; without blocks for no window.
 
     A window that one of both lost counts as ten times the largest error of all; one that both lost is left out.
-
-    Parameters
-    ----------
-    ours, theirs : array, shape (window,)
-        Mean squared errors, not finite where a run was lost.
-    size : float
-        Mean square of what is predicted.
-    block : array of int, shape (window,)
-        Of each window.
-
-    Returns
-    -------
-    Comparison
-        Without blocks where no window is left.
     """
     both, kept = np.stack([ours, theirs]), np.isfinite(ours) | np.isfinite(theirs)
     worst = _LOST * max(float(np.max(both[np.isfinite(both)], initial=0.0)), size)
@@ -240,20 +163,7 @@ def compare_windows(ours: Array, theirs: Array, size: float, block: IntArray) ->
 
 
 def non_overlapping(start: IntArray, horizon: int) -> IntArray:
-    """Select windows that do not overlap, from the first on.
-
-    Parameters
-    ----------
-    start : array of int, shape (window,)
-        First sample, ascending.
-    horizon : int
-        Samples behind it.
-
-    Returns
-    -------
-    array of int
-        Their numbers.
-    """
+    """Select windows that do not overlap, from the first on, by their first samples and the samples behind them."""
     chosen, free = [], 0
     for number, first in enumerate(start):
         if first >= free:

@@ -44,14 +44,8 @@ class Physics:
 def physical_sense(model: InertiaFunctions, rng: np.random.Generator) -> Physics:
     """Check the plausibility of a model at the cells that training visited, and its D(q) at all cells.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Draws an attitude rate for every cell.
-
-    References
-    ----------
-    Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 6.5 (skew symmetry, passivity).
+    An attitude rate is drawn for every cell. Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 6.5
+    (skew symmetry, passivity).
     """
     attitude, everywhere = cell_centres(model.visited), cell_centres(np.ones_like(model.visited))
     anywhere = int(np.sum(not_positive_definite(model.inertia(everywhere).value, everywhere)))
@@ -72,20 +66,7 @@ def physical_sense(model: InertiaFunctions, rng: np.random.Generator) -> Physics
 
 
 def energy_share(values: InertiaValues, coriolis: Array, rate: Array) -> float:
-    """Compute the power of ``dD/dt - 2 C`` relative to the sizes of its terms.
-
-    Parameters
-    ----------
-    coriolis : array, shape (samples, 3, 3), kg m^2/s
-        C.
-    rate : array, shape (samples, 3), rad/s
-        Euler rates.
-
-    Returns
-    -------
-    float
-        The largest over the samples; 0 where no term is.
-    """
+    """Compute the largest power of ``dD/dt - 2 C`` relative to the sizes of its terms; 0 where no term is."""
     along = np.einsum("nkij,nk->nij", values.gradient, rate)
     outer = rate[:, :, None] * rate[:, None, :]
     terms = np.stack([along * outer, -2.0 * coriolis * outer], axis=1)
@@ -94,17 +75,9 @@ def energy_share(values: InertiaValues, coriolis: Array, rate: Array) -> float:
 
 
 def cell_centres(visited: BoolArray) -> Array:
-    """Compute the attitudes at the centres of cells, without those near a pitch of +-90 degrees.
+    """Compute the attitudes, rad, yaw 0, at the centres of visited cells but those near a pitch of +-90 degrees.
 
-    Parameters
-    ----------
-    visited : array of bool, shape (cells, cells)
-        Cells of roll and pitch, roll along the first axis, from -180 degrees.
-
-    Returns
-    -------
-    array, shape (visited cells, 3), rad
-        The yaw is 0.
+    Roll is along the first axis of the cells, from -180 degrees.
     """
     roll, pitch = np.nonzero(visited)
     centres = (np.stack([roll, pitch, np.zeros_like(roll)], axis=1) + 0.5) * (2 * np.pi / CELLS) - np.pi
@@ -128,15 +101,7 @@ class PeriodErrors:
 def one_period_away(model: InertiaFunctions, parts: Mapping[str, TorqueSource]) -> PeriodErrors | None:
     """Compute the errors of a model with roll one turn on, and with pitch one turn back, against the same torque.
 
-    Parameters
-    ----------
-    parts : mapping of str to TorqueSource
-        By name.
-
-    Returns
-    -------
-    PeriodErrors or None
-        None where the inputs of the model are not those of the full circle.
+    None where the inputs of the model are not those of the full circle.
     """
     if model.structure.settings.input_map != "full-circle":
         return None

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.identification.findings import AXES
 from cpfls_cli.result import About
-from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
+from cpfls_cli.validation.evidence import MODEL, RIGID_BODY, Evidence
 from cpfls_cli.validation.paired import Comparison
 from cpfls_cli.validation.replay import NOTHING_MOVES
 
@@ -34,34 +34,22 @@ class Reason(NamedTuple):
 
 
 def numbers(values: Array, shown: BoolArray | None = None) -> str:
-    """Format the values of the three axes.
-
-    Parameters
-    ----------
-    values : array, shape (3,)
-    shown : array of bool, shape (3,), optional
-        Axes to print; all by default.
-
-    Returns
-    -------
-    str
-        As ``roll 0.95 pitch 0.97 yaw 0.23``.
-    """
+    """Format the values of the three axes, or of those shown, as ``roll 0.95 pitch 0.97 yaw 0.23``."""
     axes = np.flatnonzero(np.ones(3, dtype=bool) if shown is None else shown)
     return " ".join(f"{AXES[axis]} {values[axis]:.3g}" for axis in axes)
 
 
-def reasons(grounds: Grounds) -> Iterator[Reason]:
+def reasons(evidence: Evidence) -> Iterator[Reason]:
     """List the reasons for and against a model, the most important first."""
     of_errors = (_held_out, _hardly_excited, _beside_rigid_body, _constant, _steps, _lost)
     of_inertia = (_definite, _draws, _elsewhere, _fuzzy_part, _determined)
     for rule in (*of_errors, *of_inertia, _band, _search, _outside, _white):
-        yield from rule(grounds)
+        yield from rule(evidence)
 
 
-def _definite(grounds: Grounds) -> Iterator[Reason]:
-    physics = grounds.physics
-    if physics.cells and not grounds.impossible:
+def _definite(evidence: Evidence) -> Iterator[Reason]:
+    physics = evidence.physics
+    if physics.cells and not evidence.impossible:
         yield Reason(
             f"D(q) is positive definite in all {physics.cells} cells of attitude that training visited; its smallest "
             f"eigenvalue is {physics.smallest_eigenvalue:.3g} kg m^2",
@@ -69,33 +57,33 @@ def _definite(grounds: Grounds) -> Iterator[Reason]:
         )
 
 
-def _draws(grounds: Grounds) -> Iterator[Reason]:
-    share = grounds.definite
-    if share is not None and not grounds.impossible:
+def _draws(evidence: Evidence) -> Iterator[Reason]:
+    share = evidence.definite
+    if share is not None and not evidence.impossible:
         text = f"D(q) is positive definite in all cells away from vertical pitch in {100 * share:.3g} % of the draws"
         enough = share >= DEFINITE_SHARE
         yield Reason(text if enough else f"{text}; {100 * DEFINITE_SHARE:g} % are required", FOR if enough else AGAINST)
 
 
-def _elsewhere(grounds: Grounds) -> Iterator[Reason]:
+def _elsewhere(evidence: Evidence) -> Iterator[Reason]:
     """Report attitudes without a definite D(q) that training, though it went all round, did not visit."""
-    physics = grounds.physics
-    if grounds.one_rule and not grounds.impossible and physics.indefinite_anywhere:
+    physics = evidence.physics
+    if evidence.one_rule and not evidence.impossible and physics.indefinite_anywhere:
         text = f"D(q) is not positive definite in {physics.indefinite_anywhere} of {physics.every_cell} cells of roll"
         yield Reason(f"{text} and pitch, but in none that training visited", AGAINST)
 
 
-def _fuzzy_part(grounds: Grounds) -> Iterator[Reason]:
-    if grounds.fuzzy_part_off:
+def _fuzzy_part(evidence: Evidence) -> Iterator[Reason]:
+    if evidence.fuzzy_part_off:
         text = "cross-validation switched the fuzzy part off: no evidence for an inertia that depends on attitude"
         yield Reason(text, AGAINST)
 
 
-def _determined(grounds: Grounds) -> Iterator[Reason]:
-    result = grounds.identification
-    if grounds.fuzzy_part_off:
+def _determined(evidence: Evidence) -> Iterator[Reason]:
+    result = evidence.identification
+    if evidence.fuzzy_part_off:
         return
-    if grounds.determined:
+    if evidence.determined:
         yield Reason(f"every coefficient is determined; condition number {result.system.condition_number:.3g}", FOR)
     else:
         share, weak = 100 * float(np.mean(result.excitation.determined)), int(np.sum(~result.excitation.excited))
@@ -103,11 +91,11 @@ def _determined(grounds: Grounds) -> Iterator[Reason]:
         yield Reason(f"{share:.3g} % of what the rules could express is determined by the flight; {rules}", AGAINST)
 
 
-def _band(grounds: Grounds) -> Iterator[Reason]:
-    if grounds.band is None:
+def _band(evidence: Evidence) -> Iterator[Reason]:
+    if evidence.band is None:
         return
-    widest = float(np.max(grounds.band))
-    freed = grounds.identification.freed
+    widest = float(np.max(evidence.band))
+    freed = evidence.identification.freed
     if freed is not None:
         # Draws know the scatter of the torque that was freed, not that of what freed it.
         widest = max(widest, *(2 * np.sinh(freed.half[freed.identified])).tolist())
@@ -116,27 +104,27 @@ def _band(grounds: Grounds) -> Iterator[Reason]:
     yield Reason(text, FOR if widest < 1 else AGAINST)
 
 
-def _search(grounds: Grounds) -> Iterator[Reason]:
-    result = grounds.identification
+def _search(evidence: Evidence) -> Iterator[Reason]:
+    result = evidence.identification
     if not result.complete:
         done = len(result.history.evaluations) - 1
         text = f"the search stopped before its end ({result.stop_reason}, after {done} generations)"
         yield Reason(f"{text}: better partitions may exist", AGAINST)
 
 
-def _outside(grounds: Grounds) -> Iterator[Reason]:
-    result = grounds.identification
+def _outside(evidence: Evidence) -> Iterator[Reason]:
+    result = evidence.identification
     counts = (result.outside, result.samples)
-    outside, samples = (sum(count[part] for part in grounds.held_out) for count in counts)
-    if outside and not (grounds.fuzzy_part_off or grounds.everywhere):
+    outside, samples = (sum(count[part] for part in evidence.held_out) for count in counts)
+    if outside and not (evidence.fuzzy_part_off or evidence.everywhere):
         yield Reason(
             f"{100 * outside / samples:.3g} % of the held-out samples lie outside the attitudes that training visited",
             NEITHER,
         )
 
 
-def _white(grounds: Grounds) -> Iterator[Reason]:
-    errors = grounds.residuals
+def _white(evidence: Evidence) -> Iterator[Reason]:
+    errors = evidence.residuals
     tested = np.flatnonzero(np.isfinite(errors.ljung_box))
     biased = np.flatnonzero(errors.mean_p < _NOT_WHITE)
     if len(biased):
@@ -159,53 +147,53 @@ def _printed(p_value: float) -> str:
     return f"{p_value:.2g}" if p_value > _SMALLEST_P else f"below {_SMALLEST_P:g}"
 
 
-def _held_out(grounds: Grounds) -> Iterator[Reason]:
-    r2 = grounds.r2(MODEL)
-    if not grounds.held_out:
+def _held_out(evidence: Evidence) -> Iterator[Reason]:
+    r2 = evidence.r2(MODEL)
+    if not evidence.held_out:
         yield Reason(
             f"judged only on its own training data (R2 of body torque {numbers(r2)}), which says nothing about other "
             "flights: hold some out with identification.training_share below 1, or --validate another flight",
             AGAINST,
         )
         return
-    low = [name for name, value in zip(AXES, r2, strict=True) if not value >= grounds.r2_min]
-    parts = f"worst of {len(grounds.held_out)} held-out parts" if len(grounds.held_out) > 1 else "held out"
+    low = [name for name, value in zip(AXES, r2, strict=True) if not value >= evidence.r2_min]
+    parts = f"worst of {len(evidence.held_out)} held-out parts" if len(evidence.held_out) > 1 else "held out"
     text = f"R2 of body torque, {parts}: {numbers(r2)}"
     if low:
-        yield Reason(f"{text}; below {grounds.r2_min:g} about {', '.join(low)}", AGAINST)
+        yield Reason(f"{text}; below {evidence.r2_min:g} about {', '.join(low)}", AGAINST)
     else:
-        yield Reason(f"{text}; {grounds.r2_min:g} or more about every axis", FOR)
+        yield Reason(f"{text}; {evidence.r2_min:g} or more about every axis", FOR)
 
 
-def _hardly_excited(grounds: Grounds) -> Iterator[Reason]:
-    for axis in np.flatnonzero(grounds.hardly_excited):
-        ours, still = grounds.rate_error(MODEL)[axis], grounds.rate_error(NOTHING_MOVES)[axis]
+def _hardly_excited(evidence: Evidence) -> Iterator[Reason]:
+    for axis in np.flatnonzero(evidence.hardly_excited):
+        ours, still = evidence.rate_error(MODEL)[axis], evidence.rate_error(NOTHING_MOVES)[axis]
         text = f"{AXES[axis]} barely moves in training: its rate is predicted with an error of {ours:.3g} rad/s"
         if not np.isfinite(ours):
             yield Reason(f"{AXES[axis]} barely moves in training, and windows of it cannot be replayed", AGAINST)
-        elif grounds.beats_nothing_moves(MODEL)[axis]:
+        elif evidence.beats_nothing_moves(MODEL)[axis]:
             neither = "which is better by more than chance but confirms no model of its torque"
             yield Reason(f"{text}, {still:.3g} if nothing moved, {neither}", NEITHER)
         else:
             yield Reason(f"{text}, {still:.3g} if nothing moved: not better by more than chance", AGAINST)
 
 
-def _beside_rigid_body(grounds: Grounds) -> Iterator[Reason]:
-    several = len(grounds.held_out) > 1
-    for part, compared in grounds.torque.items():
+def _beside_rigid_body(evidence: Evidence) -> Iterator[Reason]:
+    several = len(evidence.held_out) > 1
+    for part, compared in evidence.torque.items():
         where = f" ({part})" if several else ""
         yield _compared(f"squared error of held-out torque{where}", compared)
-    for part, steps in grounds.replayed.items():
+    for part, steps in evidence.replayed.items():
         if steps.windows:
-            compared = grounds.replay_beside(part, MODEL, RIGID_BODY)
+            compared = evidence.replay_beside(part, MODEL, RIGID_BODY)
             reason = _compared(f"squared error of the replayed body rate ({part})", compared)
             # What was learned from is no witness.
-            yield reason if part in grounds.held_out else Reason(reason.text, NEITHER)
+            yield reason if part in evidence.held_out else Reason(reason.text, NEITHER)
 
 
-def _constant(grounds: Grounds) -> Iterator[Reason]:
+def _constant(evidence: Evidence) -> Iterator[Reason]:
     """Name a constant torque that is large beside the noise, and not negligible beside the torque."""
-    axes = grounds.identification.axes
+    axes = evidence.identification.axes
     constant, noise = np.abs(axes.constant), axes.torque * np.sqrt(np.clip(1.0 - axes.r2, 0.0, None))
     for axis in np.flatnonzero((constant > _LARGE_BESIDE_NOISE * noise) & (constant > _SMALL * axes.torque)):
         share = f"{100 * constant[axis] / axes.torque[axis]:.3g} % of its torque"
@@ -226,8 +214,8 @@ def _compared(what: str, errors: Comparison) -> Reason:
     return Reason(f"{text}, which may be chance over {errors.blocks} blocks", AGAINST)
 
 
-def _steps(grounds: Grounds) -> Iterator[Reason]:
-    steps = grounds.steps
+def _steps(evidence: Evidence) -> Iterator[Reason]:
+    steps = evidence.steps
     if not steps.windows:
         yield Reason(f"{steps.part}: no stretch without a pause or a vertical pitch to replay torques on", NEITHER)
         return
@@ -242,10 +230,10 @@ def _steps(grounds: Grounds) -> Iterator[Reason]:
         )
 
 
-def _lost(grounds: Grounds) -> Iterator[Reason]:
-    if grounds.lost(MODEL):
+def _lost(evidence: Evidence) -> Iterator[Reason]:
+    if evidence.lost(MODEL):
         yield Reason(
-            f"{grounds.lost(MODEL)} of {grounds.windows} replayed windows do not run to the end: D(q) is not "
+            f"{evidence.lost(MODEL)} of {evidence.windows} replayed windows do not run to the end: D(q) is not "
             "positive definite there, or the model turns faster than any step of integration",
             AGAINST,
         )

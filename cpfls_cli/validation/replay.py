@@ -30,17 +30,10 @@ NOTHING_MOVES = "nothing-moves"
 
 @dataclass(frozen=True)
 class MeasuredWindows:
-    """Measured motion and torque in windows of equal length.
+    """Measured motion and torque in windows of equal length, shape (window, sample, ...).
 
-    Attributes
-    ----------
-    time : array, shape (window, sample), s
-    rotation : array, shape (window, sample, 3, 3)
-        Body to world.
-    body_rate : array, shape (window, sample, 3), rad/s, body frame
-    torque : array, shape (window, sample, 3), N m, body frame
-    beyond : array of bool, shape (window,)
-        Whether the pitch of the flight is beyond +-90 degrees; in no window it crosses them.
+    Time in s, rotation from body to world, body rate in rad/s and torque in N m in the body frame. `beyond`: whether
+    the pitch of the flight is beyond +-90 degrees; in no window it crosses them.
     """
 
     time: Array
@@ -57,16 +50,9 @@ class MeasuredWindows:
 
 @dataclass(frozen=True)
 class WindowPlan:
-    """Starts and length of windows.
+    """First samples of windows, ascending, and the samples behind each.
 
-    Attributes
-    ----------
-    start : array of int, shape (window,)
-        Sample, ascending.
-    horizon : int
-        Samples behind the start; fewer than asked for where no window of that length fits.
-    period : float, s
-        Usual time between samples.
+    Those are fewer than asked for where no window of that length fits; `period` is the usual time between samples, s.
     """
 
     start: IntArray
@@ -77,18 +63,7 @@ class WindowPlan:
 def plan_windows(source: TorqueSource, horizon: int, most: int) -> WindowPlan:
     """Select windows, evenly spread over all that hold no pause and no pitch within 17 degrees of the vertical.
 
-    Parameters
-    ----------
-    source : TorqueSource
-    horizon : int
-        Samples; halved until a window fits.
-    most : int
-        Windows.
-
-    Returns
-    -------
-    WindowPlan
-        Without windows where not even one of a single step fits.
+    The horizon is halved until a window fits; none where not even a single step does.
     """
     time = sample_times(source)
     stretch = stretch_numbers(time)
@@ -181,33 +156,13 @@ def replay_steps(
     windows: int,
     missing: Mapping[str, Array] = MappingProxyType({}),
 ) -> StepErrors:
-    """Replay measured torques from many starts and compare the motion with the measured one.
+    """Replay measured body torques from many starts and compare the motion with the measured one.
 
-    The body torque is that measured, whatever attitude the prediction has come to.
-
-    Parameters
-    ----------
-    part : str
-        Name of the part of the data.
-    source : TorqueSource
-    predictors : mapping of str to InertiaModel or array, shape (6,)
-        By name; an array holds the inertia parameters of a rigid body.
-    horizon_samples : int
-        Length of the windows; shorter where the data have no window of that length without a pause.
-    windows : int
-        Windows at most, evenly spread.
-    missing : mapping of str to array, shape (3,), N m, body frame, optional
-        Constant torque that a predictor misses, which is not its inertia's; taken off what was measured.
-
-    Returns
-    -------
-    StepErrors
-        NaN throughout where the data have no window at all.
-
-    References
-    ----------
-    Measure and predictor `NOTHING_MOVES`: Busetto, Cereda, Forgione and others, Nonlinear System Identification
-    Nano-drone Benchmark, arXiv:2512.14450 (2025).
+    The torque is that measured, whatever attitude the prediction has come to, less the constant body torque that a
+    predictor misses (N m, by name), which is not its inertia's. An array among the predictors holds the six inertia
+    parameters of a rigid body. At most so many windows, evenly spread, shorter where the data have none of that length
+    without a pause; NaN without any. Measure and predictor `NOTHING_MOVES`: Busetto, Cereda, Forgione and others,
+    Nonlinear System Identification Nano-drone Benchmark, arXiv:2512.14450 (2025).
     """
     plan, names = plan_windows(source, horizon_samples, windows), (*predictors, NOTHING_MOVES)
     sums = [_SquaredErrors(plan.horizon) for _ in names]

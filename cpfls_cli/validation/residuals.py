@@ -84,21 +84,8 @@ class ResidualAnalysis:
 def examine_residuals(
     part: str, source: TorqueSource, torque: Callable[[Motion], Array], lags: int
 ) -> ResidualAnalysis:
-    """Examine the torque errors of a model in the order of time.
+    """Examine the torque errors of a model in the order of time, of the first 200 000 samples, up to the largest lag.
 
-    Parameters
-    ----------
-    part : str
-        Name of the part of the data.
-    source : TorqueSource
-        Its first 200 000 samples are examined.
-    torque : callable
-        Predicts the generalised torque of a motion.
-    lags : int
-        Largest lag, in samples.
-
-    References
-    ----------
     Ljung, System Identification: Theory for the User, section 16.6 (residual analysis).
     """
     data = gathered(source, np.arange(min(len(source), _MOST_SAMPLES)))
@@ -141,29 +128,11 @@ def autocorrelation(errors: Array, number: IntArray, without: BoolArray, lags: i
     """Compute the autocorrelation of errors about their mean, and the p-value of the test of Ljung and Box.
 
     ``r_k = sum_k e(t) e(t + k) / sum e^2`` over the n_k pairs that are k samples apart, whatever is missing between
-    them. ``Q = n (n + 2) sum_k r_k^2 / n_k`` is held against chi square with as many degrees of freedom as lags.
-
-    Parameters
-    ----------
-    errors : array, shape (samples, 3)
-    number : array of int, shape (samples,)
-        As from `sample_numbers`.
-    without : array of bool, shape (3,)
-        Axes without errors, whose rounding nobody should take for a signal.
-    lags : int
-        Largest lag, in samples.
-
-    Returns
-    -------
-    value : array, shape (lag, 3)
-        From one sample on; NaN for an axis without errors. Fewer lags than asked for where all stretches are short.
-    p_value : array, shape (3,)
-        Small where the errors are not white; NaN for an axis without errors.
-
-    References
-    ----------
-    Box, Jenkins and Reinsel, Time Series Analysis, section 2.1.6; Ljung and Box, Biometrika 65 (1978), 297; with
-    missing samples: Stoffer and Toloi, Statistics and Probability Letters 13 (1992), 391.
+    them. ``Q = n (n + 2) sum_k r_k^2 / n_k`` is held against chi square with as many degrees of freedom as lags. Shapes
+    (lag, 3), from one sample on, and (3,): small where the errors are not white; NaN for axes `without` errors, whose
+    rounding nobody should take for a signal. Fewer lags than asked for where all stretches are short. Box, Jenkins and
+    Reinsel, Time Series Analysis, section 2.1.6; Ljung and Box, Biometrika 65 (1978), 297; with missing samples:
+    Stoffer and Toloi, Statistics and Probability Letters 13 (1992), 391.
     """
     samples, centred = len(errors), errors - errors.mean(axis=0)
     products, pairs = _products(centred, number, min(lags, samples // _FEWEST_PER_LAG))
@@ -187,22 +156,11 @@ def _products(centred: Array, number: IntArray, lags: int) -> tuple[Array, IntAr
 
 
 def mean_p_value(errors: Array, without: BoolArray) -> Array:
-    """Test whether errors are 0 in the mean, by Student's test of their means over blocks of time.
+    """Test whether errors are 0 in the mean, by Student's test of their means over blocks of time; small where not.
 
     ``t = m / (s / sqrt B)`` with m the mean and s the standard deviation of the B block means. Neighbouring errors are
-    alike where filters were at work, so that they count as fewer than they are; means over long blocks are not.
-
-    Parameters
-    ----------
-    errors : array, shape (samples, 3)
-        In the order of time.
-    without : array of bool, shape (3,)
-        Axes without errors.
-
-    Returns
-    -------
-    array, shape (3,)
-        Small where the mean is not 0; NaN for an axis without errors, and for all of fewer than four samples.
+    alike where filters were at work, so that they count as fewer than they are; means over long blocks are not. NaN for
+    an axis without errors, and for all of fewer than four samples.
     """
     blocks = min(max(len(errors) // _FEWEST_SAMPLES, FEWEST_BLOCKS), MOST_COMPARED)
     if len(errors) < blocks:
@@ -216,14 +174,7 @@ def mean_p_value(errors: Array, without: BoolArray) -> Array:
 
 @dataclass(frozen=True)
 class ModelInputs:
-    """Inputs of a model, which its errors may be correlated with.
-
-    Attributes
-    ----------
-    value : array, shape (samples, input)
-    varies : array of bool, shape (input,)
-        False for constants, that nothing can be correlated with.
-    """
+    """Inputs of a model, shape (samples, input), which its errors may be correlated with where they vary."""
 
     name: tuple[str, ...]
     value: Array
@@ -231,19 +182,9 @@ class ModelInputs:
 
 
 def model_inputs(data: TorqueData, predicted: Array) -> ModelInputs:
-    """List the inputs of a model, attitude, Euler rates and accelerations, and the torque that it predicts.
+    """List the inputs of a model (attitude within one turn, Euler rates, accelerations) and the torque it predicts.
 
     Not the measured torque, which holds the error and so is correlated with it even where the model is perfect.
-
-    Parameters
-    ----------
-    predicted : array, shape (samples, 3), N m
-        Torque of the model.
-
-    Returns
-    -------
-    ModelInputs
-        Angles within one turn.
     """
     motion, axes = data.motion, ("roll", "pitch", "yaw")
     kinds = {
@@ -264,23 +205,9 @@ def model_inputs(data: TorqueData, predicted: Array) -> ModelInputs:
 def cross_correlation(errors: Array, inputs: ModelInputs, number: IntArray, without: BoolArray, lags: int) -> Array:
     """Compute the cross-correlation of errors with inputs at lags to both sides, both about their means.
 
-    ``r(k) = sum_k u(t) e(t + k) / sqrt(sum u^2 sum e^2)`` over the pairs that are k samples apart.
-
-    Parameters
-    ----------
-    errors : array, shape (samples, 3)
-    number : array of int, shape (samples,)
-        As from `sample_numbers`.
-    without : array of bool, shape (3,)
-        Axes without errors.
-    lags : int
-        Largest lag to both sides, in samples.
-
-    Returns
-    -------
-    array, shape (input, 2 lags + 1, 3)
-        From the most negative lag on; at a positive lag the error follows the input. NaN for constant inputs and axes
-        without errors.
+    ``r(k) = sum_k u(t) e(t + k) / sqrt(sum u^2 sum e^2)`` over the pairs that are k samples apart; shape (input, 2 lags
+    + 1, 3), from the most negative lag on: at a positive lag the error follows the input. NaN for constant inputs and
+    axes without errors.
     """
     e, u = errors - errors.mean(axis=0), inputs.value - inputs.value.mean(axis=0)
     products = np.zeros((2 * lags + 1, u.shape[1], e.shape[1]))

@@ -40,15 +40,10 @@ RIGID_BODY_NAME = "rigid body"
 
 
 def candidate_structures(model: StructureSettings) -> tuple[StructureSettings, ...]:
-    """List a structure and those that differ from it in one choice.
+    """List a structure, and those that differ from it in one choice; the same model is listed once.
 
     The choices are the number of membership functions, the input map, and the consequents: the triangle wave, or
     harmonics up to the first, second or third order.
-
-    Returns
-    -------
-    tuple of StructureSettings
-        The structure itself first; structures that are the same model are listed once.
     """
     structure = StructureSettings(**{field.name: getattr(model, field.name) for field in fields(StructureSettings)})
     different: dict[tuple[Any, ...], StructureSettings] = {}
@@ -58,13 +53,7 @@ def candidate_structures(model: StructureSettings) -> tuple[StructureSettings, .
 
 
 def structure_name(settings: StructureSettings) -> str:
-    """Name a structure in one line.
-
-    Returns
-    -------
-    str
-        As ``harmonic 2 tensor, 1 function, full-circle``.
-    """
+    """Name a structure in one line, as ``harmonic 2 tensor, 1 function, full-circle``."""
     harmonic = settings.consequents == "harmonic"
     consequents = f"harmonic {settings.harmonic_order}" if harmonic else "seesaw"
     counts = settings.membership_functions
@@ -112,14 +101,8 @@ def _identity(settings: StructureSettings) -> tuple[Any, ...]:
 class FoldResult:
     """Cross-validation of one structure.
 
-    Attributes
-    ----------
-    error : float
-        Mean squared error of the torque scaled by axis, over all blocks.
-    standard_error : float
-        Over blocks.
-    ridge_weight : float
-        Chosen on the same blocks; 0 without a ridge, infinite where the fuzzy part is off.
+    The error is the mean squared one of the torque scaled by axis over all blocks, the standard error over blocks; the
+    ridge weight is chosen on the same blocks, 0 without a ridge, infinite where the fuzzy part is off.
     """
 
     error: float
@@ -131,12 +114,7 @@ class FoldResult:
 class StructureFolds:
     """Data to learn from and to judge on, labelled by fold; a rigid body stands before the columns of every structure.
 
-    Attributes
-    ----------
-    learned, judged : Samples
-        Their structures are replaced by those that are asked for.
-    choice : RidgeChoice
-        Blocks, and ridge weights to try.
+    The structures of the data are replaced by those that are asked for; `choice` holds blocks and ridge weights to try.
     """
 
     learned: Samples
@@ -173,7 +151,7 @@ class StructureFolds:
         return self._plain(*products, slice(0, RIGID), np.inf)
 
     def structure(self, settings: StructureSettings) -> FoldResult | None:
-        """Cross-validate a structure; None where the samples cannot tell its parameters, or it is not finite."""
+        """Cross-validate a structure; None where the samples do not identify its parameters, or it is not finite."""
         samples = np.bincount(self.learned.label, minlength=self.learned.labels)
         fewest_rows = 3 * int(np.min(~self.choice.left_out @ samples))
         if model_structure(settings).parameters > min(_MOST_PARAMETERS, fewest_rows):
@@ -254,19 +232,9 @@ def compare_structures(
     All have equidistant partitions: nothing is searched for, so a structure whose partitions matter looks worse here
     than a search would leave it, the model's own as well. The ridge weight of a fuzzy part over a rigid body is chosen
     by the one-standard-error rule on the same blocks; without a rigid body the coefficients are those of minimum norm.
-    A structure is left out where it has more than 400 parameters, or more than the rows that a fold learns from.
-
-    Parameters
-    ----------
-    training : TorqueSource
-        Judges; of more than `validation.samples` samples, as many in contiguous pieces.
-    learned : TorqueSource
-        The samples of it that parameters are learned from.
-
-    Returns
-    -------
-    StructureComparison
-        Empty where the samples are too few for the folds and the time left out around them.
+    A structure is left out where it has more than 400 parameters, or more than the rows that a fold learns from. Of
+    more than `validation.samples` training samples, as many in contiguous pieces judge; parameters are learned from
+    `learned`. Empty where the samples are too few for the folds and the time left out around them.
     """
     try:
         folds = StructureFolds.of(training, learned, settings)

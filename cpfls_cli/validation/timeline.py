@@ -22,32 +22,15 @@ _FEWEST_SAMPLES = 20
 
 
 def sample_period(time: Array) -> float:
-    """Compute the usual time from one sample to the next.
-
-    Parameters
-    ----------
-    time : array, shape (samples,), s
-
-    Returns
-    -------
-    float, s
-        The median; NaN for a single sample.
-    """
+    """Compute the usual (median) time from one sample to the next, s; NaN for a single sample."""
     return float(np.median(np.diff(time))) if len(time) > 1 else float("nan")
 
 
 def stretch_numbers(time: Array) -> IntArray:
-    """Label every sample by its stretch, in which samples follow each other without a pause.
+    """Label every sample by its stretch from 0, in which samples follow each other without a pause.
 
-    Parameters
-    ----------
-    time : array, shape (samples,), s
-        Ascending; may jitter by less than half a step.
-
-    Returns
-    -------
-    array of int, shape (samples,)
-        From 0; a new number behind every step of more than one and a half of those usual around it.
+    Times ascend and may jitter by less than half a step; a pause is a step of more than one and a half of those usual
+    around it.
     """
     number = np.zeros(len(time), dtype=np.int64)
     number[1:] = np.cumsum(_steps(time) > 1)
@@ -55,19 +38,9 @@ def stretch_numbers(time: Array) -> IntArray:
 
 
 def sample_numbers(time: Array, longest: int) -> IntArray:
-    """Assign numbers to samples by their time, so that missing ones are counted too.
+    """Count samples from 0 by their time, so that missing ones are counted too.
 
-    Parameters
-    ----------
-    time : array, shape (samples,), s
-        Ascending; may jitter by less than half a step.
-    longest : int
-        Steps that no pause is longer than.
-
-    Returns
-    -------
-    array of int, shape (samples,)
-        From 0; ascending.
+    Times ascend and may jitter by less than half a step; no pause counts as more than `longest` steps.
     """
     number = np.zeros(len(time), dtype=np.int64)
     number[1:] = np.cumsum(np.clip(_steps(time), 1, longest).astype(np.int64))
@@ -75,20 +48,7 @@ def sample_numbers(time: Array, longest: int) -> IntArray:
 
 
 def lagged_pairs(number: IntArray, lag: int) -> tuple[IntArray, IntArray]:
-    """Find the pairs of samples that are a lag apart.
-
-    Parameters
-    ----------
-    number : array of int, shape (samples,)
-        As from `sample_numbers`.
-    lag : int
-        Not negative.
-
-    Returns
-    -------
-    earlier, later : array of int, shape (pairs,)
-        Indices of samples.
-    """
+    """Find the indices of pairs of samples, numbered as by `sample_numbers`, that are a lag of 0 or more apart."""
     later = np.searchsorted(number, number + lag)
     earlier = np.flatnonzero(later < len(number))
     earlier = earlier[number[later[earlier]] == number[earlier] + lag]
@@ -103,15 +63,7 @@ def _steps(time: Array) -> Array:
 
 @dataclass(frozen=True)
 class TimeBlocks:
-    """Blocks of equal numbers of training samples.
-
-    Attributes
-    ----------
-    starts : array, shape (blocks - 1,), s
-        Where every block but the first begins.
-    duration : float, s
-        Of one block.
-    """
+    """Blocks of equal numbers of training samples: where each but the first begins, and how long one lasts, s."""
 
     starts: Array
     duration: float
@@ -128,15 +80,10 @@ class TimeBlocks:
 
 
 def time_blocks(training: TorqueSource, block_duration: float | None, most: int = _MOST_BLOCKS) -> TimeBlocks:
-    """Cut a training part into blocks.
+    """Cut a training part into blocks of a duration in s; None: a fortieth of it.
 
-    Parameters
-    ----------
-    block_duration : float or None, s
-        None: a fortieth of the training part. There are 2 to 200 blocks; above two, each has 20 samples at least, so a
-        short flight has fewer blocks than asked for, and a long one longer blocks.
-    most : int, optional
-        Blocks at most, where there is memory for fewer than 200.
+    There are 2 to 200 blocks, or `most` where there is memory for fewer; above two, each has 20 samples at least, so a
+    short flight has fewer blocks than asked for, and a long one longer blocks.
     """
     time = sample_times(training)
     samples = len(time)

@@ -22,7 +22,7 @@ from cpfls_cli.result import about
 from cpfls_cli.rotations import wrapped
 from cpfls_cli.validation.bands import definite_share, inertia_band
 from cpfls_cli.validation.bootstrap import Draws, bootstrap
-from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
+from cpfls_cli.validation.evidence import MODEL, RIGID_BODY, Evidence
 from cpfls_cli.validation.paired import compare_torque, mean_missing_torque, with_constant
 from cpfls_cli.validation.physical import PeriodErrors, Physics, one_period_away, physical_sense
 from cpfls_cli.validation.replay import StepErrors, replay_steps
@@ -112,7 +112,7 @@ def validate(
     torques = {MODEL: model.torque, RIGID_BODY: result.baselines[0].torque}
     missing = {name: mean_missing_torque(training, torque) for name, torque in torques.items()}
     ours, theirs = (with_constant(torques[name], missing[name]) for name in (MODEL, RIGID_BODY))
-    grounds = Grounds(
+    evidence = Evidence(
         identification=result,
         torque={name: compare_torque(judged, ours, theirs) for name, judged in held_out.items()},
         steps=steps,
@@ -126,7 +126,7 @@ def validate(
         band=drawn.relative_width,
         definite=definite_share(model, draws),
     )
-    judged = beside_loop(verdict(grounds), result.loop, by_past=result.freed is not None)
+    judged = beside_loop(verdict(evidence), result.loop, by_past=result.freed is not None)
     return Validation(structures, residuals, draws, drawn, again, steps, physics, period, judged)
 
 
@@ -219,10 +219,6 @@ def curves(model: InertiaFunctions, draws: Draws, best_rigid_body: Array, traini
 
     Each curve runs from -180 to 180 degrees; where training kept within 60 degrees, over what it visited and a quarter
     of that on both sides.
-
-    Parameters
-    ----------
-    best_rigid_body : array, shape (6,), kg m^2
     """
     every = len(training) // _LOOKED_AT + 1
     visited = wrapped(np.concatenate([data.motion.attitude[::every, :2] for data in training.chunks()]))
@@ -257,13 +253,7 @@ def _ends(angle: Array) -> tuple[float, float]:
 
 
 def simulated_torque(source: TorqueSource, model: InertiaFunctions, blocks: TimeBlocks, factor: Array) -> OtherTorque:
-    """Take the motion of a source with the torque of a model, and what it missed as noise, turned over by block.
-
-    Parameters
-    ----------
-    factor : array, shape (blocks,)
-        What the errors of each block are multiplied with.
-    """
+    """Take the motion of a source with the torque of a model, and what it missed as noise, times a factor by block."""
 
     def simulated(data: TorqueData) -> Array:
         predicted = model.torque(data.motion)
@@ -307,23 +297,13 @@ def round_trip(
 
     The torque of the model along the training motion gets the model's own errors as noise, those of each block of
     samples times +1 or -1: noise as strong and as correlated as in the flight, none where the model misses nothing. It
-    is larger than the errors by what the fit has followed of it.
-
-    Nothing is integrated in time: the motion is the recorded one, and only the torque is evaluated anew.
+    is larger than the errors by what the fit has followed of it. Nothing is integrated in time: the motion is the
+    recorded one, and only the torque is evaluated anew.
 
     The partitions are the model's: a search would find others that fit as well, and the question here is whether the
     samples determine the inertia, not the breakpoints. The ridge weight is chosen anew, and its pull towards a rigid
-    body is shared by both models: a model that it pulled too far comes back all the same.
-
-    Parameters
-    ----------
-    training, learned : TorqueSource
-        What the model was identified from.
-
-    Raises
-    ------
-    ComputationError
-        If the simulation gives no finite model.
+    body is shared by both models: a model that it pulled too far comes back all the same. `ComputationError` where the
+    simulation gives no finite model.
     """
     again = _identified_again(_simulated(training, learned, settings, model, rng), settings, model)
     inertia = again.inertia(curves.attitude.reshape(-1, 3)).value.reshape(curves.inertia.shape)

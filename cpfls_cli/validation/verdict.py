@@ -13,7 +13,7 @@ from cpfls_cli.dynamics.rigid_body import why_unphysical
 from cpfls_cli.identification.findings import AXES, loop_in_words
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.result import about, part
-from cpfls_cli.validation.grounds import MODEL, RIGID_BODY, Grounds
+from cpfls_cli.validation.evidence import MODEL, RIGID_BODY, Evidence
 from cpfls_cli.validation.reasons import AGAINST, DEFINITE_SHARE, FOR, NEITHER, Reason, numbers, reasons
 from cpfls_cli.validation.trust import Trust, capped
 
@@ -27,7 +27,7 @@ class Verdict:
     reasons: tuple[Reason, ...] = part()
 
 
-def verdict(grounds: Grounds) -> Verdict:
+def verdict(evidence: Evidence) -> Verdict:
     """Judge a model by the first rule that applies.
 
     1. *do-not-use* where D(q) is not positive definite at an attitude that training visited: then some torque turns
@@ -51,10 +51,10 @@ def verdict(grounds: Grounds) -> Verdict:
     An unfinished search, wide bands, residuals that are not white and a few windows that were lost are reported as
     reasons and do not decide: each of them harms a model only as far as it predicts worse, and that is measured.
     """
-    label, decisive = _decided(grounds)
-    listed = (decisive, *reasons(grounds))
+    label, decisive = _decided(evidence)
+    listed = (decisive, *reasons(evidence))
     everywhere = label == "good-for-control"
-    region = "every roll and pitch" if everywhere else region_in_words(grounds.identification.model.visited)
+    region = "every roll and pitch" if everywhere else region_in_words(evidence.identification.model.visited)
     return Verdict(label, region, listed)
 
 
@@ -74,14 +74,9 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
 
 
 def beside_loop(found: Verdict, loop: LoopBounds | None, *, by_past: bool = False) -> Verdict:
-    """Take back a good verdict on a model whose flights show the loop.
+    """Take back a good verdict on a model whose flights show the loop, unless the past identifies it.
 
-    Parameters
-    ----------
-    loop : LoopBounds or None
-        None where something from outside separates the vehicle from its autopilot.
-    by_past : bool
-        Whether the past identifies it.
+    `loop` is None where something from outside separates the vehicle from its autopilot.
     """
     if loop is None or not loop.shows_loop:
         return found
@@ -92,90 +87,90 @@ def beside_loop(found: Verdict, loop: LoopBounds | None, *, by_past: bool = Fals
     return replace(found, label=label, reasons=(*found.reasons[:first], against, *found.reasons[first:]))
 
 
-def good_axes(grounds: Grounds, predictor: str) -> BoolArray:
+def good_axes(evidence: Evidence, predictor: str) -> BoolArray:
     """Flag the body axes about which a predictor is good enough for control, by rule 3 of `verdict`; shape (3,)."""
-    unexcited = grounds.hardly_excited | np.isnan(grounds.r2(predictor))
-    return confirmed_axes(grounds, predictor) | (unexcited & grounds.beats_nothing_moves(predictor))
+    unexcited = evidence.hardly_excited | np.isnan(evidence.r2(predictor))
+    return confirmed_axes(evidence, predictor) | (unexcited & evidence.beats_nothing_moves(predictor))
 
 
-def confirmed_axes(grounds: Grounds, predictor: str) -> BoolArray:
+def confirmed_axes(evidence: Evidence, predictor: str) -> BoolArray:
     """Flag the body axes, shape (3,), whose held-out R2 of torque is at least `r2_min` and not denied by playback."""
-    return np.asarray((grounds.r2(predictor) >= grounds.r2_min) & grounds.predicts(predictor))
+    return np.asarray((evidence.r2(predictor) >= evidence.r2_min) & evidence.predicts(predictor))
 
 
-def _decided(grounds: Grounds) -> tuple[Trust, Reason]:
-    if grounds.impossible:
-        return Trust.DO_NOT_USE, Reason(_no_body(grounds), AGAINST)
-    if not _better(grounds):
-        return _beside_rigid_body(grounds)
-    why = _not_good_enough(grounds)
+def _decided(evidence: Evidence) -> tuple[Trust, Reason]:
+    if evidence.impossible:
+        return Trust.DO_NOT_USE, Reason(_no_body(evidence), AGAINST)
+    if not _better(evidence):
+        return _beside_rigid_body(evidence)
+    why = _not_good_enough(evidence)
     if why is not None:
         return Trust.DO_NOT_USE, Reason(f"better than the rigid body, but {why}", AGAINST)
-    confirmed = bool(np.all(confirmed_axes(grounds, MODEL)))
-    label = Trust.CONTROL if grounds.everywhere and confirmed else Trust.INSIDE
+    confirmed = bool(np.all(confirmed_axes(evidence, MODEL)))
+    label = Trust.CONTROL if evidence.everywhere and confirmed else Trust.INSIDE
     text = "better than the rigid body on held-out data, and good enough for control"
-    return label, Reason(f"{text}: {_r2_in_words(grounds, MODEL)}", FOR)
+    return label, Reason(f"{text}: {_r2_in_words(evidence, MODEL)}", FOR)
 
 
-def _better(grounds: Grounds) -> bool:
-    replayed = [grounds.replay_beside(part, MODEL, RIGID_BODY) for part in grounds.held_out]
-    compared = [*grounds.torque.values(), *replayed]
+def _better(evidence: Evidence) -> bool:
+    replayed = [evidence.replay_beside(part, MODEL, RIGID_BODY) for part in evidence.held_out]
+    compared = [*evidence.torque.values(), *replayed]
     return any(one.lower for one in compared) and not any(one.higher for one in compared)
 
 
-def _not_good_enough(grounds: Grounds) -> str | None:
+def _not_good_enough(evidence: Evidence) -> str | None:
     """Explain why a model that is better than the rigid body is not to be used; None where it is."""
-    if grounds.loses_many:
-        return f"{grounds.lost(MODEL)} of {grounds.windows} replayed windows do not run to the end"
-    if grounds.definite is not None and grounds.definite < DEFINITE_SHARE:
-        share = f"only {100 * grounds.definite:.3g} % of the bootstrap draws"
+    if evidence.loses_many:
+        return f"{evidence.lost(MODEL)} of {evidence.windows} replayed windows do not run to the end"
+    if evidence.definite is not None and evidence.definite < DEFINITE_SHARE:
+        share = f"only {100 * evidence.definite:.3g} % of the bootstrap draws"
         return (
             f"{share} have a D(q) that is positive definite wherever training was; {100 * DEFINITE_SHARE:g} % are "
             "required"
         )
-    if np.all(good_axes(grounds, MODEL)) and np.any(confirmed_axes(grounds, MODEL)):
+    if np.all(good_axes(evidence, MODEL)) and np.any(confirmed_axes(evidence, MODEL)):
         return None
-    r2 = numbers(grounds.r2(MODEL))
-    denied = (grounds.r2(MODEL) >= grounds.r2_min) & ~grounds.predicts(MODEL)
+    r2 = numbers(evidence.r2(MODEL))
+    denied = (evidence.r2(MODEL) >= evidence.r2_min) & ~evidence.predicts(MODEL)
     if np.any(denied):
         return f"its replayed body rate about {_names(denied)} is farther off than if nothing moved (R2 of torque {r2})"
-    return f"not good enough for control: R2 of held-out body torque {r2}; {grounds.r2_min:g} is required"
+    return f"not good enough for control: R2 of held-out body torque {r2}; {evidence.r2_min:g} is required"
 
 
-def _r2_in_words(grounds: Grounds, predictor: str) -> str:
+def _r2_in_words(evidence: Evidence, predictor: str) -> str:
     """Format the R2 of the axes that it confirms, and name those that nothing confirms."""
-    confirmed, r2 = confirmed_axes(grounds, predictor), grounds.r2(predictor)
-    text = f"R2 of body torque {numbers(r2, confirmed)}; {grounds.r2_min:g} is required"
+    confirmed, r2 = confirmed_axes(evidence, predictor), evidence.r2(predictor)
+    text = f"R2 of body torque {numbers(r2, confirmed)}; {evidence.r2_min:g} is required"
     return text if np.all(confirmed) else f"{text}; nothing confirms it about {_names(~confirmed)}"
 
 
-def _beside_rigid_body(grounds: Grounds) -> tuple[Trust, Reason]:
-    r2 = grounds.r2(RIGID_BODY)
+def _beside_rigid_body(evidence: Evidence) -> tuple[Trust, Reason]:
+    r2 = evidence.r2(RIGID_BODY)
     explains = f"R2 of body torque {numbers(r2)}"
-    why = why_unphysical(grounds.identification.rigid_body)
-    if np.any((r2 <= 0) & ~grounds.hardly_excited):
+    why = why_unphysical(evidence.identification.rigid_body)
+    if np.any((r2 <= 0) & ~evidence.hardly_excited):
         text = f"neither the model nor the rigid body explains more of the torque than a constant does: {explains}"
         return Trust.DO_NOT_USE, Reason(text, AGAINST)
     if why is not None:
         return Trust.DO_NOT_USE, Reason(
             f"the model is not shown to be better than the rigid body, and that {why}", AGAINST
         )
-    if not grounds.held_out:
+    if not evidence.held_out:
         text = "nothing was held out, so nothing shows that the model is better than the rigid body, which is simpler"
         return Trust.RIGID_BODY, Reason(f"{text} (rigid body in training: {explains})", AGAINST)
-    return Trust.RIGID_BODY, _rigid_body_instead(grounds)
+    return Trust.RIGID_BODY, _rigid_body_instead(evidence)
 
 
-def _rigid_body_instead(grounds: Grounds) -> Reason:
+def _rigid_body_instead(evidence: Evidence) -> Reason:
     """Explain whether the rigid body is to be used in place of a model that is not better."""
-    bad = ~good_axes(grounds, RIGID_BODY)
+    bad = ~good_axes(evidence, RIGID_BODY)
     if not np.any(bad):
         use = "use the rigid body: it is simpler, and the model is not better by more than chance on held-out data"
-        return Reason(f"{use}; it is itself good for control ({_r2_in_words(grounds, RIGID_BODY)})", NEITHER)
-    neither = bad & ~good_axes(grounds, MODEL)
+        return Reason(f"{use}; it is itself good for control ({_r2_in_words(evidence, RIGID_BODY)})", NEITHER)
+    neither = bad & ~good_axes(evidence, MODEL)
     who, where = ("neither is", neither) if np.any(neither) else ("the latter is not", bad)
     text = f"the model is not better than the rigid body by more than chance, and {who} "
-    explains = f"rigid body: R2 of body torque {numbers(grounds.r2(RIGID_BODY))}; {grounds.r2_min:g} is required"
+    explains = f"rigid body: R2 of body torque {numbers(evidence.r2(RIGID_BODY))}; {evidence.r2_min:g} is required"
     return Reason(f"{text}good enough for control about {_names(where)} ({explains})", AGAINST)
 
 
@@ -183,8 +178,8 @@ def _names(axes: BoolArray) -> str:
     return ", ".join(np.array(AXES)[axes])
 
 
-def _no_body(grounds: Grounds) -> str:
-    physics, result = grounds.physics, grounds.identification
+def _no_body(evidence: Evidence) -> str:
+    physics, result = evidence.physics, evidence.identification
     if physics.indefinite:
         where = " and ".join(f"{angle:.0f}" for angle in np.degrees(physics.worst_attitude))
         at = f"in {physics.indefinite} of {physics.cells} cells of attitude that training visited, worst at roll and "
@@ -192,23 +187,15 @@ def _no_body(grounds: Grounds) -> str:
     else:
         at = f"at {result.indefinite} of {next(iter(result.samples.values()))} training samples"
     text = f"D(q) is not positive definite {at}: no body turns like that"
-    if grounds.held_out and np.all(confirmed_axes(grounds, RIGID_BODY)) and why_unphysical(result.rigid_body) is None:
-        text += f"; the rigid body is good for control (R2 of body torque {numbers(grounds.r2(RIGID_BODY))})"
+    if evidence.held_out and np.all(confirmed_axes(evidence, RIGID_BODY)) and why_unphysical(result.rigid_body) is None:
+        text += f"; the rigid body is good for control (R2 of body torque {numbers(evidence.r2(RIGID_BODY))})"
     return text
 
 
 def region_in_words(visited: BoolArray) -> str:
-    """Describe the attitudes that training visited.
+    """Describe the attitudes that training visited: the shortest ranges that hold all visited cells, and their share.
 
-    Parameters
-    ----------
-    visited : array of bool, shape (cells, cells)
-        Cells of roll and pitch, roll along the first axis, from -180 degrees.
-
-    Returns
-    -------
-    str
-        The shortest ranges of roll and pitch that hold all cells visited, and the share of all cells.
+    Roll is along the first axis of the cells, from -180 degrees.
     """
     roll, pitch = (_range(np.asarray(visited.any(axis=other))) for other in (1, 0))
     return f"roll {roll}, pitch {pitch} ({100 * np.mean(visited):.3g} % of all roll and pitch)"

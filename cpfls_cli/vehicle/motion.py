@@ -72,27 +72,11 @@ _GEOMETRY = ("hubs", "spins", "radii")
 
 @dataclass(frozen=True)
 class Instant:
-    """What effects see.
+    """What effects see: vectors in the body frame, SI, rotors as a value by rotor.
 
-    Attributes
-    ----------
-    vehicle : VehicleSettings
-    air_velocity : vector, m/s, body frame
-        Of the centre of mass through the air.
-    body_rate : vector, rad/s, body frame
-    rotor_speed, rotor_acceleration : value by rotor, rad/s and rad/s^2
-    rotation : rows of a matrix
-        Body to world.
-    attitude : vector, rad
-        Roll, pitch, yaw.
-    height : value, m
-        Of the centre of mass above the ground.
-    slow_square : value by rotor, rad^2/s^2
-        Squared speed that slow actuation has come to.
-    force : vector, N, body frame
-        Of all that has no lever for it.
-    thrust_scale, drag_scale : value
-        Ratios of the thrust and drag factors to those of `vehicle`.
+    `air_velocity` is that of the centre of mass through the air; `rotation`: body to world; `attitude`: roll, pitch,
+    yaw; `height` above the ground; `slow_square`: squared speed that slow actuation has come to; `force`: of all that
+    has no lever for it; `thrust_scale`, `drag_scale`: ratios of the factors to those of `vehicle`.
     """
 
     vehicle: VehicleSettings

@@ -64,14 +64,8 @@ class RotorViolation:
 class RotorDemand:
     """Rotor speeds that a wrench requires; nothing is clipped.
 
-    Attributes
-    ----------
-    squared_speed : array, shape (time, rotor), rad^2/s^2
-        As the allocation gives it, so it may be negative or too large.
-    speed : array, shape (time, rotor), rad/s
-        NaN where the rotor cannot turn at the demanded speed.
-    violations : tuple of RotorViolation
-        Empty when every rotor can do what is asked.
+    The squared speed, rad^2/s^2, is as the allocation gives it, so it may be negative or too large; the speed, rad/s,
+    is NaN where the rotor cannot turn so.
     """
 
     squared_speed: Array

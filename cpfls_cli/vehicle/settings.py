@@ -15,7 +15,7 @@ from cpfls_cli.settings import Settings
 
 _Moment = Annotated[float, Gt(0)]
 Unknown = Literal["thrust_factor", "drag_factor", "inertia"]
-"""Numbers of a vehicle that hardly anybody knows, and that flights tell."""
+"""Numbers of a vehicle that hardly anybody knows, and that flights identify."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,13 +61,7 @@ class VehicleSettings(Settings):
     ] = ()
 
     def __post_init__(self) -> None:
-        """Refuse an inertia that is not positive definite.
-
-        Raises
-        ------
-        SettingError
-            If a moment of inertia is not positive, or the tensor is not positive definite.
-        """
+        """Refuse an inertia of which a moment is not positive, or that is not positive definite."""
         if len(self.inertia_kg_m2) not in (3, 6):
             raise SettingError("inertia_kg_m2", "give 3 moments of inertia, or 3 moments and 3 off-diagonal entries")
         if not min(self.inertia_kg_m2[:3]) > 0:

@@ -28,13 +28,7 @@ class RotorMotion(NamedTuple):
 
 @dataclass
 class Kept:
-    """Values of the step before, and those for the next.
-
-    Attributes
-    ----------
-    start : tuple of float
-        At the first step.
-    """
+    """Values of the step before, those at the first step, and those for the next."""
 
     values: tuple[Symbol, ...]
     start: Flat

@@ -212,15 +212,7 @@ def array_symbols(rotors: int) -> Functions:
 def traced(
     graph: Graph, arguments: Mapping[str, Sequence[Symbol]], results: Sequence[Sequence[Value]]
 ) -> Callable[..., Any]:
-    """Make a function of what was recorded, of floats.
-
-    Parameters
-    ----------
-    arguments : mapping of str to sequence of Symbol
-        Inputs by the name of the argument that holds them as a tuple.
-    results : sequence of sequence of value
-        What it gives: a tuple of tuples.
-    """
+    """Make a function of what was recorded, of floats: a tuple of tuples from inputs by the name of their tuple."""
     return _compiled(python_source(graph, arguments, results))["step"]  # type: ignore[no-any-return]
 
 

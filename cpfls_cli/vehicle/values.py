@@ -147,10 +147,7 @@ def _extreme(
 def differentiable(base: Functions, spread: Callable[[Value, Value], Value]) -> Functions:
     """Make functions of numbers with derivatives, and of polynomials, from those of numbers without.
 
-    Parameters
-    ----------
-    spread : callable
-        ``spread(value, other)``: the value for each rotor, where it is the same for all and the other one is not.
+    ``spread(value, other)``: the value for each rotor, where it is the same for all and the other one is not.
     """
 
     def where(condition: Value, yes: Value, no: Value) -> Value:

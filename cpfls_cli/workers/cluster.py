@@ -29,18 +29,10 @@ _NOISY = ("distributed", "distributed.client", "tornado", "tornado.application",
 
 
 class Cluster(Workforce):
-    """Workers of a Dask cluster, which hold the evaluator.
+    """Workers of a Dask cluster, which hold the evaluator that was shipped by a name.
 
-    A chunk whose worker vanishes goes to another one, as long as there is one.
-
-    Parameters
-    ----------
-    client : Client
-        Connection to the scheduler.
-    name : str
-        By which the evaluator was shipped.
-    patience_s : float
-        How long the cluster may be without workers.
+    A chunk whose worker vanishes goes to another one, as long as there is one, for so long that the cluster may be
+    without.
     """
 
     def __init__(self, client: Client, name: str, patience_s: float) -> None:
@@ -83,21 +75,10 @@ class Cluster(Workforce):
 
 @contextmanager
 def cluster(evaluate: Evaluate, address: str, *, patience_s: float = 10.0) -> Iterator[Cluster]:
-    """Connect to a cluster and send the evaluator to all of its workers, once.
+    """Connect to a cluster at ``tcp://host:port`` and send the evaluator, which can be pickled, to all workers, once.
 
-    Parameters
-    ----------
-    evaluate : callable
-        Evaluator of chromosomes that can be pickled.
-    address : str
-        Of the scheduler, `tcp://host:port`.
-    patience_s : float
-        How long to wait for the scheduler, and for a worker whenever there is none.
-
-    Raises
-    ------
-    WorkerError
-        If the scheduler does not answer, it has no workers, or they have other versions or processors.
+    `patience_s`: how long to wait for the scheduler, and for a worker whenever there is none. `WorkerError` where the
+    scheduler does not answer, has no workers, or they have other versions or processors.
     """
     evaluator = pickle.dumps(evaluate, protocol=pickle.HIGHEST_PROTOCOL)
     name = f"cpfls-{uuid.uuid4().hex}"
@@ -138,18 +119,7 @@ def _connected(address: str, patience_s: float) -> Iterator[Client]:
 
 
 def require_workers(client: Client, patience_s: float) -> None:
-    """Require that a scheduler has a worker.
-
-    Parameters
-    ----------
-    patience_s : float
-        How long to wait for one.
-
-    Raises
-    ------
-    WorkerError
-        If there is none, or none is left.
-    """
+    """Require that a scheduler has a worker after some patience, s."""
     try:
         client.wait_for_workers(1, timeout=patience_s)
     except TimeoutError as error:
@@ -162,13 +132,7 @@ def require_workers(client: Client, patience_s: float) -> None:
 
 @contextmanager
 def explained(client: Client) -> Iterator[None]:
-    """Turn whatever Dask raises into an error with a remedy.
-
-    Raises
-    ------
-    WorkerError
-        In place of whatever Dask raises.
-    """
+    """Turn whatever Dask raises into a `WorkerError` with a remedy."""
     try:
         yield
     except ComputationError:
@@ -217,14 +181,7 @@ class Shipped(WorkerPlugin):  # type: ignore[misc]
 
 
 def evaluate_shipped(genes: IntArray, name: str) -> Evaluation | Failure:
-    """Evaluate chromosomes on a worker of a cluster.
-
-    Parameters
-    ----------
-    genes : array of int, shape (individuals, genes)
-    name : str
-        By which the evaluator was shipped.
-    """
+    """Evaluate chromosomes, shape (individuals, genes), on a worker of a cluster by what was shipped."""
     shipped: Shipped = get_worker().plugins[name]
     return attempt(partial(shipped.evaluate, genes))
 

@@ -18,13 +18,7 @@ _PACKAGES = ("cpfls", "numpy", "scipy", "numba", "llvmlite")
 
 
 def require_same_versions(client: Client) -> None:
-    """Require that all workers have the packages that make the result, in the versions of this process.
-
-    Raises
-    ------
-    WorkerError
-        Naming the first worker and package that differ.
-    """
+    """Require that all workers have the packages that make the result, in the versions of this process."""
     for package in _PACKAGES:
         here = version(package)
         for worker, answer in client.run(version, package, on_error="return").items():
@@ -36,13 +30,7 @@ def require_same_versions(client: Client) -> None:
 
 
 def require_same_processor(client: Client) -> None:
-    """Require that the compiler makes the same code for all workers as for this process.
-
-    Raises
-    ------
-    WorkerError
-        Naming the first worker that differs.
-    """
+    """Require that the compiler makes the same code for all workers as for this process."""
     here = processor()
     for worker, answer in client.run(processor, on_error="return").items():
         if answer != here:
@@ -69,15 +57,7 @@ def _described(answer: object, here: Processor) -> str:
 
 @dataclass(frozen=True)
 class Processor:
-    """Processor that a compiler makes code for.
-
-    Attributes
-    ----------
-    name : str
-        Architecture and model.
-    instructions : frozenset of str
-        Extensions of the instruction set that may be used.
-    """
+    """Processor that a compiler makes code for: architecture and model, and extensions that may be used."""
 
     name: str
     instructions: frozenset[str]

@@ -74,13 +74,7 @@ class _Process:
 
 
 class Processes(Workforce):
-    """Processes on this machine, each with its own copy of the evaluator.
-
-    Parameters
-    ----------
-    processes : list of _Process
-        Started, and with the evaluator on its way.
-    """
+    """Processes on this machine, each with its own copy of the evaluator on its way."""
 
     def __init__(self, processes: list[_Process]) -> None:
         self._processes = processes
@@ -111,19 +105,10 @@ class Processes(Workforce):
 
 @contextmanager
 def processes(evaluate: Evaluate, count: int) -> Iterator[Processes]:
-    """Start processes and end them afterwards, whatever they are doing.
+    """Start processes and end them afterwards, whatever they are doing; `WorkerError` where that cannot be.
 
-    Linear algebra takes as many threads in them as the environment of this process says.
-
-    Parameters
-    ----------
-    evaluate : callable
-        Evaluator of chromosomes that can be pickled; sent to each process once.
-
-    Raises
-    ------
-    WorkerError
-        If the processes cannot be started.
+    Linear algebra takes as many threads in them as the environment of this process says. The evaluator, which can be
+    pickled, is sent to each process once.
     """
     evaluator = pickle.dumps(evaluate, protocol=pickle.HIGHEST_PROTOCOL)
     started: list[_Process] = []
@@ -173,11 +158,8 @@ def _ending(exit_code: int | None) -> str:
 def work(connection: Connection) -> None:
     """Serve one pipe until it closes, which it also does when the other side is killed.
 
-    Parameters
-    ----------
-    connection : Connection
-        Brings the pickled evaluator first, and then chromosomes; takes None when the evaluator is loaded, then one
-        Evaluation or Failure for each array of chromosomes.
+    It brings the pickled evaluator first, and then chromosomes; takes None when the evaluator is loaded, then one
+    Evaluation or Failure for each array of chromosomes.
     """
     # An interrupt from the keyboard reaches the whole group of processes; the parent decides what it means.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

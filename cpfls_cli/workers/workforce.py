@@ -79,19 +79,11 @@ def gathered(parts: Sequence[tuple[IntArray, Evaluation]]) -> tuple[IntArray, Ev
 
 
 def chunks(rows: int, workers: int) -> list[IntArray]:
-    """Cut rows into chunks that shrink towards the end, down to a single row.
+    """Cut rows into chunks that shrink towards the end, down to a single row; one empty chunk where there are none.
 
-    Each chunk takes a fixed share of what is left, so there are few of them, and yet nobody waits long for the
-    last one, however uneven the rows are (guided self-scheduling).
-
-    Returns
-    -------
-    list of array of int
-        Consecutive rows; one empty chunk where there are no rows.
-
-    References
-    ----------
-    Polychronopoulos and Kuck, Guided self-scheduling, IEEE Transactions on Computers C-36(12), 1987.
+    Each chunk takes a fixed share of what is left, so there are few of them, and yet nobody waits long for the last
+    one, however uneven the rows are. Polychronopoulos and Kuck, Guided self-scheduling, IEEE Transactions on Computers
+    C-36(12), 1987.
     """
     bounds = [0]
     while bounds[-1] < rows:
@@ -106,16 +98,10 @@ class WorkerError(ComputationError):
 
 @dataclass(frozen=True)
 class Failure:
-    """Failure of a worker, as plain text.
+    """Failure of a worker, as plain text for the user.
 
-    Parameters
-    ----------
-    message : str
-        For the user.
-    origin : str
-        Traceback in the worker, for whoever looks for a fault of the program; empty where the message says all.
-    of_data : bool
-        Whether it is the data that cannot be worked on, whoever works.
+    `origin`: traceback in the worker, for whoever looks for a fault of the program, empty where the message says all;
+    `of_data`: whether it is the data that cannot be worked on, whoever works.
     """
 
     message: str
@@ -141,14 +127,9 @@ def attempt(work: Callable[[], _Result]) -> _Result | Failure:
 
 
 def result_of(outcome: _Result | Failure) -> _Result:
-    """Return the result of an attempt, or raise its failure.
+    """Return the result of an attempt, or raise its failure: one in the data as `ComputationError`.
 
-    Raises
-    ------
-    ComputationError
-        With the message of a failure that is in the data.
-    WorkerError
-        With the message of any other; the worker's traceback, if there is one, is a note on it.
+    Any other is a `WorkerError`, with the worker's traceback as a note.
     """
     if isinstance(outcome, Failure):
         error = ComputationError(outcome.message) if outcome.of_data else WorkerError(outcome.message)

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.blind.cases import make
 from benchmarks.blind_study.fly import fly
 from benchmarks.blind_study.sets import Set
-from tests.builders.command_line import run, undrawn
+from tests.builders.command_line import run
 
 HIDDEN = ("com_offset", "rotor_drag")
 
@@ -23,8 +23,7 @@ def answer(tmp_path_factory):
     flights = [*sorted(logs.glob("train_*.csv")), *sorted(logs.glob("held_out_*.csv"))]
     folder = place / "gap"
     held = [word for path in flights[3:] for word in ("--held-out", path)]
-    with undrawn():
-        told = run("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.shifts=39")
+    told = run("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.shifts=39")
     assert told.exit_code == 0, told.stderr
     return SimpleNamespace(folder=folder, summary=json.loads(told.stdout), hidden=case.hidden, logs=logs, held=held)
 

@@ -11,6 +11,7 @@ import pytest
 from typer import testing
 
 from cpfls_cli.cli.app import app
+from cpfls_cli.report import canvas
 from cpfls_cli.workers.employ import employ
 
 # Every call would build all commands anew, which takes longer than most of them run.
@@ -46,18 +47,27 @@ def told(*words):
 run.done, run.told = done, told
 
 
-@contextmanager
-def undrawn(*, told=False):
-    """Leave the pictures of pages away: most of their time, and nothing to a test of their words and numbers.
+_FIGURES = {name: vars(canvas._Drawing)[name] for name in ("svg", "rows")} | {"_inline_svg": canvas._inline_svg}
 
-    No figure is made, and the tables of their data are empty; where those are `told`, figures are made, and only what
-    they look like is not worked out.
-    """
+
+@contextmanager
+def undrawn():
+    """Leave the pictures of pages away: most of their time, and nothing to a test of their words and numbers."""
     with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr("cpfls_cli.report.canvas._inline_svg", lambda *_: "<svg></svg>")
-        if not told:
-            monkeypatch.setattr("cpfls_cli.report.canvas._Drawing.svg", "<svg></svg>")
-            monkeypatch.setattr("cpfls_cli.report.canvas._Drawing.rows", ())
+        monkeypatch.setattr(canvas, "_inline_svg", lambda *_: "<svg></svg>")
+        monkeypatch.setattr(canvas._Drawing, "svg", "<svg></svg>")
+        monkeypatch.setattr(canvas._Drawing, "rows", ())
+        yield
+
+
+@contextmanager
+def drawn(*, shown=True):
+    """Draw them all the same; where they are not `shown`, only what they look like is not worked out."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        for name in ("svg", "rows"):
+            monkeypatch.setattr(canvas._Drawing, name, _FIGURES[name])
+        if shown:
+            monkeypatch.setattr(canvas, "_inline_svg", _FIGURES["_inline_svg"])
         yield
 
 

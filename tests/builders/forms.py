@@ -5,11 +5,10 @@ import re
 from html import unescape
 
 from cpfls_cli.config.study import Study
-from cpfls_cli.pages.page import report_page, written
-from cpfls_cli.report.content import Box, Facts, Folded, Form, Section, Table, Text
+from cpfls_cli.pages.page import report_page
+from cpfls_cli.report.content import Box, Facts, Folded, Form, Table, Text
 from cpfls_cli.report.source import Sources
-from cpfls_cli.report.terminal import terminal_lines, warnings_of
-from tests.builders.command_line import undrawn
+from cpfls_cli.report.terminal import terminal_lines
 
 
 def phrases(block):
@@ -44,19 +43,8 @@ def in_all_forms(source, blocks, beside=()):
         On the same page.
     """
     sources = Sources([source, *beside], source.vehicle, Study().report)
-    # Drawing the curves takes longer than all the rest.
-    with undrawn():
-        pages = {form: report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
+    pages = {form: report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
     return _plain({"terminal": "\n".join(terminal_lines(blocks, whole=True)), **pages})
-
-
-def blocks_in_all_forms(blocks):
-    """Write blocks alone in each form; give the text, one line for each row of a table."""
-    sections = [Section("answer", "Answer", blocks)]
-    pages = {form: written("Title", "0", sections, [], form) for form in (Form.HTML, Form.MARKDOWN, Form.JSON)}
-    # So wide that no cell is broken.
-    shown = [*terminal_lines(blocks, 1000, whole=True), *(warning.text for warning in warnings_of(blocks))]
-    return _plain({"terminal": "\n".join(shown), **pages})
 
 
 def _plain(pages):

@@ -1,5 +1,7 @@
 """Files of simulators for a vehicle that flies in `gusty_flights`, and its flights as logs."""
 
+import re
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -92,6 +94,16 @@ def mjcf_of(truth, spins, *, thrust=1.0, step=0.002, integrator="Euler"):
     motors = "\n  ".join(f'<motor name="m{i}" site="s{i}" gear="{gear}"/>' for i, gear in enumerate(gears))
     inertia = " ".join(f"{each:g}" for each in truth.inertia)
     return MJCF.format(step=step, integrator=integrator, mass=truth.mass, inertia=inertia, sites=sites, motors=motors)
+
+
+def mjcf_in_newtons(truth, spins, *, ratio=1.0):
+    """MJCF of what flies, whose controls are thrusts, with so many times the true yaw torque over thrust."""
+    text, share = mjcf_of(truth, spins), truth.drag_factor / truth.thrust_factor
+    text = text.replace('<custom><numeric name="ctrl_power" data="2 2 2 2"/></custom>', "")
+    for index, spin in enumerate(spins):
+        gear = f'site="s{index}" gear="0 0 1 0 0 {-spin * ratio * share:.9g}" ctrlrange="0 0.4"'
+        text = re.sub(rf'site="s{index}" gear="[^"]*"', gear, text)
+    return text
 
 
 QUARTER = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

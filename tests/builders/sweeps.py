@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from cpfls_cli.identification.replicates import Replicate, Setting, Sweep
+from benchmarks.paper.replicates import Replicate, Setting, Sweep
+from benchmarks.paper.searches import Compared, main
 
 
 def setting_of(mse, structure="cpfls", samples=5487, size=(40, 10), seeds=None, **more):
@@ -38,3 +39,10 @@ def replicate_of(seed, error, **more):
 def sweep_of(*settings):
     """Make a sweep whose runs are finished."""
     return Sweep(parts=("training",), complete=True, settings=settings)
+
+
+def searched(folder, name, seed, seeds):
+    """Search 30 samples in two sizes, from a seed on."""
+    given = (folder / "study.yaml", folder / "flight.h5", Compared.LARGER, folder / name)
+    main(*given, seed, seeds, population=8, generations=1, samples=[30])
+    return folder / name

@@ -135,12 +135,6 @@ def test_header(refuse, changed, name, value, message):
     assert refuse("info", path) == [f"{path}: {message}"]
 
 
-def test_required_datasets_missing(refuse, changed, study, tmp_path):
-    path = changed("trajectory", drop("yaw", "time"))
-    (line,) = refuse("simulate", study, path, "-o", tmp_path / "out.h5")
-    assert line == f"{path}: the cpfls/trajectory lacks /time, /yaw; make it again"
-
-
 @pytest.mark.parametrize(
     ("command", "signal"), [("reduce", "attitude"), ("identify", "torque"), ("identify", "attitude")]
 )

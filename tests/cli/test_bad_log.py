@@ -69,19 +69,6 @@ def test_every_dialect_gives_the_same_flight(cpfls, log_study, write, tmp_path, 
         assert file["inputs/log"].attrs["format"] == name.rsplit(".", 1)[-1]
 
 
-@pytest.mark.parametrize("dry_run", [(), ("--dry-run",)])
-def test_missing_columns_are_all_named_with_the_nearest_ones(wrong, dry_run):
-    lines = wrong(table(names=["time", "Roll", "pitch", "yaw", "mx", "my", "torque_z"]), "log.csv", *dry_run)
-    assert [line.split(" (")[0] for line in lines] == [
-        "LOG: import.time_column: the log has no column 't'",
-        "LOG: import.signals.attitude.columns: the log has no column 'roll'",
-        "LOG: import.signals.body_torque.columns: the log has no column 'mz'",
-        "LOG: import.signals: the log has the columns time, Roll, pitch, yaw, mx, my, torque_z; `cpfls init LOG`"
-        " proposes the mapping",
-    ]
-    assert "nearest: Roll" in lines[1]
-
-
 def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):
     """Eighty columns, six of them missing: nearest names where there are any, three at most."""
     names = ["time", "state.roll", "state.pitch", "state.yaw", "roll_cmd", "roll_ref", "roll_std"]
@@ -198,15 +185,6 @@ def test_config_without_signals(refuse, study, write, tmp_path):
     log = write(table())
     (line,) = refuse("import", study, log, "-o", tmp_path / "flight.h5")
     assert line.startswith(f"{log}: import.signals: no signal is mapped")
-
-
-def test_flight_without_torque_is_refused_by_identify(cpfls, refuse, log_study, write, tmp_path):
-    flight = tmp_path / "flight.h5"
-    without = "import:\n  signals:\n    attitude: {columns: [roll, pitch, yaw], unit: rad}\n  torque_source: null\n"
-    log_study.write_text(without + VEHICLE)
-    cpfls.done("import", log_study, write(table()), "-o", flight)
-    (line,) = refuse("identify", log_study, flight, "-o", tmp_path / "model.h5")
-    assert line.startswith(f"{flight}: lacks torque; this stage needs time, attitude")
 
 
 @pytest.mark.parametrize("dry_run", [(), ("--dry-run",)])

@@ -9,8 +9,6 @@ from cpfls_cli.changes.results import Changed
 from cpfls_cli.store import read
 from tests.builders.changed_flights import HEADER, flight_table, save, write_flights
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

@@ -15,7 +15,7 @@ from cpfls_cli.result import plain
 from cpfls_cli.stages.init import _findings as of_proposal
 from cpfls_cli.stages.init import _parted as parted
 from tests.builders.closed_loop_flights import COARSE, VEHICLE, flown, signals_of
-from tests.builders.command_line import run, undrawn
+from tests.builders.command_line import run
 from tests.builders.wrong_logs import WRONG, config_of, log_of
 
 ITS_CONFIG = {"the motion, the rotors are", "which lifts no vehicle"}
@@ -45,13 +45,12 @@ def asked(wrong):
 
 
 def told(command, config, *words):
-    with undrawn():
-        result = run(command, config, *words, "--json")
+    result = run(command, config, *words, "--json")
     assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)
 
 
-@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("name", ["gyroscope mirrored about x", "spins swapped"])
 def test_gap_names_no_gap_and_no_effect(logs, name, tmp_path):
     wrong = WRONG[name]
     config, (first, second) = logs(wrong.sign)
@@ -73,8 +72,7 @@ def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
     wrong = WRONG[name]
     config, (first, second) = logs(wrong.sign)
     words = (first, "--held-out", second, "-o", tmp_path / "vehicle.h5", "--anyway", *asked(wrong))
-    with undrawn():
-        result = run("vehicle", config, *words)
+    result = run("vehicle", config, *words)
     assert result.exit_code == 0, result.stderr
     label, sentence = result.stdout.splitlines()[:2]
     assert label.startswith("DO NOT USE: ")

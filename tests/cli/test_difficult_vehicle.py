@@ -19,7 +19,6 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import plain
 from cpfls_cli.store import read
 from tests.builders.artifacts import edited, read_result, with_fields
-from tests.builders.command_line import undrawn
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 from tests.builders.vehicle_search import CONFIG
 
@@ -151,8 +150,7 @@ def test_found_numbers_stand_in_for_open_ones(cpfls, command, vehicle, tmp_path)
 
 def test_what_was_made_from_an_inertia_of_no_body_is_read_again(cpfls, config, command, vehicle, tmp_path):
     cpfls.done(*command("replay"), "--model", vehicle)
-    with undrawn():
-        read = cpfls("report", config, tmp_path / "out", "-o", tmp_path / "page.html")
+    read = cpfls("report", config, tmp_path / "out", "-o", tmp_path / "page.html")
     assert read.exit_code == 0, read.stderr
 
 
@@ -199,8 +197,7 @@ def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_p
     told = cpfls.told("info", compared)
     assert told["cautions"] == list(header.cautions)
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in cpfls("info", compared).stderr.splitlines()
-    with undrawn():
-        cpfls.done("report", config, compared, "-o", tmp_path / "page.md")
+    cpfls.done("report", config, compared, "-o", tmp_path / "page.md")
     summary = (tmp_path / "page.md").read_text().split("## ")[1]
     assert summary.count(HEADLINE) == 1
 
@@ -213,8 +210,7 @@ def test_two_vehicles_stand_side_by_side(cpfls, config, vehicle, tmp_path):
         second._replace(value=0.0, low=0.0, high=0.0, determined=True),
     )
     with_fields(vehicle, other, numbers=numbers, loop=made.loop._replace(explained=np.ones(3)))
-    with undrawn():
-        cpfls.done("report", config, vehicle, other, "-o", tmp_path / "page.json")
+    cpfls.done("report", config, vehicle, other, "-o", tmp_path / "page.json")
     page = json.loads((tmp_path / "page.json").read_text())
     (section,) = [each for each in page["sections"] if each["name"] == "vehicles"]
     (table,) = [block for block in section["blocks"] if block["kind"] == "table"]

@@ -225,13 +225,8 @@ def test_a_vehicle_that_should_not_be_used(cpfls, refuse, vehicle, tmp_path, mon
     assert mark in output.read_text()[:600]
 
 
-def test_output_rules(cpfls, refuse, vehicle, tmp_path):
+def test_output_rules(refuse, vehicle, tmp_path):
     (line,) = refuse("export", vehicle, "--format", "mjcf", "-o", tmp_path / "uav.sdf")
     assert line == f"{tmp_path / 'uav.sdf'}: --format mjcf writes a file that ends in .xml; name it so"
     (line,) = refuse("export", vehicle, "--format", "jax", "-o", tmp_path / "jax.py")
     assert "Python cannot import a module of this name" in line
-    words = ("export", vehicle, "-o", tmp_path / "uav.xml")
-    assert cpfls(*words, "--dry-run").stdout.startswith(f"{tmp_path / 'uav.xml'}: would be written")
-    assert not (tmp_path / "uav.xml").exists()
-    assert cpfls(*words, "-q").stdout == ""
-    assert refuse(*words) == [f"{tmp_path / 'uav.xml'}: exists already; --force replaces it"]

@@ -72,17 +72,6 @@ def test_what_is_said_of_it(cpfls, vehicle, tmp_path):
     assert effects in (tmp_path / "quad.py").read_text()
 
 
-def test_dry_run_names_and_existing_files(cpfls, refuse, vehicle, tmp_path):
-    output = tmp_path / "m.c"
-    assert cpfls("export", vehicle, "-o", output, "--dry-run").stdout.startswith(
-        f"{tmp_path / 'm.h'}: would be written"
-    )
-    assert not output.exists()
-    assert cpfls("export", vehicle, "-o", output, "--name", "uav").exit_code == 0
-    assert "unsigned uav_step(uav_state *s" in (tmp_path / "m.h").read_text()
-    assert refuse("export", vehicle, "-o", output) == [f"{output}: exists already; --force replaces it"]
-
-
 def test_the_same_vehicle_gives_the_same_bytes(cpfls, vehicle, tmp_path):
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()

@@ -17,7 +17,6 @@ COMMANDS = (
     "import",
     "reduce",
     "identify",
-    "sweep",
     "vehicle",
     "replay",
     "response",
@@ -86,9 +85,7 @@ def test_wrong_usage(cpfls, words, message):
     assert message in result.stderr
 
 
-def test_help_of_a_sweep_names_what_a_sweep_leaves(cpfls):
-    said = {name: " ".join(cpfls(name, "--help").stdout.split()) for name in ("identify", "sweep")}
-    assert "a search that was stopped, from OUTPUT.checkpoint" in said["identify"]
-    assert "from one or more flights" in said["identify"]
-    assert "from OUTPUT.partial and OUTPUT.checkpoint" in said["sweep"]
-    assert "Stop all runs together after TIME" in said["sweep"]
+def test_help_of_a_search_names_what_it_leaves(cpfls):
+    said = " ".join(cpfls("identify", "--help").stdout.split())
+    assert "a search that was stopped, from OUTPUT.checkpoint" in said
+    assert "from one or more flights" in said

@@ -65,14 +65,6 @@ def test_what_later_stages_will_miss_is_said_and_kept(cpfls, imported, signals, 
     assert [f"cpfls: note: {note}" for note in notes] == again
 
 
-def test_the_stages_refuse_as_it_was_said(imported, refuse, study, tmp_path):
-    _, _, flight = imported("attitude")
-    assert "lacks torque" in refuse("identify", study, flight, "-o", tmp_path / "out.h5")[0]
-    _, _, flight = imported("body_rate", "body_torque", source="column")
-    for words in (("reduce", study, flight), ("identify", study, flight)):
-        assert "lacks attitude" in refuse(*words, "-o", tmp_path / "out.h5")[0]
-
-
 def test_commands_are_shares_of_the_largest_speed_and_it_says_so(imported):
     lines, _, flight = imported("attitude", "rotor_command", source="rotor-command")
     assert "body torque: of vehicle.rotors, speed = command * vehicle.rotor_speed_max_rad_s (1000 rad/s)" in lines

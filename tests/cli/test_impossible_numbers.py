@@ -7,8 +7,6 @@ import pytest
 from tests.builders.autopilots import STUDY, crossed, found_vehicle
 from tests.builders.vehicle_models import write_vehicle
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 HEAVY = "Ixx 1.28 kg m^2"
 
 

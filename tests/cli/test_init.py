@@ -110,12 +110,6 @@ def test_the_same_log_gives_the_same_file_and_never_over_another(proposed, refus
     assert proposed(log, "--mass", MASS, "--force")[1] == text
 
 
-def test_a_dry_run_writes_nothing(cpfls, log, tmp_path):
-    result = cpfls("init", log, "-o", tmp_path / "other.yaml", "--dry-run")
-    assert result.exit_code == 0
-    assert not (tmp_path / "other.yaml").exists()
-
-
 def test_the_answer_for_machines(proposed, log):
     result, _, _ = proposed(log, "--json")
     summary = json.loads(result.stdout)
@@ -406,8 +400,7 @@ def test_constants_that_are_known_are_options(cpfls, proposed, log, tmp_path):
     assert compared.exit_code == 0, compared.stderr
 
 
-@pytest.mark.parametrize("by", ["speed", "command", "accelerometer"])
-@pytest.mark.parametrize("mass", [37.0, 44.0])
+@pytest.mark.parametrize(("by", "mass"), [("speed", 37.0), ("speed", 44.0), ("command", 44.0), ("accelerometer", 44.0)])
 def test_two_masses_in_one_config_are_said_by_how_much(proposed, tmp_path, own, by, mass):
     """Of two flights with equal propellers, the rotors of the one carry 44 g where those of the other carry 37 g."""
     columns = [f"{'cmd' if by == 'command' else 'w'}{number}" for number in range(1, 5)]

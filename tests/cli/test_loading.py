@@ -82,7 +82,7 @@ def imported():
     codes = {
         "the package": "import cpfls_cli",
         "flying": "from cpfls_cli.stages import simulate, trajectory",
-        "searches": "from cpfls_cli.stages import identify, reduce, sweep",
+        "searches": "from cpfls_cli.stages import identify, reduce",
         "report": "import cpfls_cli.stages.report",
         "all commands and pages": f"import {', '.join(names)}",
     }

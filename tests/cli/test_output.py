@@ -54,10 +54,13 @@ def test_folder_without_permission(refuse, study, tmp_path, monkeypatch):
     assert line == f"{tmp_path / 'out.h5'}: cannot write into the folder {tmp_path}: Permission denied"
 
 
-def test_devices_are_not_replaced(refuse, study):
-    assert refuse("trajectory", study, "-o", "/dev/null", "--force") == [
-        "/dev/null: is a device or a pipe; -o names a file"
+def test_devices_and_pipes_are_not_replaced(refuse, study, tmp_path):
+    # A pipe of its own: a command that wrongly replaces a device would as root leave the machine without it.
+    os.mkfifo(tmp_path / "pipe")
+    assert refuse("trajectory", study, "-o", tmp_path / "pipe", "--force") == [
+        f"{tmp_path / 'pipe'}: is a device or a pipe; -o names a file"
     ]
+    assert (tmp_path / "pipe").is_fifo()
 
 
 def test_failure_while_computing_leaves_the_old_output(refuse, pipeline, study, tmp_path):

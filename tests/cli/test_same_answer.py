@@ -10,7 +10,7 @@ import pytest
 
 from tests.builders.artifacts import edited
 
-pytestmark = [pytest.mark.decides, pytest.mark.usefixtures("undrawn")]
+pytestmark = pytest.mark.decides
 
 # Of what is computed in a row, rounding leaves some bits: these are a few thousand times the last one.
 LAST_BITS = 1e-12

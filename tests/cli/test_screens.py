@@ -20,14 +20,12 @@ from cpfls_cli.report.content import Table, unfolded
 from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import write_flights
-from tests.builders.command_line import undrawn
 from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
 from tests.builders.spread_vehicles import found_record
 from tests.builders.studies import VEHICLE
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
-pytestmark = pytest.mark.usefixtures("undrawn")
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
 COARSE = ("--set", "simulation.closed_loop.integration_rate_hz=100")
 """What a screen says hangs on no step of an integration."""
@@ -55,7 +53,6 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
             terminal.tell(outcome, common)
 
         with (
-            undrawn(),
             patch("cpfls_cli.cli.stages.tell", tell),
             patch.object(terminal, "_columns", lambda *_: COLUMNS),
             pytest.MonkeyPatch.context() as environment,
@@ -86,7 +83,6 @@ def _of_torque(show):
     show("simulate", "simulate", "tiny.yaml", "path.h5", output="other.h5")
     show("reduce", "reduce", "tiny.yaml", "flight.h5", output="few.h5")
     show("identify", "identify", "tiny.yaml", "flight.h5", "--validate", "other.h5", output="found.h5")
-    show("sweep", "sweep", "tiny.yaml", "flight.h5", "--set", "sweep.seeds=2", output="sweep.h5")
     show("response", "response", "tiny.yaml", "flight.h5", output="response.h5")
     show("replay", "replay", "tiny.yaml", "model.h5", "flight.h5", output="replay.h5")
     show("report", "report", "tiny.yaml", "model.h5", output="report.md")
@@ -164,7 +160,7 @@ def _of_open_numbers(show, folder):
 
 
 NAMES = (
-    *("trajectory", "mission", "simulate", "reduce", "identify", "sweep", "response"),
+    *("trajectory", "mission", "simulate", "reduce", "identify", "response"),
     *("info flight", "info selection", "info diagnosis", "check", "effects", "effect payload", "effect flexible_mount"),
     *("effect linear_damping", "compare", "diagnose", "extend", "gap", "gap of nothing", "response of a model"),
     *("changed", "not changed", "trend", "tune"),

@@ -7,7 +7,6 @@ from cpfls_cli.flights.models import found_vehicle
 from cpfls_cli.result import plain
 from tests.builders.unknown_logs import flight, ulog_of_flight
 
-pytestmark = pytest.mark.usefixtures("undrawn")
 CURE = "PX4: SDLOG_PROFILE = 17 (bits 0 and 4: default and high rate)"
 
 

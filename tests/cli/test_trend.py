@@ -15,7 +15,6 @@ from cpfls_cli import store
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.stages import trend as command
 from cpfls_cli.workers.employ import Serial
-from tests.builders.command_line import undrawn
 from tests.builders.studies import VEHICLE
 
 CONFIG = """
@@ -59,13 +58,12 @@ def logs(tmp_path_factory):
 @pytest.fixture(scope="module")
 def told(cpfls, logs):
     """The trend of the first twelve, and of all with one that cannot be read."""
-    with undrawn():
-        out = logs / "trend"
-        twelve = [logs / "logs" / f"log{number}.csv" for number in range(1, 13)]
-        first = cpfls("trend", logs / "study.yaml", *reversed(twelve), "-o", out, "--json")
-        (logs / "logs" / "log14.csv").write_text("t,fx\n0,1\n")
-        shutil.copy(logs / "logs" / "log3.csv", logs / "logs" / "log15.csv")
-        second = cpfls("trend", logs / "study.yaml", logs / "logs", "-o", out)
+    out = logs / "trend"
+    twelve = [logs / "logs" / f"log{number}.csv" for number in range(1, 13)]
+    first = cpfls("trend", logs / "study.yaml", *reversed(twelve), "-o", out, "--json")
+    (logs / "logs" / "log14.csv").write_text("t,fx\n0,1\n")
+    shutil.copy(logs / "logs" / "log3.csv", logs / "logs" / "log15.csv")
+    second = cpfls("trend", logs / "study.yaml", logs / "logs", "-o", out)
     assert first.exit_code == 0, first.stderr
     assert second.exit_code == 0, second.stderr
     return SimpleNamespace(first=json.loads(first.stdout), second=second, out=out)
@@ -126,8 +124,7 @@ def test_dates_of_all_logs_order_them(cpfls, logs, told, tmp_path):
         # The last was flown first.
         store.write(path, replace(kept, flown_at_s=1.7e9 - number * DAYS), origin)
     words = ("trend", logs / "study.yaml", logs / "logs", "-o", out)
-    with undrawn():
-        by_date, by_name = (cpfls(*words, *order, "--json") for order in ((), ("--order", "name")))
+    by_date, by_name = (cpfls(*words, *order, "--json") for order in ((), ("--order", "name")))
     dated, named = (json.loads(each.stdout) for each in (by_date, by_name))
     assert (dated["order"], named["order"]) == ("date", "name")
     (shift,) = dated["shifts"]
@@ -143,8 +140,7 @@ def test_workers_read_the_same(cpfls, logs, told, tmp_path, monkeypatch):
 
     monkeypatch.setattr(command, "employ", employed)
     five = [logs / "logs" / f"log{number}.csv" for number in range(1, 6)]
-    with undrawn():
-        result = cpfls("trend", logs / "study.yaml", *five, "-o", tmp_path / "trend", "--workers", 2)
+    result = cpfls("trend", logs / "study.yaml", *five, "-o", tmp_path / "trend", "--workers", 2)
     assert result.exit_code == 0, result.stderr
     assert result.stdout.startswith("NO CHANGE: over 5 flights")
     for path in (tmp_path / "trend" / "flights").iterdir():
@@ -166,8 +162,7 @@ def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeyp
     assert stopped.exit_code == 130
     assert f"what was read is kept in {tmp_path / 'trend' / 'flights'}" in stopped.stderr
     monkeypatch.setattr(command, "kept_numbers", kept_numbers)
-    with undrawn():
-        assert cpfls.told(*words, "-o", tmp_path / "trend")["new"] == 3
+    assert cpfls.told(*words, "-o", tmp_path / "trend")["new"] == 3
 
 
 @pytest.mark.parametrize(

@@ -133,19 +133,6 @@ def test_dropouts_of_the_logger_are_warned_of(flown):
     assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 1.000 s" in words
 
 
-def test_a_pause_of_one_topic_is_a_gap(wrong):
-    sent = [row for row in rows() if row[1] != 0 or not 1_000_000 < row[0] < 1_300_000]
-    (line,) = wrong(ulog(sent))
-    assert line.startswith("LOG: the log has a gap of 0.304 s at 0.996 s, longer than import.gap_s = 0.1")
-
-
-def test_the_longest_part_beside_the_pause_can_be_kept(flown):
-    sent = [row for row in rows() if row[1] != 2 or not 500_000 < row[0] < 900_000]
-    summary, flight, _ = flown(ulog(sent), "--set", "import.gap_rule=longest-part")
-    assert 1.05 < flight["time"][-1] < 1.1
-    assert summary["span_s"][0] > 0.89
-
-
 def test_an_end_that_is_cut_off_is_read_up_to_it(flown):
     summary, _, _ = flown(ulog()[:-9])
     assert 480 < summary["samples"] <= 500
@@ -181,24 +168,6 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(wrong, config):
         "LOG: import.signals.body_torque.columns: the log has no column '?!'",
         f"LOG: import.signals: the log has the topics {topics}; `cpfls init LOG` proposes the mapping",
     ]
-
-
-@pytest.mark.parametrize("column", ["t", "timestamp", "vehicle_attitude", "sensor_gyro.timestamp"])
-def test_a_clock_that_is_none_is_told_what_one_is(wrong, column):
-    (line,) = wrong(ulog(), "--set", f"import.time_column={column}")
-    assert line == (
-        f"LOG: import.time_column = {column!r}: in this log every topic has its own stamps; name those of the"
-        " fastest mapped one, such as vehicle_angular_velocity.timestamp, or null for them; the log has the topics"
-        " vehicle_angular_velocity, vehicle_attitude, vehicle_torque_setpoint; `cpfls init LOG` proposes the mapping"
-    )
-
-
-def test_a_slow_topic_is_named(wrong):
-    sent = [row for row in rows() if row[1] != 0 or row[0] % 200_000 == 0]
-    (line,) = wrong(ulog(sent))
-    assert line.startswith(
-        "LOG: topic vehicle_attitude has a sample only every 0.2 s (median), longer than import.gap_s"
-    )
 
 
 @pytest.mark.parametrize(

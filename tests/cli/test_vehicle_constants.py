@@ -115,7 +115,6 @@ def heavier(flights, folder, change, name):
     return written(folder, name, whole)
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     config = heavier(flights, folder, open_constants, "logs.yaml")
     copy = folder / "found.yaml"
@@ -138,7 +137,6 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, folder):
     assert "The values of what the config leaves open are guesses: drag factor, inertia and thrust factor." in page
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_an_added_mass_is_found_beside_what_is_shared(cpfls, flights, folder):
     config = heavier(flights, folder, same_vehicle, "groups.yaml")
     told = cpfls.told("vehicle", config, folder / "flight.csv", folder / "loaded.csv", "-o", folder / "g.h5")

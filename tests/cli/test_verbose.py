@@ -28,7 +28,6 @@ def words(pipeline, tmp_path):
 COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "report")
 
 
-@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_verbose_names_what_is_read_and_written(cpfls, words, study, tmp_path, command):
     inputs, options = words[command]

@@ -178,7 +178,7 @@ def test_people_read_what_was_flown(cpfls, config, path, vehicle, tmp_path):
         (("--set", "vehicle.mass_kg=0.9"), "{model}: was made with another vehicle; these differ: vehicle.mass_kg"),
         (
             ("--mode", "closed-loop", "--effect", "rotor_drag=1e-4"),
-            "simulation.closed_loop.effects.rotor_drag = [0.0001]: the model has it already",
+            "simulation.closed_loop.effects.rotor_drag = [0.0001]: the model has it already: k_d = ",
         ),
     ],
 )

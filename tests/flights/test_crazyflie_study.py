@@ -54,6 +54,7 @@ def test_the_file_tells_what_was_done_about_the_gap(study):
         assert len(file["warnings"]) == 0
 
 
+@pytest.mark.usefixtures("drawn")
 def test_the_page_tells_it_too(study):
     page = study.flight.with_name("page.html")
     result = run("report", CONFIG, study.flight, "-o", page)

@@ -65,14 +65,7 @@ class Walk:
             return attribute(kind, node.attr)
         if isinstance(node, nodes.Getitem):
             return self.kind(node.node)
-        if isinstance(node, nodes.Filter) and node.name in {
-            "first",
-            "last",
-            "list",
-            "sort",
-            "selectattr",
-            "rejectattr",
-        }:
+        if isinstance(node, nodes.Filter) and node.name in SAME_ROWS:
             return self.kind(node.node) if node.node is not None else None
         return None
 

@@ -82,7 +82,8 @@ def integrate(nodes: Array, middles: Array, step: float, length: float, damping:
     """
     state = (start[0], start[1], start[2], start[3], start[4], start[5])
     states = np.zeros((len(nodes), 6))
-    states[0] = start
+    for index in range(6):  # Written one by one: an assigned row takes numba most of the time of compiling.
+        states[0, index] = state[index]
     for number in range(len(middles)):
         first = _rate(state, nodes[number], length, damping)
         second = _rate(_moved(state, first, 0.5 * step), middles[number], length, damping)

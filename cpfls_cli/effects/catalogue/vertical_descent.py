@@ -23,8 +23,6 @@ _STATES = ((0.5, "normal working state"), (1.6, "vortex ring"), (2.0, "turbulent
 def induced_velocity(see: Instant) -> Value:
     """Compute the velocity that each rotor gives the air in hover, ``v_h = sqrt(T_h / (2 rho pi R^2))``, m/s.
 
-    References
-    ----------
     Leishman, Principles of Helicopter Aerodynamics: momentum theory of the hovering rotor.
     """
     thrust = scales.weight(see.vehicle) / see.functions.total(see.thrust_factors) * see.thrust_factors

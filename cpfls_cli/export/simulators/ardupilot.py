@@ -27,7 +27,7 @@ from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import Numbers, cross_order, numbers_of, places, spins
 from cpfls_cli.export.polynomials import weights_of_model
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.text import comment_lines
+from cpfls_cli.export.text import comment_lines, in_json
 from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
@@ -125,7 +125,7 @@ def ardupilot_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) 
     }
     said = [*sheet.facts, "", *remarks, "", *(each.format(**words) for each in _USE)]
     lines = [f"# {line}".rstrip() for line in comment_lines(said)]
-    given = [f'  "{name}": {json.dumps(value)}' for name, value in _keys(sheet.model, held, order).items()]
+    given = [f'  "{name}": {in_json(value)}' for name, value in _keys(sheet.model, held, order).items()]
     return "\n".join([*lines, "{", ",\n".join(given), "}", ""])
 
 
@@ -175,10 +175,7 @@ def _keys(model: VehicleModel, held: Held, order: IntArray) -> dict[str, Any]:
 def _reference_angle(momentum: float, weight: float, column: float) -> float:
     """Find the tilt, degrees, at which the drag of the motors alone holds the vehicle at `refSpd`: none is the body's.
 
-    Parameters
-    ----------
-    column : float, kg/m
-        Density times area of the discs.
+    `column`: density times area of the discs, kg/m.
     """
     low, high = 0.0, _STEEPEST
     for _ in range(60):

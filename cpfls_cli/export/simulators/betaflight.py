@@ -24,7 +24,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Held, Holds, held_by
 from cpfls_cli.export.numbers import numbers_of
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.text import comment_lines
+from cpfls_cli.export.text import comment_lines, number
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 
@@ -50,7 +50,7 @@ def betaflight_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str
     """Write the mixer of a vehicle, with what it does not hold."""
     lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *remarks, "", *_USE])]
     mixers = [
-        f"mmix {motor} {' '.join(f'{round(share, 6) + 0.0:.6f}' for share in shares)}"
+        f"mmix {motor} {' '.join(number(share, '.6f') for share in shares)}"
         for motor, shares in enumerate(_mixer(held).tolist())
     ]
     return "\n".join([*lines, "mixer CUSTOM", "mmix reset", *mixers, "save", ""])

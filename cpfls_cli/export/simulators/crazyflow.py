@@ -10,7 +10,6 @@ one curve for all rotors, and speeds follow commands by rotor_dyn_coef.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,7 +21,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.text import comment_lines
+from cpfls_cli.export.text import comment_lines, in_json
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.motion import Instant, Wrench
@@ -94,5 +93,5 @@ def crazyflow_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str)
     lag = () if rate else ("The rotors have no lag: give no rotor_vel, or commands and rotor_vel alike.",)
     lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *remarks, "", _USE, *lag])]
     return "\n".join(
-        [*lines, "", f"[{sheet.name}]", *(f"{name} = {json.dumps(each)}" for name, each in given.items()), ""]
+        [*lines, "", f"[{sheet.name}]", *(f"{name} = {in_json(each)}" for name, each in given.items()), ""]
     )

@@ -23,6 +23,7 @@ from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.simulators.model import ENTRIES
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.values import Each, scaled
 
@@ -38,8 +39,6 @@ _RADIUS_M = 0.05
 
 SHORTEST_S = 1e-6
 """Lag of rotors that have none: the plugin divides by it."""
-
-ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 def sdf_held(model: VehicleModel) -> tuple[Held, Holds]:

@@ -19,13 +19,14 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.simulators.sdf import ENTRIES, written
+from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.simulators.model import ENTRIES
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import scaled
@@ -140,10 +141,7 @@ def add_point(root: ElementTree.Element, name: str, place: Array) -> None:
 def fly_urdf(text: str, course: Course, *, in_world: bool = True) -> State:
     """Fly an exported vehicle by the published equations of gym-pybullet-drones; see `Target.fly`.
 
-    Parameters
-    ----------
-    in_world : bool
-        Whether drag acts along the axes of the world, as there, or along those of the body.
+    Drag acts along the axes of the world, as there, or along those of the body.
     """
     root = ElementTree.fromstring(text)
     attributes = next(root.iter("properties")).attrib

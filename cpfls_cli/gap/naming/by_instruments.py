@@ -257,7 +257,7 @@ def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows
         own.append(rows[there.flight_index == run.flight][inside])
         middles.append(begins[inside] - run.part.start + len(windows.weight) // 2)
         path, place = given.repeats.path(number, len(given.flown[number]))
-        # Runs of one path know of each other, but not of what was before.
+        # Runs of one path know of each other, but not of past windows.
         of_path.append(path * most + place[middles[-1]] // length)
         of_run.append((number - len(given.runs)) * most + middles[-1] // length)
     known = predicted_rows(given, windows, own) if given.kind == "setpoints" else _in_other_runs(given, own, middles)

@@ -152,6 +152,24 @@ def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed:
     return _without_columns(VEHICLE_NUMBERS.name, tuple(wrong), p_value, share, VEHICLE_NUMBERS.sentence)
 
 
+def of_thrust(numbers: Sequence[Estimate]) -> list[str]:
+    """List moments of inertia that are right where the thrust is wrong: rates show their ratio to the rotor torque.
+
+    That is where a moment of inertia times the thrust is that of the config within 99 %, by independent errors.
+    """
+    known = {number.name: number for number in numbers}
+    thrust = known.pop("thrust_scale", None)
+    moments = {name: each for name, each in known.items() if name.startswith("inertia_")}
+    return [] if thrust is None else [name for name, each in moments.items() if _undone(each, thrust)]
+
+
+def _undone(number: Estimate, other: Estimate) -> bool:
+    """Tell whether two relative errors multiply to none."""
+    off = (1 + number.value) * (1 + other.value) - 1
+    own, its = ((1 + b.value) * 0.5 * (a.high - a.low) for a, b in ((number, other), (other, number)))
+    return _chance_of(off, float(np.hypot(own, its))) > RARE
+
+
 def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:
     """List the numbers of the vehicle in the order of the catalogue; the interval of one that is not known is NaN."""
     known, nothing = {each.name: each for each in estimates.parameters}, (np.nan, np.nan)
@@ -163,8 +181,11 @@ def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:
 
 def _chance(number: Estimate) -> float:
     """Compute the probability that a number as far from 0 is chance."""
-    half = 0.5 * (number.high - number.low)
-    return 2 * float(ndtr(-1.96 * abs(number.value) / half)) if half > 0 else 0.0
+    return _chance_of(number.value, 0.5 * (number.high - number.low))
+
+
+def _chance_of(value: float, half: float) -> float:
+    return 2 * float(ndtr(-1.96 * abs(value) / half)) if half > 0 else 0.0
 
 
 def impossible_ratios(numbers: Sequence[Estimate]) -> dict[str, float]:

@@ -19,6 +19,7 @@ from benchmarks.paper.claims import (
     PaperSources,
 )
 from benchmarks.paper.readings import readings, readings_blocks, readings_figure
+from benchmarks.paper.replicates import Sweep
 from benchmarks.paper.reproduction import CLAIMS, partitions_compared, seesaw_compared
 from benchmarks.paper.search_claims import (
     AS_GOOD,
@@ -45,7 +46,9 @@ NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
 def sources(*records, times=()):
     """A report about records."""
     given = [Source("s.h5", "", record, {}, None, 0, header=Origin(stage="reduce")) for record in records]
-    return PaperSources(given, VehicleSettings(), ReportSettings(), times)
+    sweeps = [source for source in given if isinstance(source.record, Sweep)]
+    others = [source for source in given if source not in sweeps]
+    return PaperSources(others, VehicleSettings(), ReportSettings(), times, sweeps)
 
 
 def with_runs(setting, **values):
@@ -345,6 +348,7 @@ def test_a_report_of_one_reading_compares_none():
     assert readings_blocks(given, CLAIMS) == ([], [])
 
 
+@pytest.mark.usefixtures("drawn")
 def test_readings_are_drawn_where_a_search_found_nothing_too():
     nothing = chosen("D", "training", np.nan, 60.0)
     given = readings(reading_sources((0.0, [FULL, chosen("even", "training", 1.0, 101.0), nothing])))

@@ -47,12 +47,6 @@ def test_effects_come_on_top_of_a_model(fly, extended):
     assert np.abs(more - model).max() > 5
 
 
-def test_an_effect_that_the_model_has_is_refused(refuse, gap_config, path, extended, tmp_path):
-    words = ("--model", extended, "--effect", "com_offset=0.01,0")
-    (line,) = refuse("simulate", gap_config, path, *CLOSED, *words, "-o", tmp_path / "x.h5")
-    assert line.startswith("simulation.closed_loop.effects.com_offset = [0.01, 0.0]: the model has it already: c_x = ")
-
-
 def test_identified_model_is_flown(cpfls, fly, gap_config, path, tmp_path):
     """A rigid body under a fuzzy part without weight flies as the vehicle whose inertia it found."""
     flight, model = tmp_path / "flight.h5", tmp_path / "model.h5"
@@ -64,17 +58,6 @@ def test_identified_model_is_flown(cpfls, fly, gap_config, path, tmp_path):
     plain, _ = fly("plain.h5")
     assert effects == {}
     assert np.abs(identified - plain).max() < 0.01 * plain.mean()
-
-
-def test_a_model_with_effects_needs_closed_loop(refuse, gap_config, path, extended, tmp_path):
-    (line,) = refuse("simulate", gap_config, path, "--model", extended, "--mode", "inverse", "-o", tmp_path / "x.h5")
-    assert line.startswith(f"{extended}: no model is flown in mode inverse; leave the mode out")
-
-
-def test_a_model_of_another_vehicle_is_refused(refuse, gap_config, path, extended, tmp_path):
-    words = ("--model", extended, "--set", "vehicle.mass_kg=7", "-o", tmp_path / "x.h5")
-    (line,) = refuse("simulate", gap_config, path, *CLOSED, *words)
-    assert f"{extended}: was made with another vehicle; these differ: vehicle.mass_kg" in line
 
 
 def test_a_file_that_is_no_model_is_refused(refuse, gap_config, path, tmp_path):

@@ -8,8 +8,6 @@ from types import SimpleNamespace
 import h5py
 import pytest
 
-from tests.builders.command_line import undrawn
-
 OFFSET = (0.008, -0.005)
 FILES = {"disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json"}
 
@@ -30,8 +28,7 @@ def again(cpfls, gap_config, shifted, tmp_path_factory):
 @pytest.fixture(scope="module")
 def none(cpfls, gap_config, exact, tmp_path_factory):
     folder = tmp_path_factory.mktemp("none") / "gap"
-    with undrawn():
-        result = cpfls("gap", gap_config, *exact, "-o", folder, "--json")
+    result = cpfls("gap", gap_config, *exact, "-o", folder, "--json")
     assert result.exit_code == 0, result.stderr
     return SimpleNamespace(folder=folder, summary=json.loads(result.stdout))
 
@@ -105,7 +102,6 @@ def test_one_command_says_what_three_say(cpfls, gap_config, shifted, found, tmp_
         assert path.read_bytes() == (found.folder / path.name).read_bytes()
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_held_out_by_name(cpfls, gap_config, shifted, tmp_path):
     words = ("gap", gap_config, *shifted[:1], "--held-out", shifted[1], "-o", tmp_path / "x", "--json")
     summary = json.loads(cpfls(*words).stdout)
@@ -114,7 +110,6 @@ def test_held_out_by_name(cpfls, gap_config, shifted, tmp_path):
     assert [effect["name"] for effect in summary["effects"]] == ["com_offset"]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_one_flight_is_split_in_time(cpfls, gap_config, shifted, tmp_path):
     summary = cpfls.told("gap", gap_config, shifted[0], "-o", tmp_path / "x")
     assert summary["split"].endswith("flight_1.csv (last third)")
@@ -147,7 +142,6 @@ def test_people_read_the_verdict_first(again, shifted):
     assert words[3:5] == [str(folder / "extended.h5"), str(shifted[0])]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_rival_that_could_not_be_tried_is_told_with_the_signal_that_is_missing(cpfls, gap_config, shifted, tmp_path):
     said = cpfls("gap", gap_config, *shifted, "-o", tmp_path / "x", "--set", "gap.ignore=[]").stdout
     assert "AMBIGUOUS: These flights cannot separate offset of the centre of mass from steady wind." in said
@@ -163,12 +157,6 @@ def test_nothing_hidden_nothing_named(none):
     assert max(none.summary["gap_before"]["floors"]) < 1.5
 
 
-def test_extend_refuses_what_names_nothing(refuse, gap_config, none, tmp_path):
-    (message,) = refuse("extend", gap_config, none.folder / "diagnosis.h5", "-o", tmp_path / "x.h5", code=1)
-    assert message == "not extended: the diagnosis is NO_GAP and names no effect that could be added"
-
-
-@pytest.mark.usefixtures("undrawn")
 def test_a_later_run_leaves_no_file_of_an_earlier_one(cpfls, gap_config, found, exact, tmp_path):
     shutil.copytree(found.folder, tmp_path / "x")
     (tmp_path / "x" / "notes.txt").write_text("mine")

@@ -6,14 +6,12 @@ import h5py
 import pytest
 
 import cpfls_cli
-from tests.builders.command_line import undrawn
 
 
 @pytest.fixture(scope="module")
 def answer(cpfls, brief_config, pipeline, with_attitude, tmp_path_factory):
     folder = tmp_path_factory.mktemp("model") / "gap"
-    with undrawn():
-        result = cpfls("gap", brief_config, *with_attitude, "--model", pipeline.model, "-o", folder, "--json")
+    result = cpfls("gap", brief_config, *with_attitude, "--model", pipeline.model, "-o", folder, "--json")
     assert result.exit_code == 0, result.stderr
     return folder, json.loads(result.stdout)
 

@@ -20,13 +20,6 @@ def write(path, data, header):
     return path
 
 
-def test_folder_that_is_not_empty(refuse, gap_config, shifted, tmp_path):
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "mine.txt").write_text("mine")
-    (message,) = refuse("gap", gap_config, *shifted, "-o", tmp_path / "full")
-    assert message.endswith("exists already and is not empty; --force replaces what is in it")
-
-
 def test_output_that_is_a_file(refuse, gap_config, shifted, tmp_path):
     (tmp_path / "file").write_text("mine")
     (message,) = refuse("gap", gap_config, *shifted, "-o", tmp_path / "file", "--force")

@@ -10,7 +10,6 @@ import yaml
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.rotations import euler_angles
 from cpfls_cli.store import read
-from tests.builders.command_line import undrawn
 from tests.builders.gusty_flights import GUSTS, SMALL, Flight, gusty_flights
 
 COLUMNS = {
@@ -56,8 +55,7 @@ def found(cpfls, tmp_path_factory):
         np.savetxt(path, np.column_stack(parts), delimiter=",", header=header, comments="", fmt="%.9g")
     study = folder / "study.yaml"
     study.write_text(yaml.safe_dump(config()))
-    with undrawn():
-        result = cpfls("gap", study, *paths, "-o", folder / "gap", "-v")
+    result = cpfls("gap", study, *paths, "-o", folder / "gap", "-v")
     assert result.exit_code == 0, result.stderr
     summary = json.loads((folder / "gap" / "gap.json").read_text())
     return SimpleNamespace(folder=folder / "gap", stdout=result.stdout, summary=summary)

@@ -13,8 +13,6 @@ from cpfls_cli.result import plain
 from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 NAMES = ["model", "nothing-moves", "rate-stays", "stated"]
 FAST = ("--every", "7")
 
@@ -223,6 +221,7 @@ def test_people_read_to_which_horizon_it_is_better(cpfls, gap_config, extended, 
     assert "only rotation is played back" in result.stderr
 
 
+@pytest.mark.usefixtures("drawn")
 def test_report_shows_it(cpfls, gap_config, of_vehicle, tmp_path):
     told = cpfls.told("report", gap_config, of_vehicle[1], "-o", tmp_path / "page.html")
     assert "replay" in told["sections"]

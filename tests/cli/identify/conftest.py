@@ -4,7 +4,6 @@ import pytest
 
 from tests.builders.studies import VEHICLE
 
-GENERATIONS = 6
 SEARCH = """\
 seed: 1
 trajectory: {sample_time_s: 0.1}

@@ -1,4 +1,4 @@
-"""`identify --choose-on` and `sweep --choose-on`: flights that a model is chosen on."""
+"""`identify --choose-on`: flights that a model is chosen on."""
 
 import json
 import warnings
@@ -37,21 +37,12 @@ def test_a_model_is_chosen_on_a_flight_and_judged_on_another(cpfls, study, pipel
         assert {"flight", "choose-on-1", "validate-1"} == set(file["inputs"])
 
 
-def test_a_sweep_takes_it_for_the_settings_that_ask_for_it(cpfls, study, pipeline, others, tmp_path):
-    config, (kept, judged) = tmp_path / "sweep.yaml", others
-    settings = [{"name": "plain"}, {"name": "held out", "set": {"identification.choice": "held-out"}}]
-    config.write_text(f"{study.read_text()}sweep: {json.dumps({'seeds': 1, 'settings': settings})}\n")
-    words = ("sweep", config, pipeline.flight, "--validate", judged, "-o", tmp_path / "sweep.h5")
-    assert [setting["runs"] for setting in cpfls.told(*words, "--choose-on", kept)["settings"]] == [1, 1]
-
-
-@pytest.mark.parametrize("command", ["identify", "sweep"])
-def test_choice_and_flights_must_go_together(refuse, study, pipeline, others, tmp_path, command):
+def test_choice_and_flights_must_go_together(refuse, study, pipeline, others, tmp_path):
     output = ("-o", tmp_path / "out.h5")
-    (message,) = refuse(command, study, pipeline.flight, *HELD_OUT, *output)
+    (message,) = refuse("identify", study, pipeline.flight, *HELD_OUT, *output)
     assert 'identification.choice = "held-out": needs a flight' in message
     assert "--choose-on FLIGHT" in message
-    (message,) = refuse(command, study, pipeline.flight, "--choose-on", others[0], *output)
+    (message,) = refuse("identify", study, pipeline.flight, "--choose-on", others[0], *output)
     assert "--choose-on" in message
     assert "held-out" in message
 
@@ -78,17 +69,13 @@ def test_what_is_no_flight_cannot_choose(refuse, study, pipeline, tmp_path):
     assert "flight" in message
 
 
-@pytest.mark.parametrize("command", ["identify", "sweep"])
-def test_flights_of_another_vehicle_are_named(cpfls, study, pipeline, others, tmp_path, command):
+def test_flights_of_another_vehicle_are_named(cpfls, study, pipeline, others, tmp_path):
     """Their numbers are of that vehicle; they are used all the same."""
-    heavy, config = tmp_path / "heavy.h5", study
+    heavy = tmp_path / "heavy.h5"
     path = others[0].with_name(others[0].name.replace("flight", "trajectory"))
     inertia = ("--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]")
     cpfls.done("simulate", study, path, *inertia, "-o", heavy)
-    if command == "sweep":
-        config = tmp_path / "sweep.yaml"
-        config.write_text(f"{study.read_text()}sweep: {json.dumps({'seeds': 1, 'settings': [{'name': 'plain'}]})}\n")
-    words = (command, config, pipeline.flight, *HELD_OUT, *SEARCH, "--choose-on", heavy, "--validate", others[1])
+    words = ("identify", study, pipeline.flight, *HELD_OUT, *SEARCH, "--choose-on", heavy, "--validate", others[1])
     result = cpfls.done(*words, "-o", tmp_path / "out.h5")
     said = [line for line in result.stderr.splitlines() if "another vehicle" in line]
     assert len(said) == 1

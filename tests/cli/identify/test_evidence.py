@@ -74,7 +74,6 @@ def unfolded(blocks):
     return [inner for block in blocks for inner in (unfolded(block["blocks"]) if "blocks" in block else [block])]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls, study, tmp_path):
     model, text, _ = validated
     page = tmp_path / "report.json"

@@ -87,10 +87,9 @@ def kill_at_random(start, output, moments, most):
     return kills
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_killed_at_random_moments_it_ends_the_same(program, whole, tmp_path, seed):
+def test_killed_at_random_moments_it_ends_the_same(program, whole, tmp_path):
     output = tmp_path / "model.h5"
-    assert kill_at_random(program, output, random.Random(seed), 100) > 0
+    assert kill_at_random(program, output, random.Random(0), 100) > 0
     assert output.read_bytes() == whole.read_bytes()
     assert names(tmp_path) == ["model.h5"]
 
@@ -109,7 +108,7 @@ def test_killed_and_started_from_nothing(words, whole, tmp_path):
 # The initial population and six generations leave a checkpoint each; the eighth file is the model.
 @pytest.mark.parametrize(
     ("call", "owner", "name"),
-    [(1, os, "fsync"), (3, os, "fsync"), (3, os, "replace"), (8, os, "fsync"), (8, os, "replace")],
+    [(1, os, "fsync"), (3, os, "replace"), (8, os, "fsync"), (8, os, "replace")],
 )
 def test_killed_while_writing_it_ends_the_same(program, whole, tmp_path, call, owner, name):
     output = tmp_path / "model.h5"
@@ -147,12 +146,7 @@ def test_first_signal_stops_the_search_and_a_second_one_the_program(program, who
 
 @pytest.mark.parametrize(
     ("call", "file", "size"),
-    [
-        (1, "model.h5.checkpoint", 0),
-        (4, "model.h5.checkpoint", 20_000),
-        (8, "model.h5", 0),
-        (8, "model.h5", 20_000),
-    ],
+    [(1, "model.h5.checkpoint", 0), (4, "model.h5.checkpoint", 20_000), (8, "model.h5", 20_000)],
 )
 def test_full_disk_leaves_the_checkpoint_before(program, whole, tmp_path, call, file, size):
     """The system refuses what goes beyond a size, in the first or a later block."""

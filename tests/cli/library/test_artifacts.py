@@ -44,10 +44,6 @@ def test_a_dimension_of_another_length_in_each_group_is_named_with_its_group(tmp
         assert dict(named[f"curves/{axis}/gain"].sizes) == {f"curves/{axis}/frequency": length, "axis": 3}
 
 
-def artifact_data(artifact):
-    return {name: artifact[name] for name in artifact}
-
-
 def test_columns_are_named_by_axis_and_have_units(pipeline):
     flight = cpfls_cli.read(pipeline.flight)
     frame = flight.to_pandas()

@@ -11,6 +11,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from tests.builders.command_line import drawn
 from tests.builders.evidence_artifacts import with_evidence
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -54,7 +55,8 @@ def page(cpfls, pipeline, study, tmp_path_factory):
     """A report with everything: two models, of which one holds evidence."""
     folder = tmp_path_factory.mktemp("browser")
     model, output = with_evidence(pipeline.model, folder / "other.h5"), folder / "report.html"
-    result = cpfls("report", study, *pipeline.paths.values(), model, "-o", output, "--json")
+    with drawn():
+        result = cpfls("report", study, *pipeline.paths.values(), model, "-o", output, "--json")
     assert result.exit_code == 0, result.stderr
     return SimpleNamespace(text=output.read_text(encoding="utf-8"), path=output, **json.loads(result.stdout))
 

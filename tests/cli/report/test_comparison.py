@@ -19,8 +19,6 @@ from tests.builders.evidence_artifacts import curves, steps, verdict
 from tests.builders.identified_models import EVIDENCE_PARTS, with_parts
 from tests.builders.vehicle_models import vehicle_of, whole, write_vehicle
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 
 @pytest.fixture(scope="module")
 def bare(pipeline):
@@ -186,13 +184,6 @@ def test_each_model_is_summarised_after_the_comparison(compared, write):
     assert "comparison" not in names, "equal files count once"
     names, _ = compared(write("one.h5"), write("two.h5", (2.0, 1.0, 1.0)))
     assert names[:4] == ["summary", "comparison", "identify", "identify-2"]
-
-
-def test_a_file_given_twice_is_shown_once_and_said_so(cpfls, study, write, tmp_path):
-    path = write("one.h5")
-    result = cpfls("report", study, path, path, "-o", tmp_path / "twice.json")
-    assert result.exit_code == 0
-    assert f"{path}: given 2 times; shown once" in result.stderr
 
 
 def test_equal_configs_are_called_equal(compared, write):

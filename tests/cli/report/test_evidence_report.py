@@ -12,7 +12,7 @@ import pytest
 import cpfls_cli
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.store import read
-from tests.builders.command_line import undrawn
+from tests.builders.command_line import drawn
 from tests.builders.evidence_artifacts import REASONS, with_evidence
 from tests.builders.identified_models import EVIDENCE_PARTS, write_changed
 
@@ -63,7 +63,7 @@ def bare(pipeline, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(report, model):
-    with undrawn(told=True):
+    with drawn(shown=False):
         return report(model())
 
 
@@ -77,7 +77,6 @@ def test_all_evidence_is_shown(page):
     assert page.text.count("<summary>Numbers</summary>") == len(page.figures)
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_model_without_evidence_names_the_command_that_adds_it(report, bare):
     page = report(bare)
     assert [name for name in EVIDENCE if name in section(page, "identify")] == []
@@ -85,7 +84,6 @@ def test_a_model_without_evidence_names_the_command_that_adds_it(report, bare):
     assert "NOT JUDGED: bare.h5" in section(page, "summary")
 
 
-@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("label", "short", "told", "tone"),
     [
@@ -105,7 +103,6 @@ def test_the_verdict_comes_first_and_with_its_reasons(report, model, label, shor
         assert f"{sign}: {reason[0].upper()}{reason[1:]}." in f"{summary} {evidence}"
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_an_incomplete_search_is_told_in_the_summary(report, model):
     stopped = {"stop_reason": "time-limit"}
     assert "stopped (time limit), go on with" in section(report(model(**stopped)), "summary")
@@ -129,7 +126,6 @@ def test_structures_are_compared_and_the_least_error_is_marked_in_words(page):
     assert "7 functions (this model)" in shown
 
 
-@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("error", "told"),
     [
@@ -150,7 +146,6 @@ def test_the_ridge_curve_says_whether_there_is_evidence_for_a_fuzzy_part(report,
     assert "identify-1-ridge-curve" in page.figures
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_how_many_samples_of_how_many_were_examined(report, model):
     assert "the first 2500 of its 7300 samples" in section(report(model()), "identify")
     whole = section(report(model(**{"residuals/available": 2500})), "identify")
@@ -166,7 +161,6 @@ def test_residuals_are_called_white_where_they_are(page):
     assert "a|b <i>" in shown
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_residuals_that_are_rounding_are_not_drawn(report, model):
     exact = {"residuals/autocorrelation": np.full((40, 3), np.nan), "residuals/ljung_box": np.full(3, np.nan)}
     page = report(model(**exact))
@@ -174,7 +168,6 @@ def test_residuals_that_are_rounding_are_not_drawn(report, model):
     assert not set(FIGURES[:3]) & set(page.figures)
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipeline):
     value = read(pipeline.model, IdentifiedModel)[0].rigid_body
     spread = np.tile([-1.0, 1.0], 30)[:, None] * np.array([1.0, 1e-9, 1.0, 1.0, 1.0, 1.0])
@@ -187,7 +180,6 @@ def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipe
     assert last["Iyy"] == "◂"
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_the_round_trip_is_told_with_its_share(page, report, model):
     assert "D22 96.0 %, D33 96.0 %, D11 96.0 %" in section(page, "identify")
     without = report(model(**{"round_trip/inertia": None, "round_trip/inside": None}))
@@ -200,7 +192,6 @@ def test_a_prediction_that_is_lost_is_a_dash_and_the_least_error_is_marked(page)
     assert re.search(r"0\.500 s 50 model \S+ ◂ \S+ ◂", shown)
 
 
-@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("condition", "told"), [(3.0, "one rule holds everywhere"), (1e4, "the model extrapolates")])
 def test_one_rule_that_training_determined_holds_everywhere(cpfls, pipeline, study, tmp_path, condition, told):
     single, known = (tmp_path / f"{name}.h5" for name in ("single", "known"))

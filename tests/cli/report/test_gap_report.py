@@ -17,7 +17,7 @@ from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.artifacts.job import input_file
 from cpfls_cli.store import Origin
 from tests.builders import gap_artifacts as made
-from tests.builders.command_line import run
+from tests.builders.command_line import drawn, run
 from tests.builders.studies import VEHICLE
 
 FIGURES = [
@@ -56,7 +56,8 @@ def full(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gap")
     diagnosis = made.diagnosis(alone=[("torque_bias", 0.9)])
     written(folder / "diagnosis.h5", diagnosis)
-    return shown(folder, made.disagreement(), diagnosis, made.extended())
+    with drawn():
+        return shown(folder, made.disagreement(), diagnosis, made.extended())
 
 
 def test_the_answer_comes_first_and_every_figure_once(full):
@@ -108,12 +109,6 @@ def test_the_model_that_runs_away_does_not_flatten_the_picture(full):
     assert "the model as given leaves the figure" in full.text
 
 
-def test_equal_artifacts_give_equal_pages(tmp_path):
-    given = replace(made.diagnosis(), run=None, picture=None, playback=None)
-    assert shown(tmp_path, given).html == shown(tmp_path, given).html
-
-
-@pytest.mark.usefixtures("undrawn")
 def test_what_is_lacking_is_left_out_and_said(tmp_path):
     bare = replace(made.diagnosis(force=False), run=None, picture=None, whiteness=None, playback=None)
     page = shown(tmp_path, bare)
@@ -124,7 +119,6 @@ def test_what_is_lacking_is_left_out_and_said(tmp_path):
     assert "force along" not in page.text[: page.text.index("effects and their coefficients")]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_disagreement_alone_says_where_and_how_to_go_on(tmp_path):
     page = shown(tmp_path, replace(made.disagreement(force=False), heat_map=None, playback=None))
     assert page.summary["figures"] == ["compare-1-gap-over-time", "compare-1-dependence"]
@@ -133,7 +127,6 @@ def test_a_disagreement_alone_says_where_and_how_to_go_on(tmp_path):
     assert "cpfls diagnose" in page.text
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_disagreement_below_noise_has_nothing_to_follow(tmp_path):
     quiet = made.disagreement(**{"gap/floors": np.array([0.4, 0.5, 0.6, 0.7, 0.8, 0.9])})
     page = shown(tmp_path, quiet)
@@ -141,7 +134,6 @@ def test_a_disagreement_below_noise_has_nothing_to_follow(tmp_path):
     assert "compare-1-dependence" not in page.summary["figures"]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_an_extended_model_alone_brings_its_figures(tmp_path):
     page = shown(tmp_path, made.extended())
     assert page.summary["figures"] == [
@@ -151,7 +143,6 @@ def test_an_extended_model_alone_brings_its_figures(tmp_path):
     assert "its largest gap is 1.2 noise floors; it was 70" in page.text
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_fault_of_a_sensor_stands_under_sensors(tmp_path):
     finding = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
     page = shown(tmp_path, made.diagnosis(named=({"name": "gyro_bias", "kind": "sensor"},), **made.audit([finding])))
@@ -161,7 +152,6 @@ def test_a_fault_of_a_sensor_stands_under_sensors(tmp_path):
     assert "without the faults of the sensors" in page.text
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_title_of_the_config_wins(tmp_path):
     page = shown(tmp_path, made.disagreement(), options=("--set", "report.title=My vehicle"))
     assert "<h1>My vehicle</h1>" in page.html

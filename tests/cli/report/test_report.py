@@ -13,7 +13,7 @@ from benchmarks.paper.report import paper_page
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.store import read
 from tests.builders.artifacts import read_result, with_fields
-from tests.builders.command_line import run
+from tests.builders.command_line import drawn, run
 from tests.builders.studies import VEHICLE
 
 CONFIG = """
@@ -38,7 +38,7 @@ report: {title: "<script>alert(1)</script> & a study"}
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
     "summary", "comparison", "identify", "identify-2", "stated-vehicle", "trajectory", "simulate", "simulate-2",
-    "reduce", "sweep", "provenance",
+    "reduce", "provenance",
 ]  # fmt: skip
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -81,7 +81,7 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     config = folder / "study.yaml"
     config.write_text(CONFIG + VEHICLE)
-    names = ("trajectory", "flight", "selection", "model", "ridge", "noisy", "sweep")
+    names = ("trajectory", "flight", "selection", "model", "ridge", "noisy")
     files = SimpleNamespace(folder=folder, config=config, **{name: folder / f"{name}.h5" for name in names})
     cpfls("trajectory", config, "-o", files.trajectory)
     cpfls("simulate", config, files.trajectory, "-o", files.flight)
@@ -90,8 +90,6 @@ def study(tmp_path_factory):
     cpfls("identify", config, files.flight, "--selection", files.selection, "-o", files.model)
     based = ("--set", "identification.base=rigid-body", "--set", "identification.ridge.count=3")
     cpfls("identify", config, files.noisy, "-o", files.ridge, *based)
-    settings = "sweep.settings=[{name: <b>small</b>}, {name: all, set: {reduction.size: null}}]"
-    cpfls("sweep", config, files.flight, "-o", files.sweep, "--set", settings, "--set", "sweep.seeds=2")
     return files
 
 
@@ -104,10 +102,10 @@ def full(study):
         study.selection,
         study.model,
         study.ridge,
-        study.sweep,
     )
     output = study.folder / "report.html"
-    summary = json.loads(cpfls("report", study.config, *given, "-o", output, "--json").stdout)
+    with drawn():
+        summary = json.loads(cpfls("report", study.config, *given, "-o", output, "--json").stdout)
     html = output.read_text(encoding="utf-8")
     return SimpleNamespace(output=output, summary=summary, html=html, page=Page(html), given=given)
 
@@ -128,7 +126,7 @@ def test_everything_given_everything_shown(full):
     assert kinds == {
         "trajectory-1-derivatives", "trajectory-1-attitude", "simulate-1-attitude", "simulate-1-torque",
         "simulate-2-attitude", "simulate-2-torque", "reduce-1-figure",
-        "sweep-1-replicates", "identify-1-convergence", "identify-1-pareto-front",
+        "identify-1-convergence", "identify-1-pareto-front",
         "identify-1-figure", "identify-2-convergence", "identify-2-pareto-front", "identify-2-ridge-curve",
     }  # fmt: skip
 
@@ -139,7 +137,6 @@ def test_no_id_stands_twice_and_every_element_is_closed(full):
     assert full.page.open == []
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_single_artifact_says_what_is_missing_and_what_makes_it(study, tmp_path):
     summary, html, _ = report(study, tmp_path, study.noisy)
     assert summary["sections"] == ["summary", "stated-vehicle", "simulate", "provenance"]
@@ -158,6 +155,7 @@ def test_the_page_needs_nothing_from_outside(full):
             assert attributes.get(key, "#").startswith(("#", "data:,")), (tag, attributes)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_equal_inputs_give_equal_bytes(study, full, tmp_path):
     _, html, _ = report(study, tmp_path, *full.given)
     assert html == full.html
@@ -204,7 +202,6 @@ def test_the_tables_show_the_numbers_of_the_artifacts(study, full):
         assert f"{number:.5g}" in full.page.text
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_the_paper_s_numbers_stand_beside_those_of_its_own_report_alone(study, full):
     text = Page(paper_page(study.config, full.given).text).text
     for printed in ("56254", "59771", "+22.54 %", "5506.4", "0.1531", "121.5 × 10⁻⁶", "Paper"):
@@ -213,7 +210,6 @@ def test_the_paper_s_numbers_stand_beside_those_of_its_own_report_alone(study, f
         assert printed not in full.page.text
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_rank_deficient_selection_is_called_so(study, tmp_path):
     rank = read_result(study.selection).rank_full - 2
     broken = tmp_path / "broken.h5"
@@ -225,7 +221,6 @@ def test_a_rank_deficient_selection_is_called_so(study, tmp_path):
     assert "better conditioned" not in text
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_selections_from_one_flight_have_a_section_each(study, tmp_path):
     smaller = tmp_path / "smaller.h5"
     cpfls("reduce", study.config, study.flight, "-o", smaller, "--set", "reduction.size=40")
@@ -242,7 +237,6 @@ def test_the_provenance_names_hashes_and_no_folder(study, full):
     assert read(study.model, IdentifiedModel)[1].config in full.page.text
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_file_given_twice_counts_once_and_equal_names_are_told_apart(study, tmp_path):
     (tmp_path / "other").mkdir()
     copy, other = tmp_path / "copy.h5", tmp_path / "other" / "flight.h5"
@@ -256,28 +250,11 @@ def test_a_file_given_twice_counts_once_and_equal_names_are_told_apart(study, tm
     )
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_another_vehicle_is_pointed_out(study, tmp_path):
     _, html, _ = report(study, tmp_path, study.flight, options=("--set", "vehicle.mass_kg=7.0"))
     assert "another vehicle than this one: flight.h5" in html
 
 
-def test_what_is_not_an_artifact_ends_with_a_message(study, tmp_path):
-    foreign = tmp_path / "foreign.h5"
-    foreign.write_text("no artifact")
-    result = cpfls("report", study.config, foreign, "-o", tmp_path / "out.html", code=2)
-    assert "foreign.h5" in result.stderr
-    assert not (tmp_path / "out.html").exists()
-
-
-def test_an_existing_page_is_kept_and_a_dry_run_writes_nothing(study, full, tmp_path):
-    cpfls("report", study.config, study.flight, "-o", full.output, code=2)
-    assert full.output.read_text(encoding="utf-8") == full.html
-    cpfls("report", study.config, study.flight, "-o", tmp_path / "new.html", "--dry-run")
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.usefixtures("undrawn")
 def test_where_there_is_nothing_to_search_for_no_search_is_shown(study, tmp_path):
     model = tmp_path / "single.h5"
     single = ("--set", "identification.membership_functions=1", "--set", "identification.base=rigid-body")
@@ -293,6 +270,7 @@ def test_where_there_is_nothing_to_search_for_no_search_is_shown(study, tmp_path
     assert table[: table.index("</table>")].count(">no search<") == 2
 
 
+@pytest.mark.usefixtures("drawn")
 def test_the_search_is_labelled_by_the_error_that_it_minimised(study, tmp_path):
     for model, error, other in (
         (study.model, "mean squared error, (N m)²", "cross-validated error"),

@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.pages.page import written
 from cpfls_cli.report.content import Form, Listing, Section
-from tests.builders.command_line import undrawn
+from tests.builders.command_line import drawn
 
 HOSTILE = "a|b <script>alert(1)</script> `x` [y](http://z) *w* \\ & #1 $m$"
 
@@ -20,7 +20,7 @@ def report(cpfls, pipeline, study, tmp_path_factory):
     def write(name, *options, little=False):
         output = tmp_path_factory.mktemp("report") / name
         given = [pipeline.selection] if little else pipeline.paths.values()
-        with undrawn(told=True):
+        with drawn(shown=False):
             result = cpfls("report", study, *given, "-o", output, "--json", *options)
         assert result.exit_code == 0, result.stderr
         return output.read_text(encoding="utf-8"), json.loads(result.stdout)

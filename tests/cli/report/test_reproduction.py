@@ -1,4 +1,4 @@
-"""The reproduction section, and sweeps of equal settings taken as one."""
+"""The reproduction section, and searches of equal settings taken as one."""
 
 import json
 import re
@@ -7,53 +7,44 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.paper.claims import EvaluationTime
+from benchmarks.paper.replicates import Sweep
 from benchmarks.paper.report import paper_page
-from cpfls_cli.identification.replicates import Sweep
 from cpfls_cli.store import read, write
 from tests.builders.pages import table_cells
-
-pytestmark = pytest.mark.usefixtures("undrawn")
+from tests.builders.sweeps import searched
 
 TIMES = [EvaluationTime(samples=n, svd_s=n / 10, evaluation_s=n / 5, compiled_s=1.0) for n in (10, 20, 40)]
 
 
 @pytest.fixture(scope="module")
-def folder(cpfls, swept, tmp_path_factory):
-    """The sweep whole, and in two parts."""
-    folder = tmp_path_factory.mktemp("reproduction")
-    (folder / "study.yaml").symlink_to(swept / "study.yaml")
-    (folder / "trajectory.h5").symlink_to(swept / "trajectory.h5")
-    (folder / "whole.h5").symlink_to(swept / "sweep.h5")
-    words = ("sweep", swept / "study.yaml", swept / "flight.h5", "-o")
-    made = [
-        cpfls(*words, folder / "first.h5", "--set", "sweep.seeds=1"),
-        cpfls(*words, folder / "rest.h5", "--seed", "5", "--set", "sweep.seeds=2"),
-    ]
-    assert [result.exit_code for result in made] == [0, 0]
-    return folder
+def folder(swept):
+    """Searches whole, and in two parts."""
+    searched(swept, "first.h5", 4, 1)
+    searched(swept, "rest.h5", 5, 2)
+    return swept
 
 
 def page(folder, *names, times=()):
     """Write a report on the paper."""
-    made = paper_page(folder / "study.yaml", [folder / name for name in names], times)
+    made = paper_page(folder / "study.yaml", [folder / name for name in ("trajectory.h5", *names)], times)
     return made, made.text
 
 
-def test_parts_of_a_sweep_stand_as_the_whole(folder):
+def test_parts_of_searches_stand_as_the_whole(folder):
     _, whole = page(folder, "whole.h5")
     summary, parts = page(folder, "first.h5", "rest.h5")
-    assert [name for name in summary.tables if name.startswith("sweep")] == [f"sweep-1-table-{n}" for n in (1, 2, 3)]
-    assert table_cells(parts, "sweep-1-table-2") == table_cells(whole, "sweep-1-table-2")
+    assert [name for name in summary.tables if name.startswith("searches")] == ["searches-1-table"]
+    assert table_cells(parts, "searches-1-table") == table_cells(whole, "searches-1-table")
     assert "first.h5 and rest.h5" in parts
 
 
-def test_sweeps_that_share_a_seed_stand_apart(folder):
+def test_searches_that_share_a_seed_stand_apart(folder):
     summary, _ = page(folder, "whole.h5", "first.h5")
-    assert {name[:7] for name in summary.tables if name.startswith("sweep")} == {"sweep-1", "sweep-2"}
+    assert {name for name in summary.tables if name.startswith("searches")} == {f"searches-{n}-table" for n in (1, 2)}
 
 
 def test_every_claim_and_every_figure_has_its_line(folder):
-    summary, html = page(folder, "trajectory.h5", "whole.h5", times=TIMES)
+    summary, html = page(folder, "whole.h5", times=TIMES)
     assert "figure-1-seesaw" in summary.figures
     rows = table_cells(html, "claims")[1:]
     verdicts = [row[1] for row in rows]
@@ -70,7 +61,7 @@ def test_every_claim_and_every_figure_has_its_line(folder):
 
 def test_a_report_of_the_package_holds_nothing_against_the_paper(cpfls, folder):
     output = folder / "r.html"
-    given = [folder / "trajectory.h5", folder / "whole.h5"]
+    given = [folder / "trajectory.h5"]
     result = cpfls("report", folder / "study.yaml", *given, "-o", output, "--json")
     html = output.read_text(encoding="utf-8")
     assert "reproduction" not in json.loads(result.stdout)["sections"]
@@ -79,7 +70,7 @@ def test_a_report_of_the_package_holds_nothing_against_the_paper(cpfls, folder):
 
 
 def with_settings(folder, name, **values):
-    """Write a sweep that claims other settings."""
+    """Write searches that claim other settings."""
     sweep, origin = read(folder / "whole.h5", Sweep)
     rows = (dict(zip(values, each, strict=True)) for each in zip(*values.values(), strict=True))
     settings = tuple(replace(own, **given) for own, given in zip(sweep.settings, rows, strict=True))
@@ -90,7 +81,7 @@ def with_settings(folder, name, **values):
 def test_paper_stands_beside_settings_of_equal_structure_and_samples(folder):
     claimed = with_settings(folder, "paper.h5", samples=[685, 5487], structure=["cpfls", "fls"])
     _, html = page(folder, claimed)
-    rows = table_cells(html, "sweep-1-table-2")
+    rows = table_cells(html, "searches-1-table")
     places = {row[0].replace("\N{NO-BREAK SPACE}", " "): place for place, row in enumerate(rows)}
     assert rows[places["best run: MSE, (N m)²"] + 1] == ["· paper", "0.0008", "0.0007"]
     assert rows[places["best run: largest error, N m"] + 1] == ["· paper", "0.1952", "0.1531"]
@@ -101,4 +92,4 @@ def test_paper_stands_beside_settings_of_equal_structure_and_samples(folder):
 
 def test_other_settings_stand_alone(folder):
     _, html = page(folder, "whole.h5")
-    assert "· paper" not in [row[0] for row in table_cells(html, "sweep-1-table-2")]
+    assert "· paper" not in [row[0] for row in table_cells(html, "searches-1-table")]

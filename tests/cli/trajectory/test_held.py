@@ -32,6 +32,7 @@ def study(tmp_path):
     return write
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_held_vehicle_has_no_position(cpfls, tmp_path, study):
     planned = cpfls.done("trajectory", study(), "-o", tmp_path / "t.h5", "--plot")
     assert "held at its centre of mass" in planned.stdout
@@ -59,7 +60,7 @@ def test_optimised_says_what_the_path_is_worth(cpfls, tmp_path, study):
     assert told["evaluations"] == 5
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("drawn")
 def test_a_model_learned_on_full_rotations_holds_on_another_one(cpfls, tmp_path, study):
     for seed in (1, 2):
         t, f = tmp_path / f"t{seed}.h5", tmp_path / f"f{seed}.h5"

@@ -57,7 +57,6 @@ def test_runs_flown_in_closed_loop_are_found_equal(cpfls, config, mission, tmp_p
     assert np.ptp(flown.attitude[:, :2], axis=0).min() > np.radians(2.0)
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_repeated_path_says_how_long_it_takes_and_why(cpfls, config, tmp_path):
     result = cpfls.done("trajectory", config, "--repeat", "3", "-o", tmp_path / "m.h5", "-v")
     assert "The path is flown 3 times, each run the same from rest to rest: 54.86 s each" in result.stdout

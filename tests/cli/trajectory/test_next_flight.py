@@ -73,7 +73,6 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(cpfls, con
         assert (output.read_bytes() == planned[0].read_bytes()) is same
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_it_flies_like_any_other_and_its_page_says_what_it_tells(cpfls, config, planned, tmp_path):
     cpfls.done("simulate", config, planned[0], "-o", tmp_path / "flight.h5")
     cpfls.done("report", config, planned[0], "-o", tmp_path / "page.md")

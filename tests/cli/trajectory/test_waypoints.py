@@ -238,6 +238,7 @@ def test_a_given_period_that_decides_alone_is_named(cpfls, tmp_path, config):
     assert "integral of |jerk| by move, m/s^2: 8, 8, 8" in result.stdout
 
 
+@pytest.mark.usefixtures("drawn")
 def test_plot_draws_both_figures(cpfls, refuse, tmp_path, config):
     cpfls.done("trajectory", config, "-o", tmp_path / "t.h5", "--plot")
     for name, words in (("derivatives", ["pop", "crackle", "displacement"]), ("attitude", ["roll", "pitch"])):

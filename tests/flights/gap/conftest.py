@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.builders.command_line import run, undrawn
+from tests.builders.command_line import run
 from tests.builders.recorded_flights import path_of_log
 
 CONFIGS = Path(__file__).parents[3] / "configs" / "gap"
@@ -20,8 +20,7 @@ def answer_of(tmp_path_factory):
         held = [word for path in paths[len(names) :] for word in ("--held-out", path)]
         out = tmp_path_factory.mktemp("gap") / "out"
         words = ("gap", CONFIGS / f"{config}.yaml", *paths[: len(names)], *held, "-o", out, "--json", *options)
-        with undrawn():
-            result = run(*words)
+        result = run(*words)
         assert result.exit_code == 0, result.stderr
         return json.loads(result.stdout)
 

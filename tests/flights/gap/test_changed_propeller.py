@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.builders.command_line import run, undrawn
+from tests.builders.command_line import run
 from tests.builders.recorded_flights import path_of_log
 
 CONFIGS = Path(__file__).parents[3] / "configs" / "gap"
@@ -24,8 +24,7 @@ def changed(tmp_path_factory):
     def call(today, since):
         flown, before = ([path_of_log("real/crazypad_usd", name) for name in side] for side in (today, since))
         words = ("changed", CONFIGS / "crazypad_usd.yaml", *flown, "--since", *before, "-o", out, "--json", "--force")
-        with undrawn():
-            result = run(*words)
+        result = run(*words)
         assert result.exit_code == 0, result.stderr
         return json.loads(result.stdout)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.builders.command_line import run, undrawn
+from tests.builders.command_line import run
 from tests.builders.recorded_flights import path_of_log
 
 CONFIG = Path(__file__).parents[3] / "configs" / "gap" / "crazypad_usd.yaml"
@@ -19,8 +19,7 @@ ASKED = (
 @pytest.mark.parametrize("name", ["normal_flight__E8_log00"])
 def test_the_twin_is_nearer_than_the_setpoint(tmp_path, name):
     words = ("simulate", CONFIG, path_of_log("real/crazypad_usd", name), "--autopilot", "crazyflie")
-    with undrawn():
-        result = run(*words, "--set", ASKED[0], "--set", ASKED[1], "-o", tmp_path / "twin.h5", "--json")
+    result = run(*words, "--set", ASKED[0], "--set", ASKED[1], "-o", tmp_path / "twin.h5", "--json")
     assert result.exit_code == 0, result.stderr
     said = json.loads(result.stdout)
     assert (said["asked"], said["thrust_from"], said["gains"]["source"]) == ("body_rate", "setpoint", "defaults")

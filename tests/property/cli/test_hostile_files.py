@@ -4,7 +4,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.builders.command_line import undrawn
+from tests.builders.command_line import drawn
 from tests.builders.hostile_files import DAMAGED, KINDS, Good, tried
 
 # `make fuzz` tries ten thousand of each, with all figures drawn.
@@ -29,7 +29,7 @@ def test_no_file_hurts(good, kind):
     )
     @given(seed=st.integers(0, 2**32))
     def holds(seed):
-        with undrawn(told=True):
+        with drawn(shown=False):
             assert tried(good.case(kind, seed)) is None
 
     holds()

@@ -1,18 +1,21 @@
 """A wrong number in a simulator's own file, named and corrected from flights in gusts, and nothing else touched."""
 
 import json
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
+from cpfls_cli.config.load import load_study
 from cpfls_cli.flightlog.airframe import turns_by_rotors
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulators.formats import read_model
 from tests.builders import command_line
 from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights
-from tests.builders.simulator_files import mjcf_of, rotorpy_of, sdf_of, write_log
+from tests.builders.simulator_files import mjcf_in_newtons, mjcf_of, rotorpy_of, sdf_of, write_log
+from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
-pytestmark = pytest.mark.usefixtures("undrawn")
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 FLIGHTS, SECONDS = 4, 40.0
 
@@ -64,6 +67,41 @@ def test_a_thrust_17_percent_too_large(tmp_path, logs):
     assert ends["position"]["after"] < min(0.8 * ends["position"]["before"], ends["position"]["without_model"])
     assert [rotor.thrust.value for rotor in new.rotors] == [change["after"]] * 4
     np.testing.assert_allclose(np.diag(new.inertia), TRUE.inertia, rtol=1e-4)
+    require_the_same_of_exports(tmp_path, change)
+    np.testing.assert_allclose(np.diag(read_model(tmp_path / "of.sdf").inertia), TRUE.inertia, rtol=1e-4)
+
+
+def require_the_same_of_exports(folder, change):
+    """What is exported of the extended model has the arms as stated, and thrust as it was found."""
+    model, mine = folder / "gap" / "extended.h5", read_model(folder / "mine.sdf")
+    side = abs(mine.hubs[0, 0])
+    for word, name in (("sdf", "of.sdf"), ("px4params", "of.params"), ("betaflight", "of.txt")):
+        result = command_line.run("export", model, "--format", word, "-o", folder / name)
+        assert result.exit_code == 0, result.stderr
+    again = read_model(folder / "of.sdf")
+    np.testing.assert_allclose(again.hubs, mine.hubs, rtol=1e-9, atol=1e-12)
+    factors = [rotor.thrust.value for rotor in again.rotors]
+    assert change["low"] < factors[0] < change["high"]
+    np.testing.assert_allclose(factors, factors[0], rtol=1e-12)
+    # Yaw torque follows thrust, as the file states their ratio.
+    np.testing.assert_allclose([r.ratio.value for r in again.rotors], TRUE.drag_factor / TRUE.thrust_factor, rtol=1e-9)
+    lines = (line.split("\t") for line in (folder / "of.params").read_text().splitlines() if "CA_ROTOR" in line)
+    stated = {name: float(value) for _, _, name, value, _ in lines}
+    assert abs(stated["CA_ROTOR0_PX"]) == pytest.approx(side, rel=1e-6)
+    assert stated["CA_ROTOR0_CT"] == pytest.approx(factors[0] * mine.speed_max.value**2, rel=1e-6)
+    assert stated["CA_ROTOR0_KM"] == pytest.approx(-SPINS[0] * -TRUE.drag_factor / TRUE.thrust_factor, rel=1e-6)
+    mixer = [line.split()[3:5] for line in (folder / "of.txt").read_text().splitlines() if line.startswith("mmix ")]
+    assert all(abs(float(each)) == 1.0 for row in mixer if len(row) == 2 for each in row)
+
+
+def test_thrust_and_inertia_that_are_both_wrong(tmp_path, logs):
+    said, new = corrected(tmp_path, logs, thrust=1 / 0.83, inertia=(1 / 1.2, 1 / 1.2, 1.0))
+    changes = {change["element"]: change for change in said["corrected"]["changes"]}
+    assert list(changes) == ["motorConstant", "ixx", "iyy"]
+    require_the_same_of_exports(tmp_path, changes["motorConstant"])
+    moments = np.diag(read_model(tmp_path / "of.sdf").inertia)
+    np.testing.assert_allclose(moments[:2], np.diag(new.inertia)[:2], rtol=0.01)
+    np.testing.assert_allclose(moments, TRUE.inertia, rtol=0.03)
 
 
 def test_an_inertia_20_percent_too_small(tmp_path, logs):
@@ -76,9 +114,7 @@ def test_an_inertia_20_percent_too_small(tmp_path, logs):
     assert {rotor.thrust.value for rotor in new.rotors} == {TRUE.thrust_factor}
 
 
-@pytest.mark.parametrize(
-    ("ending", "spins"), [("sdf", (-1, 1, -1, -1)), ("xml", (1, 1, -1, 1)), ("sdf", (1, -1, -1, 1))]
-)
+@pytest.mark.parametrize(("ending", "spins"), [("xml", (1, 1, -1, 1)), ("sdf", (1, -1, -1, 1))])
 def test_rotors_that_turn_the_other_way(tmp_path, logs, ending, spins):
     """One of them, or two of different spins, which roll and pitch would not show."""
     text = sdf_of(TRUE, spins=spins) if ending == "sdf" else mjcf_of(TRUE, spins)
@@ -125,6 +161,30 @@ def test_a_thrust_17_percent_too_large_in_python(tmp_path, logs):
     assert after[1].startswith("# Corrected by cpfls gap; 95 % intervals, from flight0.csv")
     (differs,) = [pair for pair in zip(before[1:], after[3:], strict=True) if pair[0] != pair[1]]
     assert differs[1] == f"    'k_eta': {change['after']:.4g},  # from a data sheet"
+
+
+def test_a_yaw_share_one_and_a_half_times_too_large_in_newtons(tmp_path, logs):
+    """Where controls are thrusts, the thrust by speed is the model's, and the file has the yaw torque over thrust."""
+    mine, study, vehicle = (tmp_path / name for name in ("mine.xml", "study.yaml", "vehicle.h5"))
+    mine.write_text(mjcf_in_newtons(TRUE, SPINS, ratio=1.5))
+    assert command_line.run("init", "--from", mine, logs[0], "-o", study).exit_code == 0
+    settings = load_study(study).vehicle
+    factors = {"thrust_factor_n_s2": TRUE.thrust_factor, "drag_factor_n_m_s2": TRUE.drag_factor}
+    rotors = tuple(replace(rotor, **factors) for rotor in settings.rotors)
+    known = replace(settings, rotors=rotors, unknown=())
+    write_vehicle(vehicle, vehicle_of(VehicleModel(vehicle=known)), config=study.read_text())
+    words = ("gap", mine, *logs[:-1], "--held-out", logs[-1], "--model", vehicle, "-o", tmp_path / "gap", "--json")
+    result = command_line.run(*words)
+    assert result.exit_code == 0, result.stderr
+    said, share = json.loads(result.stdout)["corrected"], TRUE.drag_factor / TRUE.thrust_factor
+    assert {change["element"] for change in said["changes"]} == {"gear yaw"}
+    for change in said["changes"]:
+        assert min(map(abs, (change["low"], change["high"]))) < share < max(map(abs, (change["low"], change["high"])))
+        assert change["sentence"].endswith("by its ratio to the inertia about z")
+    new = read_model(tmp_path / "gap" / "mine.xml")
+    assert [rotor.spin for rotor in new.rotors] == list(SPINS)
+    np.testing.assert_allclose(np.diag(new.inertia), TRUE.inertia)
+    require_the_same_in("mujoco", said)
 
 
 def test_turns_of_single_rotors_have_their_intervals():

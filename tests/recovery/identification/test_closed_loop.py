@@ -61,7 +61,7 @@ def test_what_comes_again_tells_the_body_in_gusts(sources):
 def test_least_squares_of_the_freed_torque_is_the_estimate_by_instruments(identified):
     result = identified["gusts"]
     np.testing.assert_allclose(result.rigid_body[:3], result.freed.rigid_body[:3], rtol=5e-3)
-    assert any("come from the torque that comes again" in finding for finding in result.findings)
+    assert any("come from the repeatable torque" in finding for finding in result.findings)
     assert result.loop is None
 
 
@@ -81,7 +81,7 @@ def test_where_nothing_repeats_what_was_before_tells_roll_and_pitch(identified):
     assert freed.rigid_body[2] == freed.least_squares[2]
     assert result.loop.shows_loop
     (finding,) = (each for each in result.findings if "show the loop" in each)
-    assert "Izz not determined because what was before does not tell it" in finding
+    assert "Izz not determined because past windows do not identify it" in finding
 
 
 def test_what_was_before_tells_no_body_in_a_quarter_of_a_minute(sources):
@@ -89,7 +89,7 @@ def test_what_was_before_tells_no_body_in_a_quarter_of_a_minute(sources):
     result = identify(source, source, {}, IdentificationSettings(), np.random.default_rng(1))
     assert result.freed is None
     assert result.loop.shows_loop
-    assert any("What was before does not tell them closer" in finding for finding in result.findings)
+    assert any("Past windows do not identify them better" in finding for finding in result.findings)
 
 
 def test_a_rest_that_comes_again_is_an_effect_and_not_taken_for_gusts(sources):

@@ -26,8 +26,6 @@ from tests.builders.playback_flights import (
     truth,
 )
 
-RATE = 3
-
 
 def fitted(vehicle, blocks, flights):
     windows = [own for flight in flights for own in windows_of([flight], 0.5, 0.6)]
@@ -78,6 +76,7 @@ def test_from_mass_and_geometry_alone_the_constants_come_back():
         assert number.value == pytest.approx(true[name], rel=part)
         assert number.low < true[name] < number.high
         assert number.determined
+    assert (found.guessed, found.model.vehicle.unknown) == ((), ())
     assert by_name["lag.time_constant_s"].value == pytest.approx(truth().response.lag_s, abs=0.002)
     # About yaw all is known by its inertia far better than by itself, and named as it is known.
     pairs = {(trade.first, trade.second) for trade in found.trades}

@@ -10,7 +10,7 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.validation.grounds import Grounds
+from cpfls_cli.validation.evidence import Evidence
 from cpfls_cli.validation.paired import Comparison, compare_torque
 from cpfls_cli.validation.physical import physical_sense
 from cpfls_cli.validation.replay import replay_steps
@@ -36,7 +36,7 @@ def rotating_flight(torque_of, noise, seed):
 
 
 @cache
-def grounds(torque_of, noise=0.0, structure=(), *, held_out=True, seeds=(3, 53)):
+def evidence(torque_of, noise=0.0, structure=(), *, held_out=True, seeds=(3, 53)):
     """All evidence on a model of a flight, judged on another."""
     training, other = (rotating_flight(torque_of, noise, seed) for seed in seeds)
     parts = {"other": other} if held_out else {}
@@ -45,7 +45,7 @@ def grounds(torque_of, noise=0.0, structure=(), *, held_out=True, seeds=(3, 53))
     part, data = ("other", other) if held_out else ("training", training)
     rigid_body = found.baselines[0]
     steps = replay_steps(part, data, {"model": found.model, "rigid-body": rigid_body.parameters}, 10, 100)
-    return Grounds(
+    return Evidence(
         identification=found,
         torque={name: compare_torque(own, found.model.torque, rigid_body.torque) for name, own in parts.items()},
         steps=steps,
@@ -81,12 +81,12 @@ def with_still_yaw(evidence):
 @pytest.fixture(scope="module")
 def better():
     """A model that wins over the rigid body."""
-    return grounds(bent, 0.05)
+    return evidence(bent, 0.05)
 
 
 @pytest.mark.parametrize("structure", [(("base", "none"),), ()], ids=["base none", "default"])
 def test_of_an_exact_rigid_vehicle_the_rigid_body_is_the_model(structure):
-    judged = verdict(grounds(rigid, 0.0, structure))
+    judged = verdict(evidence(rigid, 0.0, structure))
     assert judged.label == "not-better-than-rigid-body"
     assert said(judged, "it is itself good for control") == 0
     assert said(judged, "squared error of held-out torque: the same") == -1
@@ -94,14 +94,14 @@ def test_of_an_exact_rigid_vehicle_the_rigid_body_is_the_model(structure):
 
 
 def test_noisy_rotations_of_a_rigid_vehicle_switch_the_fuzzy_part_off():
-    judged = verdict(grounds(rigid, 0.05))
+    judged = verdict(evidence(rigid, 0.05))
     assert judged.label == "not-better-than-rigid-body"
     assert said(judged, "switched the fuzzy part off") == -1
     assert said(judged, "white noise") == 1
 
 
 def test_the_paper_s_coefficients_on_noisy_rotations_are_no_body():
-    judged = verdict(grounds(rigid, 0.05, tuple(PAPER.items())))
+    judged = verdict(evidence(rigid, 0.05, tuple(PAPER.items())))
     assert judged.label == "do-not-use"
     assert "D(q) is not positive definite" in judged.reasons[0][0]
     assert "the rigid body is good for control" in judged.reasons[0][0]
@@ -117,7 +117,7 @@ def test_inertia_that_depends_on_attitude_is_worth_a_model(better):
 
 
 def test_without_held_out_data_no_model_is_good():
-    judged = verdict(grounds(bent, 0.05, held_out=False))
+    judged = verdict(evidence(bent, 0.05, held_out=False))
     assert judged.label == "not-better-than-rigid-body"
     assert "nothing was held out" in judged.reasons[0][0]
     assert said(judged, "only on its own training data") == -1
@@ -125,7 +125,7 @@ def test_without_held_out_data_no_model_is_good():
 
 
 def test_signs_that_are_wrong_give_no_body():
-    judged = verdict(grounds(mirrored, 0.05))
+    judged = verdict(evidence(mirrored, 0.05))
     assert (judged.label, judged.reasons[0][1]) == ("do-not-use", -1)
 
 

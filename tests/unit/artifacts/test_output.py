@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import os
 
 import h5py
 import numpy as np
@@ -17,7 +16,7 @@ from cpfls_cli.artifacts.output import (
     locked,
     write_files,
 )
-from cpfls_cli.errors import InputError, OutputError
+from cpfls_cli.errors import OutputError
 
 
 def test_temporary_name_is_hidden_and_in_the_same_folder(tmp_path):
@@ -26,22 +25,6 @@ def test_temporary_name_is_hidden_and_in_the_same_folder(tmp_path):
         assert temporary.name.startswith(".s.h5.")
         assert list(tmp_path.iterdir()) == [temporary]
     assert list(tmp_path.iterdir()) == []
-
-
-def test_check_output_leaves_nothing(tmp_path):
-    (tmp_path / "old").write_text("old")
-    check_output(tmp_path / "new", force=False)
-    check_output(tmp_path / "old", force=True)
-    with pytest.raises(InputError, match="--force"):
-        check_output(tmp_path / "old", force=False)
-    assert [path.name for path in tmp_path.iterdir()] == ["old"]
-
-
-def test_a_pipe_and_a_folder_are_no_outputs(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    for name, kind in (("pipe", "a device or a pipe"), (".", "a folder")):
-        with pytest.raises(InputError, match=f"is {kind}"):
-            check_output(tmp_path / name, force=True)
 
 
 def test_only_what_was_half_written_of_an_output_is_tidied(tmp_path):

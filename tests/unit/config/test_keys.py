@@ -96,11 +96,15 @@ def test_a_config_file_with_keys_that_are_gone_is_refused_with_what_to_do(tmp_pa
     lines = str(refused.value).splitlines()
     assert [line.split(": ")[1] for line in lines] == ["report.evaluation_times", "report.paper"]
     assert all("remove it; `make reproduce`" in line for line in lines)
+    path.write_text("sweep: {seeds: 3}\n" + VEHICLE)
+    with pytest.raises(ConfigError, match=r"sweep\.seeds: is no longer a key: remove it; a loop over `cpfls identify"):
+        load_study(path)
 
 
 def test_keys_that_are_gone_are_left_out_of_the_configs_of_artifacts():
     study = validate({"report": {"title": "A study", "paper": True, "evaluation_times": []}}, "study.yaml")
     assert resolved(study)["report"] == {"title": "A study", "notes": []}
+    assert validate({"sweep": {"seeds": 3}}, "study.yaml") == validate({}, "study.yaml")
 
 
 def test_a_key_that_has_no_effect_any_more_is_read_with_a_warning(tmp_path, caplog):

@@ -99,9 +99,3 @@ def test_an_unknown_preset_is_refused(preset):
 def test_a_section_that_is_no_mapping_is_told_as_before(section):
     with pytest.raises(ConfigError, match="must be a section of keys"):
         validate({"identification": section}, "study.yaml")
-
-
-def test_a_setting_of_a_sweep_cannot_name_a_preset():
-    settings = [{"name": "as in the paper", "set": {"identification.preset": "paper"}}]
-    with pytest.raises(ConfigError, match=r'identification.preset = "paper": .*name the keys that differ'):
-        validate({"sweep": {"settings": settings}}, "study.yaml", sweep=True)

@@ -1,5 +1,6 @@
 """What the audit says where it cannot test, and what it says about the other channels."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -114,13 +115,13 @@ def test_channels_that_agree_are_not_warned_about(turning):
         (lambda s: replace(s, velocity=s.velocity[:, [1, 0, 2]], acceleration=None), "axes are swapped"),
         (lambda s: replace(s, velocity=s.velocity * [1, -1, -1], acceleration=None), "opposite signs along y"),
         (lambda s: replace(s, position=None, acceleration=s.acceleration + 0.5 * UP), "gravity"),
-        (lambda s: replace(s, velocity=np.roll(s.velocity, 6, axis=0), acceleration=None), "late by 6"),
+        (lambda s: replace(s, velocity=np.roll(s.velocity, 6, axis=0), acceleration=None), "late by (59|60)\\."),
         (lambda s: replace(s, velocity=s.velocity[::-1] ** 2 - 2.0, acceleration=None), "do not match"),
     ],
 )
 def test_channels_that_disagree_are_warned_about(turning, change, words):
     found = audit([change(moved(turning))], WINDOWS)
-    assert any(words in sentence for sentence in (*found.warnings, *found.contradictions))
+    assert any(re.search(words, sentence) for sentence in (*found.warnings, *found.contradictions))
 
 
 def test_noise_of_a_hover_is_not_taken_for_disagreement(turning):
@@ -168,7 +169,12 @@ def test_the_motion_follows_the_torque(turning, commanded, whom):
     torque = np.gradient(momentum, clean.time, axis=0) + np.cross(clean.body_rate, momentum)
     early = np.roll(torque, -5, axis=0)
     found = audit([replace(clean, stated_torque=early, commanded=commanded)], WINDOWS)
-    assert found.notes == (f"The motion follows the {whom} by 50 ms [50, 50].",)
+    (note,) = found.notes
+    # Of an interval that is narrower than a millisecond the digits are shown.
+    says = re.fullmatch(rf"The motion follows the {whom} by (\d+\.\d+) ms \[(\d+\.\d+), (\d+\.\d+)\]\.", note)
+    delay, low, high = map(float, says.groups())
+    assert low < delay < high
+    assert delay == pytest.approx(50.0, abs=0.1)
     assert not any("follows" in note for note in audit([turning], WINDOWS).notes)
     # Behind measured speeds it may be the autopilot that comes first.
     measured = replace(clean, stated_torque=early, rotor_speed=np.full((len(early), 4), 500.0))

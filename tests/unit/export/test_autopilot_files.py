@@ -8,7 +8,7 @@ import pytest
 
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.registry import exported
+from cpfls_cli.export.registry import FORMS, exported
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulators.formats import read_model
 from cpfls_cli.vehicle.rotors import allocation_matrix
@@ -175,3 +175,10 @@ def test_what_each_cannot_state_is_said():
         assert " no " in made.remarks[0]
         words = " ".join(re.sub(r"\n[#*/ ]*", " ", made.text).split())
         assert all(remark in words for remark in made.remarks)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_no_number_is_written_as_minus_nothing(form):
+    """A rotor in the plane of the centre of mass has a height of 0 in axes with z down, too."""
+    text = text_of(form, rotors_of(CROSS, height=0.0))
+    assert re.findall(r"(?<![\w.])-0(?:\.0*)?(?![\w.])", text) == []

@@ -78,7 +78,8 @@ def test_height_alone_tells_a_flight():
             None,
             None,
             None,
-            f"no rotors, no height and no rates are recognised, so flight cannot be told from standing: {BY_HAND}",
+            "no rotors, no height and no rates are recognised, so flight cannot be distinguished from standing: "
+            f"{BY_HAND}",
         ),
     ],
 )

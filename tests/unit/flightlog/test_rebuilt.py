@@ -26,10 +26,6 @@ def rebuilt(autopilot, **rates):
     return rebuilt_rotors({"": own.betaflight_columns()}, BF, "Betaflight 4.5.1")
 
 
-def true_at(found, own):
-    return np.column_stack([np.interp(found.time, own.time, column) for column in own.command.T])
-
-
 @pytest.mark.parametrize(
     ("autopilot", "rate_hz", "within"), [("px4", 50.0, 1e-6), ("ardupilot", 400.0, 2e-3), ("betaflight", 500.0, 2e-3)]
 )

@@ -6,7 +6,6 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
 ATTITUDE = SignalMap(columns=("a", "b", "c"), unit="deg")
-RATE = SignalMap(columns=("p", "q", "r"), unit="rad/s")
 TORQUE = SignalMap(columns=("l", "m", "n"), unit="N m")
 ROTORS = SignalMap(columns=("r1", "r2", "r3", "r4"), unit="rpm")
 

@@ -124,7 +124,8 @@ def test_the_clock_is_named_or_that_of_the_fastest_mapped_topic():
     np.testing.assert_allclose(columns["gyro.timestamp"], 1e3 * GYRO)
     with pytest.raises(
         InputError,
-        match=r"'t': .* such as gyro\.timestamp, or null for them; the log has the topics gyro, other, slow;",
+        match=r"'t': in this log every topic has its own stamps; name those of the fastest mapped one, such as "
+        r"gyro\.timestamp, or null for them; the log has the topics gyro, other, slow;",
     ):
         on_one_clock(topics, {}, replace(settings, time_column="t"))
     with pytest.raises(

@@ -134,6 +134,3 @@ def test_rows_are_weighted_by_axis():
     columns = constant_inertia_columns(motion())
     expected = np.linalg.lstsq((columns * scale[:, :, None]).reshape(-1, 6), (torque * scale).ravel(), rcond=None)[0]
     np.testing.assert_allclose(fitted(torque)["constant-inertia"].parameters, expected, atol=1e-12)
-
-
-VALUES = [0.0012, 0.0009, 0.0031, 0.0010]

@@ -141,6 +141,7 @@ def test_without_repeats_one_line_says_what_to_fly():
     assert plain(made.diagnosis())["repeatability"] is plain(made.disagreement())["repeatability"] is None
 
 
+@pytest.mark.usefixtures("drawn")
 def test_bars_hold_all_and_the_table_every_band():
     groups = {"repeatability_before": made.repeatability(PITCH), "repeatability_after": made.repeatability(NOTHING)}
     found = replace(made.diagnosis(), **groups)

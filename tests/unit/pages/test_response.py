@@ -113,6 +113,7 @@ def test_a_contradiction_comes_first():
     assert box.tone == "warning"
 
 
+@pytest.mark.usefixtures("drawn")
 def test_bode_plots_hold_the_curves():
     made = result_of(
         roll=estimate(0.5, np.where(FREQUENCY < 5, 0.9, 0.2), error=np.where(FREQUENCY < 5, 0.02, 0.4)),

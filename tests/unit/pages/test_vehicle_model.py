@@ -38,7 +38,7 @@ def title(own):
     return box_of(own).title.removeprefix("vehicle.h5: ")
 
 
-def grounds(own):
+def evidence(own):
     return list(box_of(own).sentences)
 
 
@@ -284,7 +284,7 @@ def test_constants_that_repeats_identify_are_judged_by_what_is_repeatable_and_no
     assert own.held_out is None
     assert own.forecast_verdict == Trust.NOT_JUDGED
     assert own.verdict == Trust.SIMULATION
-    first, cost, *_ = grounds(own)
+    first, cost, *_ = evidence(own)
     assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in first
     assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in first
     assert cost.startswith("Mismatch J of its frequency responses (0 is none, up to 100 is acceptable): roll 12")
@@ -295,9 +295,9 @@ def test_constants_that_repeats_identify_are_judged_by_what_is_repeatable_and_no
 def test_a_response_that_is_off_is_none_of_the_vehicle_and_one_that_is_not_seen_judges_nothing():
     off, unseen = instrumented(vehicle_of(whole()), cost=101.0), instrumented(vehicle_of(whole()), cost=np.nan)
     assert off.verdict == Trust.LACKING
-    assert "roll 101 (0.40 to 9.0 Hz), pitch 8.0" in " ".join(grounds(off))
+    assert "roll 101 (0.40 to 9.0 Hz), pitch 8.0" in " ".join(evidence(off))
     assert unseen.verdict == Trust.NOT_JUDGED
-    assert "do not show the frequency responses of roll and pitch clearly enough" in " ".join(grounds(unseen))
+    assert "do not show the frequency responses of roll and pitch clearly enough" in " ".join(evidence(unseen))
     assert plain(off)["responses"][0] == {"name": "roll", "cost": 101.0, "low": 0.4, "high": 9.0}
 
 
@@ -317,7 +317,7 @@ def test_constants_that_lack_something_are_not_good(given, number, trust):
     own = with_first(instrumented(vehicle_of(whole()), **given), **number)
     assert own.verdict == trust
     assert replace(own, contradictions=("rates are mirrored",)).verdict == Trust.DO_NOT_USE
-    said = " ".join(grounds(own))
+    said = " ".join(evidence(own))
     assert ("Below 2.0 Hz they explain less" in said) == ("bands" in given)
     assert ("Other values of Ixx would explain about as much" in said) == (trust == Trust.NOT_DETERMINED)
 

@@ -43,8 +43,7 @@ def somewhere(free, seed=0):
     return np.clip(free.starts + away, free.lows, free.highs)
 
 
-@pytest.mark.parametrize("every", [1, 2], ids=["steps of a sample", "steps of two"])
-@pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
+@pytest.mark.parametrize(("rules", "every"), [*zip(RULES.values(), (1, 2), strict=True)], ids=RULES)
 def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules, every):
     free = numbers(STATED, blocks_of(STATED), rules)
     values, scale = somewhere(free), free.scales

@@ -120,7 +120,7 @@ def test_few_vehicles_are_drawn_where_many_draws_are_impossible():
 
 
 def test_one_block_tells_no_interval():
-    with pytest.raises(InputError, match="too short to tell how sure its numbers are"):
+    with pytest.raises(InputError, match="too short to show how sure its numbers are"):
         spread_of(found_record(blocks=1))
 
 

@@ -46,16 +46,6 @@ def test_guesses_are_of_the_right_size():
     assert ((guess / true < 3) & (guess / true > 1 / 3)).all()
 
 
-def test_mass_and_geometry_are_enough_where_velocity_is_known():
-    vehicle, by_name = found(flown(TRUE, noise=MIDDLING, seed=2, hold="linear"))
-    rotor = TRUE.vehicle.rotors[0]
-    assert by_name["thrust_factor"].value == pytest.approx(rotor.thrust_factor_n_s2, rel=0.01)
-    assert by_name["drag_factor"].value == pytest.approx(rotor.drag_factor_n_m_s2, rel=0.05)
-    for axis, name in enumerate(("Ixx", "Iyy", "Izz")):
-        assert by_name[f"inertia.{name}"].value == pytest.approx(TRUE.vehicle.inertia_kg_m2[axis], rel=0.05)
-    assert (vehicle.guessed, vehicle.model.vehicle.unknown) == ((), ())
-
-
 def without_velocity(flights, accelerometer):
     """The same flights as a log without position and velocity has them."""
     gravity = np.array([0.0, 0.0, STATED.gravity_m_s2])

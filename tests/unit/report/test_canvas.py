@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from cpfls_cli.arrays import runs
 from cpfls_cli.report.canvas import band, figure_html, kept_samples, legend_above, legend_over, line, plot, stacked
 
+pytestmark = pytest.mark.usefixtures("drawn")
+
 
 def draw(figure):
     axes = figure.subplots()

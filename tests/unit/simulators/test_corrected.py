@@ -370,7 +370,7 @@ def test_thrusts_as_controls_are_not_what_flights_were_compared_with(tmp_path):
     assert files["cf2.xml"] == path.read_bytes()
     assert said.elsewhere[0].startswith(
         "thrust, as a factor on that which flights were compared with: M1 1.05 [1.05, 1.05], M3 0.95 [0.9495, 0.9505]; "
-        "controls are thrusts"
+        "controls are newtons"
     )
     assert said.elsewhere[1].startswith(
         "yaw torque over thrust, as a factor on that which flights were compared with: "
@@ -534,3 +534,63 @@ def test_a_direction_that_no_flight_shows_stays(mine):
     said, files = corrected(of, SMALL.vehicle, found, [flight])
     assert files["mine.sdf"] == mine.read_bytes()
     assert said.unchanged[0].startswith("directions of rotors: no flight of more than 5 s")
+
+
+SHIFT = np.array([0.004, -0.003, 0.002])
+
+
+def shifted(path):
+    """Correct a file by a centre of mass that is elsewhere; give what is said, and the file before and after."""
+    before = read_model(path)
+    offset = effect("com_offset", **{f"c_{axis}": (c, 1e-4) for axis, c in zip("xyz", SHIFT, strict=True)})
+    return *correct(path, offset), before
+
+
+def test_rotors_of_rotorpy_move_around_its_centre(tmp_path):
+    """Its own vehicle gives the torque about the centre of mass where that is, and the force of before."""
+    multirotor = pytest.importorskip("rotorpy.vehicles.multirotor").Multirotor
+    path = tmp_path / "mine.py"
+    text = rotorpy_of(SMALL).replace("'k_d'", "'k_z': 2e-7, 'k_d'")
+    path.write_text(text)
+    said, new, before = shifted(path)
+    # The second rotor is an expression for all three numbers: all are listed.
+    assert (said.changes, len(said.elsewhere)) == ((), 12)
+    path.write_text(text.replace("d * np.array([-0.5**0.5, -0.5**0.5, 0])", "[-side, -side, 0]"))
+    said, new, before = shifted(path)
+    np.testing.assert_allclose(new.hubs, before.hubs - SHIFT, rtol=0, atol=1e-5)
+    assert said.elsewhere == ()
+    assert len(said.changes) == 12
+    assert said.changes[0].sentence == "centre of mass of the vehicle is 4 mm forward, and M1 from there"
+    rng, wrenches = np.random.default_rng(1), []
+    speeds, rate, air = rng.uniform(800, 2500, 4), rng.normal(0, 0.0, 3), rng.normal(0, 3, 3)
+    for own in (path, path.parent / "new" / path.name):
+        names: dict = {}
+        exec(own.read_text(), names)
+        vehicle = multirotor(names["quad_params"])
+        wrenches.append(vehicle.compute_body_wrench(rate, speeds, air))
+    (force, torque), (after, moved) = wrenches
+    np.testing.assert_allclose(after, force, rtol=1e-12)
+    thrusts = before.rotors[0].thrust.value * (speeds**2).sum()
+    assert np.linalg.norm(np.cross(SHIFT, [0, 0, thrusts])) > 1e-4
+    np.testing.assert_allclose(moved, torque - np.cross(SHIFT, force), rtol=0, atol=1e-9 + 1e-5 * thrusts)
+
+
+def test_rotors_of_crazyflow_move_in_its_plane(tmp_path):
+    """Its mixing matrix times L has the levers of thrust, and none of heights."""
+    path = tmp_path / "params.toml"
+    path.write_text(SECTION.format(name="a"))
+    said, new, before = shifted(path)
+    np.testing.assert_allclose(new.hubs[:, :2], before.hubs[:, :2] - SHIFT[:2], rtol=0, atol=3e-5)
+    entries = {f"a.mixing_matrix[{row}][{rotor}]" for row in (0, 1) for rotor in range(4)}
+    assert {change.element for change in said.changes} == entries
+    assert said.elsewhere == ("centre of mass of the vehicle is 2 mm up: the format has no number for it",)
+
+
+def test_motors_of_ardupilot_move_around_its_centre(tmp_path):
+    path = tmp_path / "frame.json"
+    places = ((0.2, 0.2), (-0.2, -0.2), (0.2, -0.2), (-0.2, 0.2))
+    lines = "".join(f'"motor{i}_position": [{x}, {y}, -0.01],\n' for i, (x, y) in enumerate(places, 1))
+    path.write_text(FRAME.replace('"mass"', f'{lines}    "mass"'))
+    said, new, before = shifted(path)
+    np.testing.assert_allclose(new.hubs, before.hubs - SHIFT, rtol=0, atol=1e-4)
+    assert said.elsewhere == ()

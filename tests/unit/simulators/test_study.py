@@ -1,5 +1,6 @@
 """The vehicle of a study: rotors of a simulator's file in the order of the log, and which way they turn."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -65,3 +66,15 @@ def test_single_rotors_turn_as_the_log_has_them(tmp_path, turned, sure, has_log)
     assert list(vehicle.spins) == (true if has_log else spins)
     assert list(vehicle.turned) == (turned if has_log else [])
     assert len(vehicle.warnings) == len(turned)
+
+
+def test_a_largest_speed_that_a_log_let_one_guess_is_that_of_the_model(tmp_path):
+    """Whose config was made with another log: what is guessed makes no other vehicle."""
+    path = tmp_path / "mine.sdf"
+    path.write_text(sdf_of(LARGE, spins=(-1, 1, -1, 1)))
+    model = read_model(path)
+    fast = 1.3 * model.speed_max.value
+    proposal = SimpleNamespace(airframe=None, rotors=4, speed_max=fast, share_of_speed=False)
+    like = replace(LARGE.vehicle, rotor_speed_max_rad_s=1.5 * model.speed_max.value)
+    assert of_log(model, proposal, None).speed_max == fast
+    assert of_log(model, proposal, None, like).speed_max == like.rotor_speed_max_rad_s

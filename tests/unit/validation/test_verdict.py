@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.playback.loop import LoopBounds
-from cpfls_cli.validation.grounds import MODEL, Grounds
+from cpfls_cli.validation.evidence import MODEL, Evidence
 from cpfls_cli.validation.reasons import Reason, _band
 from cpfls_cli.validation.replay import NOTHING_MOVES
 from cpfls_cli.validation.trust import Trust
@@ -35,26 +35,26 @@ def test_ranges(roll, pitch, words):
     assert region_in_words(visited(list(roll), list(pitch))).startswith(words)
 
 
-def grounds(model_error, still_error, r2=(0.95, 0.95, 0.95)):
-    """What `confirmed_axes` asks of grounds, with the squared errors of replayed rates in one window."""
+def evidence(model_error, still_error, r2=(0.95, 0.95, 0.95)):
+    """What `confirmed_axes` asks of evidence, with the squared errors of replayed rates in one window."""
     steps = SimpleNamespace(model=(MODEL, NOTHING_MOVES), window_error=np.array([[model_error], [still_error]]))
     known = SimpleNamespace(replayed={"rest": steps}, r2_min=0.8, r2=lambda _: np.array(r2))
-    known.predicts = lambda predictor: Grounds.predicts(known, predictor)
+    known.predicts = lambda predictor: Evidence.predicts(known, predictor)
     return known
 
 
 def test_an_axis_that_torque_confirms_and_playback_denies_is_not_confirmed():
-    judged = grounds((1.0, 3.0, 1.0), (2.0, 2.0, 2.0))
+    judged = evidence((1.0, 3.0, 1.0), (2.0, 2.0, 2.0))
     assert confirmed_axes(judged, MODEL).tolist() == [True, False, True]
 
 
 def test_playback_does_not_confirm_what_torque_denies():
-    judged = grounds((1.0, 1.0, 1.0), (2.0, 2.0, 2.0), r2=(0.9, 0.5, 0.9))
+    judged = evidence((1.0, 1.0, 1.0), (2.0, 2.0, 2.0), r2=(0.9, 0.5, 0.9))
     assert confirmed_axes(judged, MODEL).tolist() == [True, False, True]
 
 
 def test_without_windows_torque_decides():
-    judged = grounds((np.nan,) * 3, (np.nan,) * 3)
+    judged = evidence((np.nan,) * 3, (np.nan,) * 3)
     assert confirmed_axes(judged, MODEL).all()
 
 

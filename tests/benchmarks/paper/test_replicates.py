@@ -5,7 +5,7 @@ import statistics
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.replicates import spread
+from benchmarks.paper.replicates import spread
 from cpfls_cli.result import plain
 from tests.builders.sweeps import setting_of
 

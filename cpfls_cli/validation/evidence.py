@@ -24,26 +24,14 @@ _MANY_LOST = 0.05
 
 
 @dataclass(frozen=True)
-class Grounds:
+class Evidence:
     """Evidence that the verdict on a model rests on.
 
-    Attributes
-    ----------
-    identification : Identification
-        Its scores hold the training part first, then what was held out.
-    torque : mapping of str to Comparison
-        Errors of torque, the model beside the rigid body, by held-out part; each with the constant torque that it
-        misses in training.
-    steps : StepErrors
-        Of predictors `MODEL`, `RIGID_BODY` and `NOTHING_MOVES` as they are, to be shown.
-    replayed : mapping of str to StepErrors
-        The same of each judged part, without the constant torque that each predictor misses in training.
-    r2_min : float
-        R2 of body torque that is good enough for control.
-    band : array, shape (3,), or None
-        Widest 95 % band of D11, D22 and D33 over the value itself, where training was; None if no bands were drawn.
-    definite : float or None
-        Share of the bootstrap draws whose D(q) is positive definite in all cells visited; None if none were drawn.
+    `torque`: errors of torque, the model beside the rigid body, by held-out part, each with the constant torque that it
+    misses in training; `steps`: of the predictors as they are, to be shown; `replayed`: the same of each judged part,
+    without the constant torque that each misses; `r2_min`: R2 of body torque that is good enough for control; `band`:
+    widest 95 % band of D11, D22 and D33 over the value itself, where training was; `definite`: share of the bootstrap
+    draws whose D(q) is positive definite in all cells visited. None without draws.
     """
 
     identification: Identification

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import ClassVar
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.identify import TRAINING, Identification
+from cpfls_cli.identification.identify import Identification
 from cpfls_cli.identification.judge import Score
+from cpfls_cli.report.source import Source
 from cpfls_cli.result import about, part, result
 from cpfls_cli.rounding import levelled
 
@@ -24,8 +25,6 @@ _SETTLED = 0.05
 @result
 class Spread:
     """A measure over replicates, those left out in which it is not known."""
-
-    SHOWN: ClassVar = ("standard_deviation",)
 
     count: int = about("replicates in which it is known")
     mean: float = about("not known without any", gaps=True)
@@ -100,8 +99,6 @@ def _errors(score: Score | None) -> tuple[float, float, float]:
 @result
 class Setting:
     """A setting of a sweep with its finished runs, in the order of their seeds."""
-
-    SHOWN: ClassVar = ("runs", "seeds", *ERRORS, "condition_number")
 
     name: str = about("what the config calls it")
     overrides: tuple[str, ...] = about("what is different in it, as options of --set", "override")
@@ -181,11 +178,10 @@ class Setting:
 class Sweep:
     """Replicates of a search, by setting and seed."""
 
-    FORMAT: ClassVar = "cpfls/sweep"
-    SHOWN: ClassVar = ("runs", "held_out")
+    FORMAT: ClassVar = "cpfls/searches"
 
-    parts: tuple[str, ...] = about("what models are judged on: training, held-out rests, other flights", "part")
-    complete: bool = about("1 where every run is finished, 0 where `--resume` goes on")
+    parts: tuple[str, ...] = about("what models are judged on: training", "part")
+    complete: bool = about("1 where every run is finished")
     settings: tuple[Setting, ...] = part()
 
     @property
@@ -197,15 +193,6 @@ class Sweep:
     def without_model(self) -> int:
         """Runs that found no finite model."""
         return int(sum(np.sum(np.isnan(setting.of("mse"))) for setting in self.settings))
-
-    @property
-    def held_out(self) -> Mapping[str, Mapping[str, Mapping[str, Spread]]]:
-        """Errors on what was not learned from, by part and setting."""
-        return {
-            name: {own.name: {error: spread(own.of(error, index)) for error in ERRORS} for own in self.settings}
-            for index, name in enumerate(self.parts)
-            if name != TRAINING
-        }
 
     def with_run(self, setting: int, run: Replicate, *, complete: bool) -> Sweep:
         """Add a finished run of a setting by its index."""
@@ -234,3 +221,22 @@ class Sweep:
 def _same(one: Sequence[object], two: Sequence[object]) -> bool:
     """Tell whether values are equal, also where both are no number."""
     return len(one) == len(two) and all(a == b or (a != a and b != b) for a, b in zip(one, two, strict=True))
+
+
+def joined_sweeps(sweeps: Sequence[Source[Sweep]]) -> list[Source[Sweep]]:
+    """Take sweeps of equal settings and inputs as one, in the order of the first of each, unless they share a seed."""
+    joined: list[Source[Sweep]] = []
+    for sweep in sweeps:
+        both = ((index, _joined(other, sweep)) for index, other in enumerate(joined))
+        index, one = next(((index, one) for index, one in both if one is not None), (None, None))
+        if index is None or one is None:
+            joined.append(sweep)
+        else:
+            joined[index] = one
+    return joined
+
+
+def _joined(first: Source[Sweep], second: Source[Sweep]) -> Source[Sweep] | None:
+    one, two = (sorted((role, file.sha256) for role, file in own.header.inputs.items()) for own in (first, second))
+    sweep = first.record.joined(second.record) if one == two else None
+    return None if sweep is None else replace(first, label=f"{first.label} and {second.label}", record=sweep)
