@@ -17,7 +17,7 @@ from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.disturbance import gusts_in
 from cpfls_cli.weak_form.windows import Recording, common_windows
-from tests.builders.gusty_flights import CALM, GUSTS, MEMORY_S, SMALL, STORM, Flight, gusty_flights, logged
+from tests.builders.gusty_flights import CALM, GRAVITY, GUSTS, MEMORY_S, SMALL, STORM, Flight, gusty_flights, logged
 
 HEAVY = 1.15
 """What the config takes the inertia about x for, over the true one."""
@@ -82,6 +82,22 @@ def test_a_wrong_inertia_is_named_in_gusts_with_its_number(flown, kind, setpoint
     (number,) = effect.numbers
     assert (effect.name, number.name) == ("parameter_error", "inertia_x")
     assert number.low < 1 / HEAVY - 1 < number.high < 0
+
+
+def test_a_centre_of_mass_is_told_from_a_constant_torque_in_gusts(flown):
+    at = np.array([0.002, -0.0015])
+    rotors = [replace(each, position_m=(*np.add(each.position_m[:2], at), 0.0)) for each in TRUE.vehicle.rotors]
+    aside = recorded(flown["asked"], replace(TRUE.vehicle, rotors=tuple(rotors)), setpoints=True)
+    # Rotors that carry a constant torque turn as much faster and slower as it takes.
+    carried = np.linalg.solve(TRUE.mixer, [0.0, *(TRUE.mass * GRAVITY * at[::-1] * [1, -1]), 0.0])
+    pushed = [replace(each, speed=np.sqrt(each.speed**2 + carried)) for each in flown["asked"]]
+    for name, recordings in (
+        ("com_offset", aside),
+        ("torque_bias", recorded(pushed, TRUE.vehicle, setpoints=True)),
+    ):
+        found = diagnosed(recordings).diagnosis
+        assert (found.verdict, [each.name for each in found.effects]) == (GapVerdict.NAMED, [name])
+        assert not found.alternatives
 
 
 def test_an_inertia_that_nothing_was_asked_of_is_told_by_what_was_before(flown):
