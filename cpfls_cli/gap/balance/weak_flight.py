@@ -68,9 +68,10 @@ class WeakFlight:
     # Shape (6,), N m and N: standard deviation that gusts and noise give averages over the windows; 0 where no gusts
     # are known.
     air: Array = field(default_factory=lambda: np.zeros(6))
-    # Shape (6, window): what of both lasts from one window to others, by how many windows later; empty without gusts.
+    # Shape (6, window): correlation of both by how many windows apart they are, while they last; empty without gusts.
     lasting: Array = field(default_factory=lambda: np.zeros((6, 0)))
-    # Shape (6, window, window): takes rows to what of each the rows before do not predict; None for rows as averaged.
+    # Shape (6, window, window): takes the first rows to what of each those before do not predict, the last one also all
+    # that follow; None for rows as averaged.
     whitening: Array | None = None
     # Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
     seen: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
@@ -131,6 +132,7 @@ class WeakFlight:
     def innovations(self) -> WeakFlight:
         """Take of each row what the rows before do not predict: of gusts and noise these are alike and independent.
 
+        Rows further back than gusts last predict nothing more.
         Reference: Aitken 1936 (generalised least squares).
         """
         lasting = np.array([toeplitz(each) for each in self.lasting])
@@ -141,8 +143,16 @@ class WeakFlight:
         """Give rows, shape (window, 6, ...), of the channels that the flight has, whitened where that is asked for."""
         rows = rows * self.known.reshape(-1, *[1] * (rows.ndim - 2))
         if self.whitening is not None:
-            rows = np.stack([each @ rows[:, at] for at, each in enumerate(self.whitening)], axis=1)
+            rows = np.stack([_whitened(each, rows[:, at]) for at, each in enumerate(self.whitening)], axis=1)
         return np.asarray(rows)
+
+
+def _whitened(whitening: Array, rows: Array) -> Array:
+    from scipy.signal import lfilter
+
+    white = lfilter(whitening[-1, ::-1], [1.0], rows, axis=0)
+    white[: len(whitening)] = whitening @ rows[: len(whitening)]
+    return np.asarray(white)
 
 
 def weak_flight(

@@ -45,6 +45,7 @@ _WITNESSES: dict[GivenKind, tuple[InstrumentKind, ...]] = {
     "none": ("past",),
 }
 """What identifies gusts, by the instruments of flights; each for channels that those before it leave open."""
+_MEMORIES = 5.0  # Memories after which nothing of a gust is left that counts: a hundredth.
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Air:
         Result: shape (6,), N m and N.
         """
         windows = learned[0].windows
-        gusts, noise = self._gusts(windows, 0), self.noise(windows)
+        gusts, noise = self._gusts(windows, np.zeros(1, int))[:, 0], self.noise(windows)
         seconds = (float(sum(len(f.signals.time) * f.signals.period for f in own)) for own in (learned, flights))
         seldom = 0.0 if flights is learned else sum(1 / each for each in seconds)
         total = np.zeros(6)
@@ -76,21 +77,26 @@ class Air:
         return np.sqrt(total)
 
     def lasting(self, windows: Windows, count: int) -> Array:
-        """Compute how gusts and noise of windows correlate by how many windows they are apart, shape (6, count)."""
-        both = np.zeros((count, 6))
-        for later in range(count):
-            apart = later * windows.hop
-            shared = slice(apart, None), slice(None, max(len(windows.weight) - apart, 0))
-            common = [float(each[shared[0]] @ each[shared[1]]) for each in (windows.weight, windows.slope)]
-            both[later] = self._gusts(windows, apart) + self.found.noise @ common
-        return np.asarray(np.where(self.split, both / both[0], np.arange(count)[:, None] == 0).T)
+        """Compute how gusts and noise of windows correlate by how many windows they are apart, shape (6, window).
 
-    def _gusts(self, windows: Windows, apart: int) -> Array:
-        """Compute the product of gusts averaged over windows so many samples apart, on average, shape (6,)."""
-        at = windows.period * np.arange(len(windows.weight))
-        seconds = np.abs(np.subtract.outer(at, at + apart * windows.period))
+        `count`: windows of the flight. Result: as many of these as a gust lasts, or fewer.
+        """
+        most = self.found.memory[self.split].max(initial=0.0) * _MEMORIES / windows.period + len(windows.weight)
+        apart = windows.hop * np.arange(min(count, 2 + int(most / windows.hop)))
+        common = [
+            np.pad(np.correlate(each, each, "full")[len(each) - 1 :], (0, apart[-1]))[apart]
+            for each in (windows.weight, windows.slope)
+        ]
+        both = self._gusts(windows, apart) + self.found.noise @ common
+        return np.asarray(np.where(self.split[:, None], both / both[:, :1], apart == 0))
+
+    def _gusts(self, windows: Windows, apart: IntArray) -> Array:
+        """Compute the mean product of gusts averaged over windows so many samples apart, shape (6, apart)."""
+        within = np.arange(1 - len(windows.weight), len(windows.weight))
+        seconds = windows.period * np.abs(apart[:, None] + within)
         decay = np.exp(-seconds / np.where(self.split, self.found.memory, 1.0)[:, None, None])
-        return np.asarray(self.found.size**2 * (decay @ windows.weight @ windows.weight))
+        weights = np.correlate(windows.weight, windows.weight, "full")
+        return np.asarray(self.found.size[:, None] ** 2 * (decay @ weights))
 
     def noise(self, windows: Windows) -> Array:
         """Compute what noise does without gusts, shape (6,); infinite where none are split off."""

@@ -70,3 +70,25 @@ def test_of_gusts_and_noise_the_rows_before_leave_innovations_alike_and_independ
     spread = np.cov(white[:, 0]) / rows.var()
     np.testing.assert_allclose(spread, np.eye(count), atol=0.12)
     assert np.abs(np.cov(rows) / rows.var() - np.eye(count)).max() > 0.8
+
+
+def test_rows_of_long_flights_are_predicted_from_as_many_as_a_gust_lasts():
+    """The covariance of all windows, summed sample by sample, becomes that of independent ones."""
+    flat, sloping, count = 0.5, 0.004, 300
+    found = SimpleNamespace(
+        size=np.full(6, SIZE), memory=np.full(6, MEMORY), noise=np.tile([flat**2, sloping**2], (6, 1))
+    )
+    air = Air(found, gusts_only=np.zeros(6, dtype=bool), split=np.ones(6, dtype=bool))
+    begins, samples = WINDOWS.hop * np.arange(count), len(WINDOWS.weight)
+    weight, slope = (np.zeros((count, begins[-1] + samples)) for _ in range(2))
+    for row, begin in enumerate(begins):
+        weight[row, begin : begin + samples], slope[row, begin : begin + samples] = WINDOWS.weight, WINDOWS.slope
+    at = PERIOD * np.arange(weight.shape[1])
+    blown = SIZE**2 * np.exp(-np.abs(at[:, None] - at) / MEMORY)
+    covariance = weight @ blown @ weight.T + flat**2 * weight @ weight.T + sloping**2 * slope @ slope.T
+    lasting = air.lasting(WINDOWS, count)
+    assert lasting.shape[1] < count / 5
+    np.testing.assert_allclose(lasting[0], covariance[0, : lasting.shape[1]] / covariance[0, 0], rtol=1e-9)
+    flight = WeakFlight("gusty", None, WINDOWS, None, np.ones(6, dtype=bool), np.ones(10), lasting=lasting)
+    whitened = flight.innovations().of_channels(np.repeat(np.eye(count)[:, None], 6, axis=1))[:, 0]
+    np.testing.assert_allclose(whitened @ covariance @ whitened.T / covariance[0, 0], np.eye(count), atol=1e-3)
