@@ -223,7 +223,7 @@ def words(
 ) -> str:
     """Word a result by its template, in which it is ``r``.
 
-    `added`: what the template knows beside what all do, functions also as filters and tests; `more`: what it knows of
+    `added`: what the template knows besides what all do, functions also as filters and tests; `more`: what it knows of
     this result.
     """
     own = environment(folder, _NOTHING if added is None else added)
@@ -324,7 +324,7 @@ def _name_cells(table: Sequence[Token]) -> None:
 def blocks(text: str, pictures: Mapping[str, Picture] | None = None, prefix: str = "") -> list[Block]:
     """Give a page as blocks, without headings of nothing and figures that are not given, as on a terminal.
 
-    `prefix` stands before the names of shown figures and tables on the page.
+    `prefix` begins the names of shown figures and tables on the page.
     """
     made = list(_boxed(_blocks(tree(text), pictures or {}, prefix, count(1))))
     empty = (Heading, Folded, type(None))

@@ -84,7 +84,7 @@ class Run(Job):
     `writes`: False where the answer is only printed; `next`: commands to go on with; `exit_code`: of an answer that a
     script has to distinguish; `with_config`: whether the stage takes a config, which its results hold; `files`:
     inputs of all results, by role; `outputs`: files that will be written, as far as they are known before, no input is
-    one; `also`: what ``--json`` says beside its result; `last_words`: behind the answer; `texts`: other files that are
+    one; `also`: what ``--json`` says besides its result; `last_words`: behind the answer; `texts`: other files that are
     written with the result; `said`: of this run alone, its file says none of it again; `until_written`: contexts that
     last until the result is written, or it is sure that it will not be; `afterwards`: done when it is; `data` gives the
     config as plain data, with what the command line changes of it.
@@ -179,7 +179,7 @@ class Stage:
     results by name, with a page each; or None in a dry run; or the outcome of a command that goes on.
 
     `title` is of the section of a report; `figures`: of each figure of the template its HTML, made of the result,
-    `Drawn` of `report.canvas` or a function; `words`: what the template uses beside what all templates know; `folder`:
+    `Drawn` of `report.canvas` or a function; `words`: what the template uses besides what all templates know; `folder`:
     whether its output is a folder with a page for each result (left out, the answer is only printed); `fills`: whether
     it is one with one answer; `study`: whether it takes a config, or what separates it from what else was given;
     `output`: its option where it is another than usual, False of one that only answers; `several`: whether options that

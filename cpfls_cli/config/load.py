@@ -128,7 +128,7 @@ def flat_keys(config: Mapping[str, Any], above: str = "") -> Iterator[tuple[str,
 
 
 def validate(data: dict[str, Any], source: str, *, wrong: Sequence[str] = ()) -> Study:
-    """Validate plain data as a study, beside what is known to be wrong."""
+    """Validate plain data as a study, in addition to what is known to be wrong."""
     _refuse_asked(data, source)
     study, found = check_data(data, source)
     errors = [*wrong, *found]

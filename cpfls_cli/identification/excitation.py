@@ -80,9 +80,9 @@ def _firing(learned: Samples, partitions: Breakpoints) -> Array:
 class AxisEvidence:
     """Share of each body axis that a rigid body and a constant torque explain, where the pitch is not vertical.
 
-    `constant`: body torque fitted beside the rigid body, N m; `r2`: share of the body torque explained by both, NaN
-    without samples; `torque` and `acceleration`: root mean squares of it, N m, and of the derivative of the body rates,
-    rad/s^2.
+    `constant`: body torque fitted jointly with the rigid body, N m; `r2`: share of the body torque explained by both,
+    NaN without samples; `torque` and `acceleration`: root mean squares of it, N m, and of the derivative of the body
+    rates, rad/s^2.
     """
 
     constant: Array

@@ -96,7 +96,7 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
     / <h, h>`` and ``<t, t> / <t, h>`` are the factors by which torque on rotation and rotation on torque want the
     inertia changed. A disturbance that the torque opposes and that turns the vehicle its own way leaves the true factor
     between them. The torque is taken without slow actuation: a torque that fades by itself is how an autopilot that
-    cancels gusts looks. The widest bounds of all bands in which motion stands above noise, with 95 % of the scatter
+    cancels gusts looks. The widest bounds of all bands in which motion is above noise, with 95 % of the scatter
     over blocks. Frisch 1934 (bounds by regression both ways); Forssell and Ljung 1999 (closed-loop identification
     revisited).
     """

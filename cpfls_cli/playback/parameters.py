@@ -154,8 +154,8 @@ def needs_velocity(block: str) -> bool:
 class FreeNumbers:
     """The numbers of a vehicle that are free, and what each adds to torque and force.
 
-    `chosen` are blocks beside those of what is not known of the vehicle; `airflow` are rules of the remainder, where it
-    is among them.
+    `chosen` are blocks besides those of what is not known of the vehicle; `airflow` are rules of the remainder, where
+    it is among them.
     """
 
     vehicle: VehicleSettings

@@ -200,7 +200,7 @@ def carrying_weight(
     """Replace the guess of the thrust factor by what carries the weight; a guessed drag factor scales with it.
 
     Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found
-    and returned: it is no longer unknown to the runs. Without one either, or where it feels no lift, nothing tells
+    and returned: it is no longer unknown to the runs. Without one either, or where it feels no lift, nothing separates
     thrust from weight, and the guess stays.
     """
     if "thrust_factor" not in vehicle.unknown:
@@ -323,8 +323,8 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
 
     About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where
     the flights show the loop, or are not explained, nothing is determined but what carries the weight, for every effect
-    answers with it: the thrust factor, where no law of the rotors found beside it carries a part of the weight. The
-    bounds are in moments of inertia of the model whose numbers these are.
+    answers with it: the thrust factor, where no law of the rotors found jointly with it carries a part of the weight.
+    The bounds are in moments of inertia of the model whose numbers these are.
     """
     low, high = np.fmin(loop.low, 1.0), np.fmax(loop.high, 1.0)
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}

@@ -43,7 +43,7 @@ class Program(NamedTuple):
     """What is computed of each sample, as numbers of lines.
 
     `partitions`, 5 columns: line of the antecedent, membership functions, rules, first inner breakpoint, first line or
-    -1 where one function always fires; the last one stands for no partition.
+    -1 where one function always fires; the last one is no partition.
 
     `columns`, 7 columns, those that are not zero at a sample: the one of the first rule; by roll and by pitch
     partition, which of the two functions fires, and columns from one rule to the next.

@@ -1,4 +1,4 @@
-"""What a stopped search leaves beside its output, and whether a command may go on from it."""
+"""What a stopped search leaves next to its output, and whether a command may go on from it."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def _same_origin(one: Origin, other: Origin) -> bool:
 
 @dataclass(frozen=True)
 class KeptFile:
-    """A file beside the output from which a stopped command can go on; the origin is of the command that is run now."""
+    """A file next to the output from which a stopped command can go on; `origin` is of the command run now."""
 
     path: Path
     header: Origin

@@ -247,7 +247,7 @@ def fly(
 class Setpoints:
     """What an autopilot's own law is asked for, time first; a setpoint stays until the next.
 
-    `attitude`: roll, pitch, yaw, rad, None where rates alone are asked for; `body_rate`: beside what that asks for,
+    `attitude`: roll, pitch, yaw, rad, None where rates alone are asked for; `body_rate`: added to what that asks for,
     rad/s; `thrust`: share of the full thrust, in the units of the law.
     """
 

@@ -1,4 +1,4 @@
-"""What a search that was stopped leaves beside its output, as `identify` keeps it."""
+"""What a search that was stopped leaves next to its output, as `identify` keeps it."""
 
 from __future__ import annotations
 

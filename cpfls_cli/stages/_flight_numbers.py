@@ -57,7 +57,7 @@ def of_other_vehicles(stated: Sequence[tuple[str, Mapping[str, str]]], *, anyway
 def of_other_autopilots(flights: Sequence[FlightNumbers], *, thrusts: bool) -> tuple[list[str], list[str]]:
     """List where logs state another board, version or range of outputs, and whose shares of thrust that touches.
 
-    `thrusts`: whether shares of thrust are compared; of commands they are shares of what full throttle stands for.
+    `thrusts`: whether shares of thrust are compared; of commands they are shares of full throttle.
     """
     (first, own), *others = [each for each in stated_by(flights) if each[1]] or [("", {})]
     unlike, ranges = [], []

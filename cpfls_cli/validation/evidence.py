@@ -27,11 +27,11 @@ _MANY_LOST = 0.05
 class Evidence:
     """Evidence that the verdict on a model rests on.
 
-    `torque`: errors of torque, the model beside the rigid body, by held-out part, each with the constant torque that it
-    misses in training; `steps`: of the predictors as they are, to be shown; `replayed`: the same of each judged part,
-    without the constant torque that each misses; `r2_min`: R2 of body torque that is good enough for control; `band`:
-    widest 95 % band of D11, D22 and D33 over the value itself, where training was; `definite`: share of the bootstrap
-    draws whose D(q) is positive definite in all cells visited. None without draws.
+    `torque`: errors of torque of the model and of the rigid body, by held-out part, each with the constant torque that
+    it misses in training; `steps`: of the predictors as they are, to be shown; `replayed`: the same of each judged
+    part, without the constant torque that each misses; `r2_min`: R2 of body torque that is good enough for control;
+    `band`: widest 95 % band of D11, D22 and D33 over the value itself, where training was; `definite`: share of the
+    bootstrap draws whose D(q) is positive definite in all cells visited. None without draws.
     """
 
     identification: Identification

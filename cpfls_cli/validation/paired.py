@@ -29,7 +29,7 @@ _LOST = 10.0
 
 @dataclass(frozen=True)
 class Comparison:
-    """Mean squared errors of a model beside those of a rival.
+    """Mean squared errors of a model and of a rival.
 
     Ratio ``ours / theirs`` is 1 where they differ by no more than rounding, infinite where theirs alone are rounding.
     Ours are lower, or higher, by more than chance: so is the mean over all blocks, and the mean logarithm of the ratio

@@ -164,7 +164,7 @@ def of_thrust(numbers: Sequence[Estimate]) -> list[str]:
 
 
 def _undone(number: Estimate, other: Estimate) -> bool:
-    """Tell whether two relative errors multiply to none."""
+    """Check whether two relative errors cancel as factors."""
     off = (1 + number.value) * (1 + other.value) - 1
     own, its = ((1 + b.value) * 0.5 * (a.high - a.low) for a, b in ((number, other), (other, number)))
     return _chance_of(off, float(np.hypot(own, its))) > RARE
