@@ -23,6 +23,7 @@ from benchmarks.paper.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColu
 from benchmarks.paper.replicates import ALL_SAMPLES, Setting, Sweep, joined_sweeps, spread
 from benchmarks.paper.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.arrays import Array
+from cpfls_cli.flights.flight import Simulated
 from cpfls_cli.report.canvas import GREY, plot, style_of
 from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
 from cpfls_cli.report.numbers import UNKNOWN, number, percent
@@ -223,10 +224,9 @@ def _judged_here(sources: PaperSources) -> Iterator[Text]:
 def _mean_square_noise(sources: PaperSources, sweep: Source[Sweep]) -> float:
     """Find the mean square of the noise that was put on the torque of a sweep's flight; 0 where none is known."""
     flight = sources.by_hash(sweep.made_from("flight"))
-    noise = None if flight is None else flight.record.noise
-    if noise is None or "torque" not in noise.signal:
+    if flight is None or not isinstance(flight.record, Simulated) or "torque" not in flight.record.noise_std:
         return 0.0
-    return float(np.mean(noise.std[noise.signal.index("torque")] ** 2))
+    return float(np.mean(flight.record.noise_std["torque"].std ** 2))
 
 
 def _of_flight(found: Sequence[Reading], one: Reading) -> list[Reading]:

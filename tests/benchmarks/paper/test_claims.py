@@ -33,6 +33,7 @@ from benchmarks.paper.search_claims import (
     paired_ratio,
 )
 from cpfls_cli.config.study import ReportSettings
+from cpfls_cli.flights.flight import Noise, Simulated
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.source import Source
 from cpfls_cli.store import Origin
@@ -295,8 +296,9 @@ def reading_sources(*flights):
         )
         for noise, settings in flights
     ]
-    noise = SimpleNamespace(signal=("body_rate", "torque"), std=np.array([[9.0, 9.0, 9.0], [0.01, 0.02, 0.03]]))
-    flight = SimpleNamespace(record=SimpleNamespace(noise=noise))
+    std = {"body_rate": np.full(3, 9.0), "torque": np.array([0.01, 0.02, 0.03])}
+    noise = {name: Noise(std=each) for name, each in std.items()}
+    flight = SimpleNamespace(record=Simulated(time=np.arange(3.0), noise_std=noise, infeasible=(), effects={}))
     return SimpleNamespace(sweeps=made, by_hash=lambda _: flight)
 
 
