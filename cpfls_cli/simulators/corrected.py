@@ -614,7 +614,8 @@ def _around_centre(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
         own = numbers.get(f"c_{name}")
         if own is None:
             continue
-        moved, words = _Found.of(own).times(-1.0), f"{_moved(own.value, axis)}, and {{whom}} from there"
+        moved = _Found.of(own).times(-1.0)
+        words = f"{_moved(own.value, axis)}, and the place of {{whom}} is from it"
         if all(axis < len(rotor.place) for rotor in made.rotors):
             # All of them or none: an expression for several numbers has no place for one.
             whole = all(each.span is not None for rotor in made.rotors for each in rotor.place)

@@ -560,7 +560,7 @@ def test_rotors_of_rotorpy_move_around_its_centre(tmp_path):
     np.testing.assert_allclose(new.hubs, before.hubs - SHIFT, rtol=0, atol=1e-5)
     assert said.elsewhere == ()
     assert len(said.changes) == 12
-    assert said.changes[0].sentence == "centre of mass of the vehicle is 4 mm forward, and M1 from there"
+    assert said.changes[0].sentence == "centre of mass of the vehicle is 4 mm forward, and the place of M1 is from it"
     rng, wrenches = np.random.default_rng(1), []
     speeds, rate, air = rng.uniform(800, 2500, 4), rng.normal(0, 0.0, 3), rng.normal(0, 3, 3)
     for own in (path, path.parent / "new" / path.name):
