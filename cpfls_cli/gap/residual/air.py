@@ -45,7 +45,6 @@ _WITNESSES: dict[GivenKind, tuple[InstrumentKind, ...]] = {
     "none": ("past",),
 }
 """What identifies gusts, by the instruments of flights; each for channels that those before it leave open."""
-_MEMORIES = 5.0  # Memories after which nothing of a gust is left that counts: a hundredth.
 
 
 @dataclass(frozen=True)
@@ -79,9 +78,11 @@ class Air:
     def lasting(self, windows: Windows, count: int) -> Array:
         """Compute how gusts and noise of windows correlate by how many windows they are apart, shape (6, window).
 
-        `count`: windows of the flight. Result: as many of these as a gust lasts, or fewer.
+        `count`: windows of the flight. Result: as many of them as pass until less than one part in `count` of a gust
+        is left.
         """
-        most = self.found.memory[self.split].max(initial=0.0) * _MEMORIES / windows.period + len(windows.weight)
+        memory = self.found.memory[self.split].max(initial=0.0) / windows.period
+        most = memory * np.log(count) + len(windows.weight)
         apart = windows.hop * np.arange(min(count, 2 + int(most / windows.hop)))
         common = [
             np.pad(np.correlate(each, each, "full")[len(each) - 1 :], (0, apart[-1]))[apart]
