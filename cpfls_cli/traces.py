@@ -5,17 +5,21 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from markupsafe import escape
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.chart import COLOURS, Axis, Chart, span
 from cpfls_cli.errors import visible
 from cpfls_cli.page import TEMPLATES
+from cpfls_cli.report.canvas import BASELINE, Drawn, legend_above, stacked, style_of
 from cpfls_cli.trace import Track, thinned
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MOST_VALUES = 1_500_000
 """Of all signals of a page, so that it stays below some megabytes."""
@@ -27,6 +31,8 @@ _OF_NOISE = 16.0
 """Steps in the usual change from sample to sample."""
 _STILL = 1200
 """Samples of a signal in the picture."""
+_WIDE, _PANEL = 10.0, 1.5
+"""Inches of the picture, and of a panel in it."""
 _SEVERITIES = ("note", "warning", "danger")
 
 
@@ -85,9 +91,12 @@ def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Happening] = 
     }
     vendor = {name: (TEMPLATES / "vendor" / name).read_text(encoding="utf-8") for name in _VENDOR}
     licence, style, script = vendor.values()
+    still = Drawn(
+        "Signals over the whole log", 0.4 + _PANEL * len(shown), partial(_still, shown, ends), lambda _: True, _WIDE
+    )
     return (
         f'<div class="traces"><ol class="events" aria-label="Events">{"".join(map(_event, events))}</ol>'
-        f'<div class="moving"></div><div class="still">{"".join(_still(shown, ends, events))}</div></div>'
+        f'<div class="moving"></div><div class="still plot">{still(events)}</div></div>'
         f"<style>{style}</style><script>/*! uPlot 1.6.32 (https://github.com/leeoniya/uPlot)\n{licence}*/\n{script}</script>"
         f'<script type="application/json" id="traces-data">{_in_script(data)}</script>'
         f"<script>{(TEMPLATES / 'traces.js').read_text(encoding='utf-8')}</script>"
@@ -142,18 +151,19 @@ def _event(own: Happening) -> str:
 
 
 def _still(
-    panels: Mapping[str, Sequence[Track]], ends: tuple[float, float], events: Sequence[Happening]
-) -> Iterator[str]:
-    """Draw each panel for print and for who runs no scripts."""
-    for at, (title, tracks) in enumerate(panels.items()):
-        last = at == len(panels) - 1
-        drawn = [(own, *thinned(own.time, own.values, _STILL)) for own in tracks]
-        x, y = Axis("s" if last else "", *ends), Axis(title, *span(*(values for *_, values in drawn)))
-        chart = Chart(f"still-{at}", title, x, y, width=1000, height=170, least_left=64, table=False)
-        for event in events:
-            chart.mark(event.text if at == 0 and event.severity != _SEVERITIES[0] else "", x=event.time_s)
-        for own, time, values in drawn:
-            kind = "thin dashed" if own.dashed else "thin"
+    panels: Mapping[str, Sequence[Track]], ends: tuple[float, float], events: Sequence[Happening], figure: Figure
+) -> None:
+    """Draw all panels for print and for who runs no scripts."""
+    rows = stacked(figure, len(panels))
+    for axes, (title, tracks) in zip(rows, panels.items(), strict=True):
+        for own in tracks:
+            time, values = thinned(own.time, own.values, _STILL)
             for channel, label in enumerate(own.labels):
-                chart.line(label, time, values[:, channel].astype(float), channel % COLOURS, kind=kind)
-        yield str(chart)
+                look = {"color": style_of(channel)["color"], "linestyle": "--" if own.dashed else "-"}
+                axes.plot(time, values[:, channel], label=label, linewidth=0.8, **look)
+        for event in events:
+            axes.axvline(event.time_s, **BASELINE)
+        axes.set_xlim(*ends)
+        axes.set_ylabel(title)
+        legend_above(axes, 8)
+    rows[-1].set_xlabel("s")

@@ -114,6 +114,6 @@ def _draw_sizes(gap: GapChange, figure: Figure) -> None:
     axes.grid(visible=False, axis="y")
     largest = float(np.nanmax([*before, *after, 1.0]))
     axes.set_xlim(0.8 * _LEAST, 1.6 * max(largest, 3.0))
-    logarithmic(axes, [0.1, 1.0, *(10.0**power for power in range(1, 9) if 10.0**power < 1.6 * largest)])
+    logarithmic(axes, _LEAST, 1.6 * largest)
     axes.set_xlabel("gap, noise floors")
     legend_over(figure, axes)

@@ -98,8 +98,8 @@ _LAYOUT_ROUNDS = 2
 _AT_THE_END = 1e-9
 """Share of an axis by which rounding may put a tick beyond the end of it."""
 
-_ROWS = 25
-"""Of a table of the data of a chart, at most."""
+_WIDE_RANGE = 1000.0
+"""Ratio of the ends of a logarithmic axis from which on only powers of ten have room."""
 
 _POINTS = 12
 """Of a curve that are all listed for who does not see it."""
@@ -118,6 +118,7 @@ class _Drawing:
     description: str
     height: float
     draw: Callable[[Figure], None]
+    width: float = WIDTH
 
     @cached_property
     def svg(self) -> str:
@@ -147,7 +148,7 @@ class _Drawing:
             # A reader's own matplotlib settings must not change the page.
             matplotlib.rcdefaults()
             matplotlib.rcParams.update(style)
-            figure = Figure(figsize=(WIDTH, self.height), layout="constrained")
+            figure = Figure(figsize=(self.width, self.height), layout="constrained")
             self.draw(figure)
             _show_as_written(figure)
             yield figure
@@ -160,17 +161,20 @@ class Drawn:
     Attributes
     ----------
     height : float, inch, or callable
-        At a width of 7.6; or what gives it, of the result.
+        Or what gives it, of the result.
     draw : callable
         Fills the figure, with the result before it.
     holds : callable
         Whether there is anything to draw.
+    width : float, inch
+        Narrower for cards, which stand side by side.
     """
 
     description: str
     height: float | Callable[[Any], float]
     draw: Callable[[Any, Figure], None]
     holds: Callable[[Any], object] = bool
+    width: float = WIDTH
 
     def __call__(self, given: Any) -> str:
         """Write it as HTML, under no name."""
@@ -196,7 +200,7 @@ def picture_of(draw: Callable[[Any], str], name: str, given: Any) -> Picture | N
         if not draw.holds(given):
             return None
         height = draw.height(given) if callable(draw.height) else draw.height
-        return _Drawing(name, draw.description, height, lambda figure: draw.draw(given, figure))
+        return _Drawing(name, draw.description, height, lambda figure: draw.draw(given, figure), draw.width)
     written = draw(given)
     return _Written(written) if written else None
 
@@ -255,13 +259,16 @@ def _words_at(axis: Axis) -> dict[float, str]:
 def _curves(axes: Axes) -> Iterator[tuple[str, Array]]:
     """List the labels of curves, points, bars and bands with their points, shape (points, 2); no levels and spans."""
     from matplotlib.collections import PathCollection, PolyCollection
-    from matplotlib.container import BarContainer
+    from matplotlib.container import BarContainer, ErrorbarContainer
 
     for container in axes.containers:
         if isinstance(container, BarContainer):
             boxes = np.array([[*bar.get_xy(), bar.get_width(), bar.get_height()] for bar in container]).reshape(-1, 4)
             flat = container.orientation == "horizontal"
             yield str(container.get_label()), boxes[:, :2] + boxes[:, 2:] * ((1.0, 0.5) if flat else (0.5, 1.0))
+        elif isinstance(container, ErrorbarContainer):
+            ends = np.concatenate([own.vertices for each in container[2] for own in each.get_paths()])
+            yield str(container.get_label()), ends[np.isfinite(ends).all(axis=1)]
     drawn: list[tuple[Any, list[Any]]] = [(own, [np.column_stack(own.get_data())]) for own in axes.lines]
     drawn += [(own, [own.get_offsets()]) for own in axes.collections if isinstance(own, PathCollection)]
     bands = (own for own in axes.collections if isinstance(own, PolyCollection))
@@ -327,11 +334,14 @@ def plain_ticks(axis: Axis) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, smallest=1e-4)))
 
 
-def logarithmic(axes: Axes, ticks: Sequence[float]) -> None:
-    """Make the x axis logarithmic, with ticks that are written in full and none between."""
+def logarithmic(axes: Axes, low: float, high: float, steps: Sequence[int] = (1, 2, 5)) -> None:
+    """Make the x axis logarithmic, with ticks that are written in full: at 1, 2 and 5 if there is room."""
+    steps = steps if high < _WIDE_RANGE * low else (1,)
+    ticks = [step * 10.0**power for power in range(-4, 9) for step in steps]
     axes.set_xscale("log")
     axes.set_xticks([], minor=True)
-    axes.set_xticks(ticks, [plain(tick) for tick in ticks])
+    shown = [tick for tick in ticks if 0.99 * low <= tick <= 1.01 * high]
+    axes.set_xticks(shown, [plain(tick) for tick in shown])
 
 
 def style_of(index: int) -> dict[str, Any]:
@@ -349,11 +359,6 @@ def kept_samples(values: Array, largest: int = _LARGEST) -> IntArray:
     ends = np.searchsorted(stretch[order], np.arange(largest // 2), side="right")
     starts = np.concatenate([[0], ends[:-1]])
     return np.unique(np.concatenate([order[starts], order[ends - 1], [0, samples - 1]]))
-
-
-def evenly_spread(samples: int) -> IntArray:
-    """Choose the samples of a chart's curve that a table shows: both ends and some between."""
-    return np.unique(np.linspace(0, max(samples - 1, 0), min(samples, _ROWS)).round().astype(int))
 
 
 def _show_as_written(figure: Figure) -> None:
@@ -407,7 +412,9 @@ def _inline_svg(figure: Figure, name: str, description: str) -> str:
             element.set(key, _LONG_NUMBER.sub(lambda digits: f"{float(digits[0]):.2f}", words))
     for attribute in ("width", "height", "version"):
         root.attrib.pop(attribute, None)
-    root.attrib |= {"xmlns": _NAMESPACE, "role": "img", "aria-label": description}
+    # Below this its words are too small to read: a page scrolls it.
+    least = f"min-width:{_DOTS_PER_INCH * figure.get_figwidth():.0f}px"
+    root.attrib |= {"xmlns": _NAMESPACE, "role": "img", "aria-label": description, "style": least}
     return ElementTree.tostring(root, encoding="unicode")
 
 

@@ -6,20 +6,28 @@ Without -o the answer is printed; with it, FOLDER gets a page and a result for e
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
-from cpfls_cli.chart import Axis, Chart, span
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.logs.formats import LogContents, log_flights, suffixes_in_words
+from cpfls_cli.look.balance import RotorBalance
 from cpfls_cli.look.effectiveness import AxisPlant
 from cpfls_cli.look.flight import AXES
 from cpfls_cli.look.look import Look, look_at
+from cpfls_cli.look.loop import AxisLoop
+from cpfls_cli.look.vibration import Spectrum
+from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, band, legend_above, logarithmic, style_of
 from cpfls_cli.stage import Run, stage, unique_names
 from cpfls_cli.traces import traces
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _SEEN = 0.15
 """Coherence below which a point of a frequency response is left out."""
@@ -29,181 +37,169 @@ _LEAST_STEP_S, _HALVES = 0.2, 10.0
 """Time that a step is shown: at least, and in times until half of it."""
 _MOST_FACTOR = 10.0
 """Intervals wider than this factor are not drawn."""
+_LEAST_EXPECTED = 0.5
+"""Per cent from the mean from which on it is drawn what equal rotors would have."""
+_ENDS, _FAINT = ("value", "low", "high"), 0.18
 
 
-def _balance(r: Look) -> str:
+def _balanced(r: Look) -> list[RotorBalance]:
+    return [] if r.balance is None else [row for row in r.balance.rotors if row.share is not None]
+
+
+def _balance(r: Look, figure: Figure) -> None:
     """Draw the share of thrust of each rotor against the mean."""
-    rows = [] if r.balance is None else [row for row in r.balance.rotors if row.share is not None]
-    if not rows:
-        return ""
-    values, low, high = (
-        np.array([100 * (getattr(row.share, end) - 1) for row in rows]) for end in ("value", "low", "high")
-    )
-    x = np.array([float(row.rotor) for row in rows])
-    chart = Chart(
-        "balance",
-        "Share of each rotor against the mean, in per cent, with 95 % intervals",
-        Axis("rotor", 0.4, x.max() + 0.6, names={at: f"M{at:.0f}" for at in x}),
-        Axis("above the mean, %", *span(values, low, high, zero=True)),
-    )
-    chart.bars("", x, values, 0, low=low, high=high)
-    expected = np.array([100 * (row.expected - 1) for row in rows])
-    if np.abs(expected).max() > 0.5:
-        chart.points("equal rotors", x, expected, "g")
-    return str(chart)
+    rows, axes = _balanced(r), figure.subplots()
+    value, low, high = (np.array([100 * (getattr(row.share, end) - 1) for row in rows]) for end in _ENDS)
+    rotor, expected = np.array([row.rotor for row in rows]), np.array([100 * (row.expected - 1) for row in rows])
+    axes.bar(rotor, value, 0.6, label="share", color=style_of(0)["color"])
+    axes.errorbar(rotor, value, [value - low, high - value], fmt="none", ecolor="black", label="95 %")
+    if np.abs(expected).max() > _LEAST_EXPECTED:
+        axes.plot(rotor, expected, "o", color=GREY, label="equal rotors")
+        legend_above(axes)
+    axes.set_axisbelow(True)
+    axes.set_xticks(rotor, [f"M{at}" for at in rotor])
+    axes.set_ylabel("above the mean, %")
 
 
-def _effectiveness(r: Look) -> str:
+def _identified(r: Look) -> list[AxisPlant]:
+    return [plant for plant in (r.plants or {}).values() if plant.identified]
+
+
+def _effectiveness(r: Look, figure: Figure) -> None:
     """Draw angular acceleration per full command over frequency, by instruments and by least squares."""
-    shown = [plant for plant in (r.plants or {}).values() if plant.identified]
-    if not shown:
-        return ""
-    seen = [np.minimum(plant.input_coherence, plant.output_coherence) > _SEEN for plant in shown]
-    tops = [plant.model_gain for plant in shown]
-    frequency = np.concatenate([plant.frequency for plant in shown])
-    chart = Chart(
-        "effectiveness",
-        "Angular acceleration per full command over frequency",
-        Axis("frequency, Hz", float(frequency.min()), float(frequency.max()), log=True),
-        Axis("rad/s² per full command", 0.0, 1.6 * max(float(np.nanmax(each)) for each in tops)),
-    )
-    for plant, clear in zip(shown, seen, strict=True):
-        _curves(chart, plant, clear)
-    return str(chart)
+    axes, shown = figure.subplots(), _identified(r)
+    for plant in shown:
+        seen = np.minimum(plant.input_coherence, plant.output_coherence) > _SEEN
+        spread = np.exp(np.minimum(1.96 * plant.gain_error, np.log(_MOST_FACTOR)))
+        gain = np.where(seen & (spread < _MOST_FACTOR), plant.gain, np.nan)
+        style, ends = style_of(AXES.index(plant.axis)), [gain - gain / spread, gain * spread - gain]
+        axes.errorbar(plant.frequency, gain, ends, fmt="o", markersize=3, linewidth=1, color=style["color"])
+        axes.plot(plant.frequency, plant.model_gain, label=plant.axis, **style)
+        axes.plot(plant.frequency, plant.direct_gain, label=f"{plant.axis}, least squares", **BASELINE)
+    axes.set_ylim(0.0, 1.6 * max(float(np.nanmax(plant.model_gain)) for plant in shown))
+    axes.set_ylabel("rad/s² per full command")
+    _over_frequency(axes)
 
 
-def _curves(chart: Chart, plant: AxisPlant, clear: np.ndarray) -> None:
-    style = AXES.index(plant.axis)
-    spread = np.exp(np.minimum(1.96 * plant.gain_error, np.log(_MOST_FACTOR)))
-    gain = np.where(clear & (spread < _MOST_FACTOR), plant.gain, np.nan)
-    chart.points(
-        f"{plant.axis}, points", plant.frequency, gain, style, low=gain / spread, high=gain * spread, key=False
-    )
-    chart.line(plant.axis, plant.frequency, plant.model_gain, style)
-    chart.line(f"{plant.axis}, least squares", plant.frequency, plant.direct_gain, style, kind="dashed thin", key=False)
+def _over_frequency(axes: Axes) -> None:
+    low, high = axes.dataLim.intervalx
+    logarithmic(axes, low, high)
+    axes.set_xlim(low, high)
+    axes.set_xlabel("frequency, Hz")
+    if len(axes.get_legend_handles_labels()[1]) > 1:
+        legend_above(axes)
 
 
-def _step(r: Look) -> str:
+def _measured(r: Look) -> list[AxisLoop]:
+    return [loop for loop in (r.loops or {}).values() if loop.measured]
+
+
+def _step(r: Look, figure: Figure) -> None:
     """Draw the answer of the body rate to a step of its setpoint."""
-    shown = [loop for loop in (r.loops or {}).values() if loop.measured]
-    if not shown:
-        return ""
-    lows, highs = [loop.step_low for loop in shown], [loop.step_high for loop in shown]
+    axes, shown = figure.subplots(), _measured(r)
     late = max([loop.by_step.half_s.value for loop in shown if loop.by_step is not None], default=np.inf)
     end = min(float(shown[0].time[-1]), max(_LEAST_STEP_S, _HALVES * late))
-    inside = shown[0].time <= end
-    low, high = span(*(each.step[inside] for each in shown), *(each[inside] for each in (*lows, *highs)), [0.0, 1.2])
-    chart = Chart(
-        "step",
-        "Body rate after a step of its setpoint, as a share of the step",
-        Axis("time after the step, s", 0.0, end),
-        Axis("share of the step", max(low, -0.5), min(high, 2.0)),
-    )
-    chart.mark(y=1.0)
+    axes.axhline(1.0, **BASELINE)
     for loop in shown:
-        style = AXES.index(loop.axis)
+        style = style_of(AXES.index(loop.axis))
+        inside = loop.time <= end
         time, step, least, most = (each[inside] for each in (loop.time, loop.step, loop.step_low, loop.step_high))
-        chart.line(loop.axis, time, step, style, low=least, high=most)
+        band(axes, time, least, most, color=style["color"], alpha=_FAINT)
+        axes.plot(time, step, label=loop.axis, **style)
         if getattr(loop, "law_explains", False) and len(loop.law_step) == len(loop.time):
-            chart.line(f"{loop.axis}, by law", time, loop.law_step[inside], style, kind="dashed thin", key=False)
-    return str(chart)
+            axes.plot(time, loop.law_step[inside], label=f"{loop.axis}, by law", color=style["color"], linewidth=0.7)
+    low, high = axes.get_ylim()
+    axes.set_ylim(max(low, -0.5), min(high, 2.0))
+    axes.set_xlabel("time after the step, s")
+    axes.set_ylabel("share of the step")
+    legend_above(axes, 3)
 
 
-def _response(r: Look) -> str:
+def _response(r: Look, figure: Figure) -> None:
     """Draw the gain from rate setpoint to body rate."""
-    shown = [loop for loop in (r.loops or {}).values() if loop.measured]
-    if not shown:
-        return ""
-    inside = [(loop.frequency > 0) & (loop.frequency <= loop.clear_hz) for loop in shown]
-    frequency = np.concatenate([loop.frequency[part] for loop, part in zip(shown, inside, strict=True)])
-    chart = Chart(
-        "response",
-        "Body rate over rate setpoint, by frequency",
-        Axis("frequency, Hz", float(frequency.min()), float(frequency.max()), log=True),
-        Axis("gain", 0.0, 2.0),
-    )
-    chart.mark(y=1.0)
-    for loop, part in zip(shown, inside, strict=True):
-        spread = np.exp(1.96 * loop.gain_error[part])
-        gain, style = loop.gain[part], AXES.index(loop.axis)
-        chart.line(loop.axis, loop.frequency[part], gain, style, low=gain / spread, high=gain * spread)
-    return str(chart)
+    axes = figure.subplots()
+    for loop in _measured(r):
+        inside = (loop.frequency > 0) & (loop.frequency <= loop.clear_hz)
+        frequency, gain, spread = loop.frequency[inside], loop.gain[inside], np.exp(1.96 * loop.gain_error[inside])
+        style = style_of(AXES.index(loop.axis))
+        band(axes, frequency, gain / spread, gain * spread, color=style["color"], alpha=_FAINT)
+        axes.plot(frequency, gain, label=loop.axis, **style)
+    axes.axhline(1.0, **BASELINE)
+    axes.set_ylim(0.0, 2.0)
+    axes.set_ylabel("gain")
+    _over_frequency(axes)
 
 
-def _map(r: Look) -> str:
-    """Draw the power of the gyroscope over frequency and throttle."""
-    v = r.vibration
-    if v is None or not v.map_db.size or not np.isfinite(v.map_db).any():
-        return ""
+def _mapped(r: Look) -> bool:
     # Below, the vehicle moves as a whole, which would hide what vibrates.
+    return r.vibration is not None and bool(
+        np.isfinite(r.vibration.map_db[:, r.vibration.map_hz >= _VIBRATES_HZ]).any()
+    )
+
+
+def _map(r: Look, figure: Figure) -> None:
+    """Draw the power of the gyroscope over frequency and throttle."""
+    v, axes = r.vibration, figure.subplots()
+    assert v is not None, "asked before"
     inside = v.map_hz >= _VIBRATES_HZ
-    if not np.isfinite(v.map_db[:, inside]).any():
-        return ""
     hz, shown = v.map_hz[inside], v.map_db[:, inside]
-    high = float(np.nanpercentile(shown, 99.5))
-    half = 0.5 * (v.map_collective[1] - v.map_collective[0])
-    chart = Chart(
-        "vibration-map",
-        "Power of the gyroscope over frequency and throttle: the darker, the stronger",
-        Axis("frequency, Hz", float(hz[0]), float(hz[-1])),
-        Axis("throttle, share of full", float(v.map_collective[0] - half), float(v.map_collective[-1] + half)),
+    high, half = float(np.nanpercentile(shown, 99.5)), 0.5 * (v.map_collective[1] - v.map_collective[0])
+    axes.imshow(
+        shown,
+        cmap="Blues",
+        vmin=high - _DECIBELS,
+        vmax=high,
+        aspect="auto",
+        origin="lower",
+        interpolation="nearest",
+        extent=(hz[0], hz[-1], v.map_collective[0] - half, v.map_collective[-1] + half),
     )
-    chart.map(shown, high - _DECIBELS, high)
-    return str(chart)
+    axes.grid(visible=False)
+    axes.set_xlabel("frequency, Hz")
+    axes.set_ylabel("throttle, share of full")
 
 
-def _spectra(r: Look) -> str:
-    """Draw the spectra of the gyroscope, before and after filters."""
+def _of_gyroscope(r: Look) -> list[Spectrum]:
     every = {} if r.vibration is None else r.vibration.spectra
-    shown = [each for name, each in every.items() if name.startswith("gyroscope")]
-    if not shown:
-        return ""
-    densities = [np.degrees(np.sqrt(each.density.mean(axis=1))) for each in shown]
-    inside = [each.frequency > 1.0 for each in shown]
-    chart = Chart(
-        "spectra",
-        "Spectrum of the gyroscope, mean of its axes",
-        Axis("frequency, Hz", 1.0, max(float(each.frequency[-1]) for each in shown), log=True),
-        Axis("deg/s per √Hz", *_decades(*(d[i] for d, i in zip(densities, inside, strict=True))), log=True),
-    )
+    return [each for name, each in every.items() if name.startswith("gyroscope")]
+
+
+def _spectra(r: Look, figure: Figure) -> None:
+    """Draw the spectra of the gyroscope, before and after filters."""
+    axes, shown = figure.subplots(), _of_gyroscope(r)
     names = {
         "gyroscope before filters": "before filters",
         "gyroscope": "after filters" if len(shown) > 1 else "as logged",
     }
-    for index, (each, density, part) in enumerate(zip(shown, densities, inside, strict=True)):
-        chart.line(names[each.signal], each.frequency[part], density[part], "g" if index and len(shown) > 1 else 0)
+    for index, each in enumerate(shown):
+        inside, style = each.frequency > 1.0, BASELINE if index else style_of(0)
+        density = np.degrees(np.sqrt(each.density.mean(axis=1)))
+        axes.plot(each.frequency[inside], density[inside], label=names[each.signal], **style)
     for line in () if r.vibration is None else r.vibration.lines:
-        chart.mark(f"{line.hz:.0f}", x=line.hz)
-    return str(chart)
+        axes.axvline(line.hz, **BASELINE)
+        axes.text(line.hz, 1.0, f"{line.hz:.0f}", transform=axes.get_xaxis_transform(), ha="center", fontsize=8.5)
+    axes.set_yscale("log")
+    axes.set_ylabel("deg/s per √Hz")
+    _over_frequency(axes)
 
 
-def _decades(*values: np.ndarray) -> tuple[float, float]:
-    every = np.concatenate(values)
-    every = every[np.isfinite(every) & (every > 0)]
-    return (
-        (float(10 ** np.floor(np.log10(every.min()))), float(10 ** np.ceil(np.log10(every.max()))))
-        if len(every)
-        else (0.1, 1.0)
-    )
+def _shaped(r: Look) -> bool:
+    return r.hover is not None and r.hover.shape is not None and len(r.hover.shape.collective) > 0
 
 
-def _thrust(r: Look) -> str:
+def _thrust(r: Look, figure: Figure) -> None:
     """Draw specific force over the collective command."""
     shape = None if r.hover is None else r.hover.shape
-    if shape is None or not len(shape.collective):
-        return ""
-    chart = Chart(
-        "thrust",
-        "Specific force along the rotors' axis over the collective command",
-        Axis("throttle, share of full", *span(shape.collective)),
-        Axis("specific force, m/s²", *span(shape.specific_force, zero=True)),
-        table=False,
-    )
-    chart.points("", shape.collective, shape.specific_force, 0)
-    level = np.linspace(*span(shape.collective, room=0.0), 50)
-    middle = float(np.median(shape.specific_force / shape.collective**shape.exponent.value))
-    chart.line(f"exponent {shape.exponent.value:.2f}", level, middle * level**shape.exponent.value, 1)
-    return str(chart)
+    assert shape is not None, "asked before"
+    axes, exponent = figure.subplots(), shape.exponent.value
+    axes.plot(shape.collective, shape.specific_force, "o", color=style_of(0)["color"], markersize=3)
+    level = np.linspace(shape.collective.min(), shape.collective.max(), 50)
+    middle = float(np.median(shape.specific_force / shape.collective**exponent))
+    axes.plot(level, middle * level**exponent, label=f"exponent {exponent:.2f}", **style_of(1))
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("throttle, share of full")
+    axes.set_ylabel("specific force, m/s²")
+    legend_above(axes)
 
 
 _PANELS = {
@@ -222,15 +218,22 @@ def _traces(r: Look) -> str:
     return traces({label: own for label, own in panels.items() if own}, r.events)
 
 
+def _drawn(description: str, draw: Callable[[Look, Figure], None], holds: Callable[[Look], object]) -> Drawn:
+    """Make a figure of a card."""
+    return Drawn(description, 2.9, draw, holds, 4.8)
+
+
 FIGURES = {
     "traces": _traces,
-    "balance": _balance,
-    "effectiveness": _effectiveness,
-    "step": _step,
-    "response": _response,
-    "vibration-map": _map,
-    "spectra": _spectra,
-    "thrust": _thrust,
+    "balance": _drawn("Share of each rotor against the mean, in per cent", _balance, _balanced),
+    "effectiveness": _drawn("Angular acceleration per full command over frequency", _effectiveness, _identified),
+    "step": _drawn("Body rate after a step of its setpoint, as a share of the step", _step, _measured),
+    "response": _drawn("Body rate over rate setpoint, by frequency", _response, _measured),
+    "vibration-map": _drawn(
+        "Power of the gyroscope over frequency and throttle: the darker, the stronger", _map, _mapped
+    ),
+    "spectra": _drawn("Spectrum of the gyroscope, mean of its axes", _spectra, _of_gyroscope),
+    "thrust": _drawn("Specific force along the rotors' axis over the collective command", _thrust, _shaped),
 }
 
 

@@ -65,7 +65,6 @@ _KINDS = {
     **{name: (f"setpoint to {name}, of vehicle and autopilot", "rad per rad") for name in _FOLLOWERS},
 }
 """From what to what each response is, and in which unit."""
-_TICKS_HZ = tuple(digit * 10.0**power for power in range(-2, 3) for digit in (1, 2, 5))
 _ROOM_DB, _ROOM_DEG = 12.0, 45.0
 _MODEL: dict[str, Any] = {**style_of(1), "linewidth": 1.6, "zorder": 3}
 _UNEXCITED: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "zorder": 1.5}
@@ -110,8 +109,7 @@ def _draw(name: str, r: Responses, figure: Figure) -> None:
     lower.set_ylim(0.0, 1.05)
     lower.set_ylabel("coherence")
     lower.set_xlabel("Hz")
-    low, high = own.frequency[0], own.frequency[-1]
-    logarithmic(lower, [tick for tick in _TICKS_HZ if 0.99 * low <= tick <= 1.01 * high])
+    logarithmic(lower, own.frequency[0], own.frequency[-1])
     legend_over(figure, upper)
 
 

@@ -98,7 +98,7 @@ def _bode(axis: int, r: Gains, figure: Figure) -> None:
     low, high = r.sets[PROPOSED].frequency[[0, -1]]
     lower.set_xlim(low, high)
     lower.set_xlabel("Hz")
-    logarithmic(lower, [tick for tick in (0.1, 1.0, 10.0, 100.0, 1000.0) if tick <= high])
+    logarithmic(lower, low, high)
     legend_over(figure, upper)
 
 

@@ -65,7 +65,6 @@ _CPFLS = "cpfls"
 _SHOWN_S = 6.0
 _BEFORE: dict[str, Any] = {**style_of(2), "linewidth": 1.4, "zorder": 3}
 _AFTER: dict[str, Any] = {**style_of(1), "linewidth": 1.4, "zorder": 3.5}
-_TICKS_HZ = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 
 
 def _named(vehicle: str) -> str:
@@ -138,15 +137,14 @@ def _frequency(r: Twin, figure: Figure) -> None:
     names = [r.channel[index] for index in _shown(r)[:3]]
     panels = figure.subplots(2, len(names), sharex=True, sharey="row", squeeze=False)
     every = np.concatenate([own.frequency for one in r.vehicles.values() for own in one.channels.values()])
-    low, high = every.min(), every.max()
-    ticks = [tick for tick in _TICKS_HZ if 0.99 * low <= tick <= 1.01 * high][:: 2 if len(names) > 2 else 1]
+    steps = (1,) if len(names) > 2 else (1, 2, 5)
     for column, name in enumerate(names):
         for number, ((vehicle, own), style) in enumerate(zip(r.vehicles.items(), _styles(r), strict=True)):
             if own.channels[name].band is not None:
                 _ratio(panels[:, column], own.channels[name], _named(vehicle), style, first=number == 0)
         panels[0, column].set_title(name)
         panels[1, column].set_xlabel("Hz")
-        logarithmic(panels[1, column], ticks)
+        logarithmic(panels[1, column], every.min(), every.max(), steps)
     panels[0, 0].set_ylabel("simulated over flight, dB")
     panels[1, 0].set_ylabel("degrees")
     legend_over(figure, panels[0, 0])

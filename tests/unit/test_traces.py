@@ -113,10 +113,13 @@ def test_events_are_listed_without_scripts_and_no_text_is_obeyed():
     assert data_of(shown)["panels"][0]["title"] == "p</script>"
 
 
+@pytest.mark.usefixtures("drawn")
 def test_the_still_picture_and_the_licence_are_there():
     shown = traces({"rate": [track(("a",), np.arange(10.0), np.arange(10.0), dashed=True)]}, [event(3.0)])
-    still = shown[shown.index('class="still"') :]
-    assert 'class="curve s0 thin dashed"' in still
+    still = shown[shown.index('class="still plot"') :]
+    assert 'role="img" aria-label="Signals over the whole log"' in still
+    # The signal, its key and the moment of the event.
+    assert still.count("stroke-dasharray") == 3
     assert "Copyright (c) 2022 Leon Sorokin" in shown
     assert "Permission is hereby granted" in shown
     assert not re.search(r"(src|href)=\"?https?:", shown)
