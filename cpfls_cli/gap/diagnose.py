@@ -19,7 +19,8 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, has_force
+from cpfls_cli.gap.balance.balance_system import System, has_force, system
+from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.actuation import decided_by_instruments
@@ -50,6 +51,7 @@ from cpfls_cli.gap.naming.results import (
 )
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
+from cpfls_cli.gap.residual.rotor_loss import RotorLoss, rotor_losses
 from cpfls_cli.gap.settings import CLEAR, NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
@@ -111,6 +113,9 @@ def diagnose(
             flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
             named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
             gusts = _gusts(named, given, settings)
+    losses = _losses(flights, named, settings, rng)
+    if losses:
+        named = named._replace(losses=losses, differ=tuple(each.sentence for each in losses))
     weak, (found, held_out) = flights.training, named.judgement
     hypothesis, estimates = found.hypothesis, found.estimates
     progress(0.75, "rivals")
@@ -188,6 +193,7 @@ class _Named(NamedTuple):
     refusals: list[Refusal]
     differ: tuple[str, ...]
     alike: tuple[Alternative, ...] = ()
+    losses: tuple[RotorLoss, ...] = ()
     sure: Mapping[str, float] = MappingProxyType({})
     unidentified: tuple[str, ...] = ()
 
@@ -210,6 +216,23 @@ def _named(
     judgement, unconfirmed = judge.confirmed(first)
     differ = differences(first, judgement, steps[0], judge)
     return _Named(effects, steps, judge, first if differ else judgement, [*refusals, *unconfirmed], differ)
+
+
+def _losses(flights: _Flights, named: _Named, settings: GapSettings, rng: np.random.Generator) -> tuple[RotorLoss, ...]:
+    """Find rotors that lose thrust in flight, which is no effect of the catalogue, though several together look alike.
+
+    What is named may take a part of it, so its size is that of the model as given; and what only that shows is what is
+    named.
+    """
+    every, found = [*flights.training, *flights.repaired], named.judgement.found
+    explained = system(every, found.hypothesis.chosen)
+    beside_names = rotor_losses(explained, found.estimates.linear, found.floor, settings, rng)
+    left = {(each.flight, each.rotor) for each in beside_names}
+    if not left:
+        return ()
+    numbers, _ = fit_within_bounds(system(flights.training), found.floor)
+    given = rotor_losses(system(every), numbers, found.floor, settings, rng)
+    return tuple(each for each in given if (each.flight, each.rotor) in left)
 
 
 def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | None:
@@ -371,9 +394,10 @@ def _concluded(
         share=share,
         share_by_kind=ByKind(torque=removed.get("torque", np.nan), force=removed.get("force", np.nan)),
         differences=differ,
+        rotor_losses=found.losses,
         effects=tuple(faults if refused else effects),
-        closest=tuple(named) if refused else (),
-        alternatives=rivals,
+        closest=tuple(named) if refused and not found.losses else (),
+        alternatives=() if found.losses else rivals,
         # In gusts fits of lags see the loop, and do not compare.
         sets=() if lags and not still else likely_sets(judged),
         unexplained=() if verdict is GapVerdict.NAMED else remainder,

@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.registry import CATALOGUE, effect
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.residual.rotor_loss import RotorLoss
 from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
 from cpfls_cli.result import about, part, result
 
@@ -218,6 +219,7 @@ class Conclusion:
     share: float = about("part of the held-out gap above the floor that the effects take off: the least by kind")
     share_by_kind: ByKind = part()
     differences: tuple[str, ...] = about("what differs between the training and the held-out flights", "difference")
+    rotor_losses: tuple[RotorLoss, ...] = part(default=())
     effects: tuple[NamedEffect, ...] = part()
     closest: tuple[NamedEffect, ...] = part()
     alternatives: tuple[Alternative, ...] = part()
