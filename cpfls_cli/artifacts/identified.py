@@ -21,7 +21,7 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
 from cpfls_cli.validation.bootstrap import Draws
-from cpfls_cli.validation.physical import PeriodErrors, Physics
+from cpfls_cli.validation.physical import Physics
 from cpfls_cli.validation.replay import StepErrors
 from cpfls_cli.validation.residuals import ResidualAnalysis
 from cpfls_cli.validation.structures import StructureComparison
@@ -81,7 +81,6 @@ class IdentifiedModel(AnyModel):
     curves: Curves | None = part(default=None)
     steps: StepErrors | None = part(default=None)
     physics: Physics | None = part(default=None)
-    period: PeriodErrors | None = part(default=None)
     verdict: Verdict | None = part(default=None)
 
     @property

@@ -38,14 +38,6 @@ class ResidualWindows:
 
 
 @result
-class States:
-    """Signals averaged over the windows."""
-
-    name: tuple[str, ...] = about("signals", "state")
-    value: Array = about("their averages", "window", "state", unit="SI", gaps=True)
-
-
-@result
 class ChannelGaps:
     """Gap of each channel: torque about the body axes x, y, z, then force along them; NaN where unknown."""
 
@@ -81,7 +73,6 @@ class Comparison:
     not_excited: tuple[NotExcited, ...] = part()
     audit: Audit = part()
     residual: ResidualWindows = part(brief=False)
-    states: States = part(brief=False)
     playback: AlongFlights | None = part(None)
 
     @property
@@ -163,7 +154,6 @@ def compare(
         not_excited=not_excited(hypothesis, effects, floor),
         audit=audited,
         residual=ResidualWindows(time=centres, flight=index, value=np.where(known, residual, np.nan)),
-        states=States(name=tuple(states), value=np.column_stack(list(states.values()))),
         playback=replayed.along(played, {name: name for name in replayed.models if name != STATED}),
     )
 

@@ -23,7 +23,7 @@ from cpfls_cli.validation.bands import definite_share, inertia_band
 from cpfls_cli.validation.bootstrap import Draws, bootstrap
 from cpfls_cli.validation.evidence import MODEL, RIGID_BODY, Evidence
 from cpfls_cli.validation.paired import compare_torque, mean_missing_torque, with_constant
-from cpfls_cli.validation.physical import PeriodErrors, Physics, one_period_away, physical_sense
+from cpfls_cli.validation.physical import Physics, physical_sense
 from cpfls_cli.validation.replay import StepErrors, replay_steps
 from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
@@ -49,8 +49,6 @@ class Validation:
         D_ij(q) with their bands.
     steps : StepErrors
         Measured torques replayed, on the same part as the residuals, by the predictors as they are.
-    period : PeriodErrors or None
-        None where inputs do not go all the way round.
     """
 
     structures: StructureComparison | None
@@ -59,7 +57,6 @@ class Validation:
     curves: Curves
     steps: StepErrors
     physics: Physics
-    period: PeriodErrors | None
     verdict: Verdict
 
 
@@ -89,7 +86,7 @@ def validate(
     """
     asked, model = settings.validation, result.model
     part, source = next(iter(held_out.items()), (TRAINING, training))
-    drawing, examining = rng.spawn(2)
+    (drawing,) = rng.spawn(1)
     tell("compares structures")
     freed_data = source_of(result.freed, training, learned)
     structures = compare_structures(*freed_data, settings) if asked.structures else None
@@ -100,8 +97,7 @@ def validate(
     predictors: dict[str, Predictor] = {MODEL: model, RIGID_BODY: result.rigid_body}
     steps = replay_steps(part, source, predictors, asked.horizon_samples, asked.windows)
     residuals = examine_residuals(part, source, model.torque, asked.lags)
-    physics = physical_sense(model, examining)
-    period = one_period_away(model, {TRAINING: training, **held_out})
+    physics = physical_sense(model)
     torques = {MODEL: model.torque, RIGID_BODY: result.baselines[0].torque}
     missing = {name: mean_missing_torque(training, torque) for name, torque in torques.items()}
     ours, theirs = (with_constant(torques[name], missing[name]) for name in (MODEL, RIGID_BODY))
@@ -120,7 +116,7 @@ def validate(
         definite=definite_share(model, draws),
     )
     judged = beside_loop(verdict(evidence), result.loop, by_past=result.freed is not None)
-    return Validation(structures, residuals, draws, drawn, steps, physics, period, judged)
+    return Validation(structures, residuals, draws, drawn, steps, physics, judged)
 
 
 POINTS = 181

@@ -108,12 +108,8 @@ def others():
         "physics/indefinite": 3,
         "physics/smallest_eigenvalue": -0.0123,
         "physics/worst_attitude": np.deg2rad([12.0, -34.0]),
-        "physics/energy": 3e-16,
         "physics/indefinite_anywhere": 3,
         "physics/every_cell": 4000,
-        "period/parts": ("training",),
-        "period/mse": np.full((1, 3), 4e-6),
-        "period/max_error": np.full((1, 3), 7e-3),
     }
 
 

@@ -11,7 +11,7 @@ from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WorstWindows
-from cpfls_cli.gap.compare import ChannelGaps, ResidualWindows, States
+from cpfls_cli.gap.compare import ChannelGaps, ResidualWindows
 from cpfls_cli.gap.naming.results import (
     Alternative,
     ByKind,
@@ -253,8 +253,6 @@ def disagreement(force=True, **changed):
         "residual/time": np.tile(np.arange(WINDOWS // 2) * 0.2, 2),
         "residual/flight": np.repeat([0, 1], WINDOWS // 2),
         "residual/value": rng.standard_normal((WINDOWS, 6)) * floors * 0.01,
-        "state/name": texts("thrust", "yaw"),
-        "state/value": np.zeros((WINDOWS, 2)),
         **table(
             "stretch",
             ("flight", "start", "end", "'channel", "floors"),
@@ -274,7 +272,6 @@ def disagreement(force=True, **changed):
         not_excited=unseen(data),
         audit=audited(data),
         residual=part(ResidualWindows, data, "residual"),
-        states=States(name=tuple(data["state/name"].tolist()), value=data["state/value"]),
         playback=along(AlongFlights, data),
         warnings=tuple(data["warning"].tolist()),
         base=VehicleModel(vehicle=VehicleSettings()),

@@ -114,7 +114,6 @@ def test_scores_are_those_of_the_artifact(page, pipeline):
     shown = section(page, "identify")
     for explained in r2:
         assert f"{100 * np.sqrt(1 - explained):.3g}" in shown
-    assert "RMSE one period away" in shown
     assert "not in 3 of 120 cells" in shown
     assert "at roll 12°, pitch −34°" in shown
 
