@@ -59,5 +59,4 @@ def _effect(effect):
         c.name: {"value": c.value, "low": c.low, "high": c.high, "unit": c.unit, "possible": list(c.plausible)}
         for c in effect.numbers
     }
-    told = {"name": effect.name, "coefficients": numbers, "p_value": effect.p_value, "share": effect.share}
-    return told | {"selection_frequency": effect.selection_frequency}
+    return {"name": effect.name, "coefficients": numbers, "p_value": effect.p_value, "share": effect.share}

@@ -13,7 +13,7 @@ from cpfls_cli.artifacts.learned import LearnedFlight
 from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WhitenessChange, WorstWindows
+from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.naming.results import Conclusion, GapSize
 from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
 from cpfls_cli.gap.residual.repeated import Repeatability
@@ -60,7 +60,6 @@ class Diagnosis(Conclusion):
     playback: PlaybackChange | None = part(None)
     worst: tuple[GapStretch, ...] = part((), brief=False)
     residual: ResidualChange = part(brief=False)
-    whiteness: WhitenessChange | None = part(None)
     picture: WorstWindows | None = part(None, brief=False)
     run: FreeRuns | None = part(None, brief=False)
     audit: Audit = part()
@@ -97,7 +96,6 @@ class Diagnosis(Conclusion):
             playback=change.playback,
             worst=change.stretches,
             residual=change.residual,
-            whiteness=change.whiteness,
             picture=change.picture,
             run=change.run,
             audit=diagnosed.audit,

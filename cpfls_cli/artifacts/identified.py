@@ -21,12 +21,12 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
 from cpfls_cli.validation.bootstrap import Draws
-from cpfls_cli.validation.physical import PeriodErrors, Physics
+from cpfls_cli.validation.physical import Physics
 from cpfls_cli.validation.replay import StepErrors
 from cpfls_cli.validation.residuals import ResidualAnalysis
 from cpfls_cli.validation.structures import StructureComparison
 from cpfls_cli.validation.trust import Trust
-from cpfls_cli.validation.validate import Curves, RoundTrip, Validation
+from cpfls_cli.validation.validate import Curves, Validation
 from cpfls_cli.validation.verdict import Verdict
 
 WELL_CONDITIONED = 100.0
@@ -79,10 +79,8 @@ class IdentifiedModel(AnyModel):
     residuals: ResidualAnalysis | None = part(default=None)
     uncertainty: Draws | None = part(default=None)
     curves: Curves | None = part(default=None)
-    round_trip: RoundTrip | None = part(default=None)
     steps: StepErrors | None = part(default=None)
     physics: Physics | None = part(default=None)
-    period: PeriodErrors | None = part(default=None)
     verdict: Verdict | None = part(default=None)
 
     @property

@@ -1,4 +1,4 @@
-"""A model before and after its effects, on held-out flights: playback, whiteness, and the worst stretches."""
+"""A model before and after its effects, on held-out flights: playback, and the worst stretches."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.results import BODY
 from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
-from cpfls_cli.gap.residual.views import GapStretch, Whiteness, stretches, whiteness
+from cpfls_cli.gap.residual.views import GapStretch, stretches
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
 from cpfls_cli.playback.errors import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED, AlongFlights
@@ -192,28 +192,6 @@ class ResidualChange:
 
 
 @result
-class WhitenessChange:
-    """Autocorrelation of the gap on held-out windows."""
-
-    lag: Array = about("distance of windows that do not overlap", "lag", unit="s", brief=False)
-    before: Array = about("autocorrelation of the gap of the model as given", "lag", "6", gaps=True, brief=False)
-    after: Array = about("autocorrelation of the gap with the effects", "lag", "6", gaps=True, brief=False)
-    p_value_before: Array = about("probability that noise is as correlated, by Ljung and Box", "6", gaps=True)
-    p_value_after: Array = about("the same with the effects", "6", gaps=True)
-
-    @classmethod
-    def of(cls, before: Whiteness, after: Whiteness, lag_s: float) -> Self:
-        """Arrange autocorrelations; `lag_s` is the time between windows without common samples, s."""
-        return cls(
-            lag=np.asarray(lag_s * np.arange(1, len(before.autocorrelation) + 1), dtype=float),
-            before=before.autocorrelation,
-            after=after.autocorrelation,
-            p_value_before=before.p_value,
-            p_value_after=after.p_value,
-        )
-
-
-@result
 class EndError:
     """How far off a signal is at the longest horizon."""
 
@@ -260,7 +238,6 @@ class BeforeAfter:
     playback: PlaybackChange
     residual: ResidualChange
     stretches: tuple[GapStretch, ...]  # Of the model as given, largest gap first.
-    whiteness: WhitenessChange
     picture: WorstWindows
     run: FreeRuns
     repeatability_before: Repeatability | None  # Of training flights too; None where no flight repeats another.
@@ -285,7 +262,6 @@ def before_after(
     windows = common_windows(held, settings)
     centres = [windows.centres(recording.signals.time) for recording in held]
     index = np.repeat(np.arange(len(held)), [len(each) for each in centres])
-    stride = -(-len(windows.weight) // windows.hop)
     stated = held[0].signals.vehicle
     with_effects, given = (whole_vehicle(each, stated) for each in (model, plain(model.base)))
     if base is not None:
@@ -295,12 +271,10 @@ def before_after(
     found = stretches(in_floors, np.concatenate(centres), index, level=0.0)
     left = {"before": unseen.before, "parameters": unseen.parameters, "after": unseen.after}
     known = {name: np.where(unseen.known, rows, np.nan) for name, rows in left.items()}
-    white = [whiteness(rows * unseen.known, index, stride) for rows in (unseen.before, unseen.after)]
     return BeforeAfter(
         PlaybackChange.of_pairs(played, errors_by_horizon(played, settings.horizon_s)),
         ResidualChange(time=np.concatenate(centres), flight=index, **known),
         found,
-        WhitenessChange.of(white[0], white[1], stride * windows.hop * windows.period),
         _picture(held, found[0], windows, model, settings),
         worst_stretch(played, held, settings.horizon_s, settings.block_s),
         *_again(training, held, model, settings),

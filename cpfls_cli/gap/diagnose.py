@@ -19,7 +19,7 @@ from cpfls_cli.dynamics.equations_of_motion import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, has_force, system
+from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
@@ -37,7 +37,7 @@ from cpfls_cli.gap.naming.causes import (
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
 from cpfls_cli.gap.naming.open_questions import not_excited, unexplained_channels, untried, with_unnamed
-from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
+from cpfls_cli.gap.naming.ranking import RankedStep
 from cpfls_cli.gap.naming.results import (
     Alternative,
     ByKind,
@@ -45,7 +45,6 @@ from cpfls_cli.gap.naming.results import (
     GapChange,
     GapVerdict,
     NamedEffect,
-    TorqueAlone,
     gap_remains,
     verdict_of,
 )
@@ -129,7 +128,6 @@ def diagnose(
     judged = [named.in_gusts(each) for each in judge_effects(fit, named.effects, rng)]
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
-    torque_alone = _torque_alone(weak, settings, named.effects)
     doubts = [
         *_doubts(unnamed, judged, named.unidentified, settings),
         *(refused.sentence for refused in named.refusals),
@@ -138,7 +136,7 @@ def diagnose(
     inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
     # Above the floor of the sensors alone.
     excited = bool((inertial[:, :3].std(axis=0) > TURNING * quiet[:3]).any())
-    diagnosis = _concluded(named, judged, faults, excited, torque_alone, audited, notes, (training, held), settings)
+    diagnosis = _concluded(named, judged, faults, excited, audited, notes, (training, held), settings)
     return DiagnosisRun(diagnosis, gusts, audited, hypothesis, estimates, held_out)
 
 
@@ -332,23 +330,11 @@ def considered(settings: GapSettings) -> list[Effect]:
     ]
 
 
-def _torque_alone(
-    weak: Sequence[WeakFlight], settings: GapSettings, effects: Sequence[Effect]
-) -> tuple[TorqueAlone, ...]:
-    """List the effects that the torques alone would name first, where the force balance was used too."""
-    if not has_force(weak):
-        return ()
-    step = rank_effects([flight.without_force() for flight in weak], (), effects, settings, None)
-    best = [scored for scored in step.ranking[:3] if np.isfinite(scored.gain) and scored.gain > 0]
-    return tuple(TorqueAlone(s.candidate.effect.name, float(min(1.0, s.gain / step.above_floor))) for s in best)
-
-
 def _concluded(
     found: _Named,
     judged: Sequence[JudgedEffect],
     faults: Sequence[NamedEffect],
     excited: bool,
-    torque_alone: tuple[TorqueAlone, ...],
     audited: Audit,
     notes: Sequence[str],
     flown: tuple[Sequence[Recording], Sequence[Recording]],
@@ -404,6 +390,5 @@ def _concluded(
         not_excited=not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], floor),
         vehicle_numbers=all_numbers(estimates),
         gap=GapChange.of(held_out.size(held_out.before), held_out.size(held_out.after), held_out.floor),
-        torque_alone=torque_alone,
         notes=(*audited.filtered, *audited.settled, *differ, *wrong, *notes, *audited.warnings, *audited.notes),
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
-from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +24,6 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.recordings import FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
 from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
-from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, before_after
 from cpfls_cli.gap.diagnose import diagnose as diagnose_flights
 from cpfls_cli.gap.naming.causes import of_thrust
@@ -51,7 +49,7 @@ from cpfls_cli.pages.repeats import repeatability_drawn
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.errors import AFTER
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over, plain_ticks, stacked
+from cpfls_cli.report.canvas import GREY, Drawn, legend_over, plain_ticks, stacked
 from cpfls_cli.report.content import Command
 from cpfls_cli.report.source import Source
 from cpfls_cli.rounding import less
@@ -64,7 +62,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_BAND = 1.96
 _VISIBLE = 0.05  # Share of the error without a model by which a playback has to grow to be called worse.
 
 
@@ -125,34 +122,6 @@ def _draw_picture(r: Diagnosis, figure: Figure) -> None:
     legend_over(figure, axes)
 
 
-def _rows(r: Diagnosis) -> int:
-    return ceil(len(r.gap.known) / len(AXES))
-
-
-def _draw_whiteness(r: Diagnosis, figure: Figure) -> None:
-    """Draw the autocorrelation of the gap by channel, torques above forces, with the band of white noise."""
-    white, known = r.whiteness, r.gap.known
-    assert white is not None, "asked before"
-    steps = np.diff(r.residual.time)
-    hop = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    # Windows a lag apart share no sample.
-    independent = len(r.residual.time) * hop / float(white.lag[0])
-    band = _BAND / np.sqrt(max(independent, 1.0))
-    panels = in_columns(figure, len(known), len(AXES), share_y=True).ravel()[: len(known)]
-    for axes, index in zip(panels, known, strict=True):
-        axes.set_title(CHANNELS[index])
-        plain_ticks(axes.yaxis)
-        axes.axhspan(-band, band, color="#e6e6e6", label="white noise", zorder=0)
-        axes.axhline(0.0, color="#999999", linewidth=0.7)
-        axes.plot(white.lag, white.before[:, index], label="before", **BEFORE)
-        axes.plot(white.lag, white.after[:, index], label="after", **marked(len(white.lag)))
-        axes.set_ylim(-1.05, 1.05)
-    middle = min(len(AXES) * (_rows(r) - 1) + 1, len(panels) - 1)
-    panels[middle].set_xlabel("distance in time, s")
-    panels[0].set_ylabel("correlation")
-    legend_over(figure, panels[0])
-
-
 def _wrong(r: Diagnosis, source: Source) -> tuple[int, list[str]]:
     """Count wrong numbers, and say how far they are off, and from what: what was taken where the config has null."""
     guessed = any(map(is_of_guesses, source.header.cautions))
@@ -206,12 +175,6 @@ FIGURES = {
     ),
     "gap-sizes": sizes_drawn(lambda r: r.gap),
     "playback": playback_drawn(),
-    "whiteness": Drawn(
-        "Autocorrelation of the gap before and after, by channel",
-        lambda r: 0.9 + 1.6 * _rows(r),
-        _draw_whiteness,
-        lambda r: r.whiteness is not None and len(r.whiteness.lag) > 1 and r.gap.known,
-    ),
     "intervals": intervals_drawn(lambda r: [*r.effects, *r.closest]),
     "flown": Drawn(
         "Mean error by horizon of a simulator's file, as given and as corrected",

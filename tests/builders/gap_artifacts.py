@@ -10,8 +10,8 @@ from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.extended import Extended
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
-from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WhitenessChange, WorstWindows
-from cpfls_cli.gap.compare import ChannelGaps, ResidualWindows, States
+from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WorstWindows
+from cpfls_cli.gap.compare import ChannelGaps, ResidualWindows
 from cpfls_cli.gap.naming.results import (
     Alternative,
     ByKind,
@@ -20,13 +20,12 @@ from cpfls_cli.gap.naming.results import (
     LikelySet,
     NamedEffect,
     NotExcited,
-    TorqueAlone,
     Unexplained,
 )
 from cpfls_cli.gap.recorded import RecordedFlight
 from cpfls_cli.gap.residual.dependence import Dependence
 from cpfls_cli.gap.residual.repeated import Repeatability
-from cpfls_cli.gap.residual.views import GapStretch, HeatMap
+from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.source import source_of_result
@@ -35,7 +34,7 @@ from cpfls_cli.store import Origin
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 CHANNELS = np.array([f"{kind} {axis}" for kind in ("torque", "force") for axis in "xyz"])
-WINDOWS, HORIZON, LAGS = 60, 50, 10
+WINDOWS, HORIZON = 60, 50
 SENTENCE = "The centre of mass is not where the model has it."
 EFFECT = {
     "name": "com_offset",
@@ -43,7 +42,6 @@ EFFECT = {
     "named": 1,
     "p_value": 1e-9,
     "share": 0.93,
-    "selection_frequency": 1.0,
     "sentence": SENTENCE,
 }
 
@@ -165,7 +163,7 @@ def effects_of(data, named):
     numbers = rows(
         data, "coefficient", "effect", "name", "unit", "value", "low", "high", "plausible_low", "plausible_high"
     )
-    columns = ("name", "named", "p_value", "share", "selection_frequency", "sentence")
+    columns = ("name", "named", "p_value", "share", "sentence")
     return tuple(
         named_effect(
             name,
@@ -178,10 +176,9 @@ def effects_of(data, named):
             ),
             p_value=p_value,
             share=share,
-            selection_frequency=frequency,
             sentence=sentence,
         )
-        for name, is_named, p_value, share, frequency, sentence in rows(data, "effect", *columns)
+        for name, is_named, p_value, share, sentence in rows(data, "effect", *columns)
         if bool(is_named) is named
     )
 
@@ -192,9 +189,7 @@ def numbers_of(data):
     return tuple(Estimate(*row, (np.nan, np.nan)) for row in rows(data, "parameter", *columns))
 
 
-def named_effect(
-    name, shape=None, linear=(), numbers=(), p_value=0.001, share=1.0, selection_frequency=1.0, sentence=""
-):
+def named_effect(name, shape=None, linear=(), numbers=(), p_value=0.001, share=1.0, sentence=""):
     """Make an effect with its numbers."""
     return NamedEffect(
         name=name,
@@ -203,7 +198,6 @@ def named_effect(
         numbers=tuple(numbers),
         p_value=p_value,
         share=share,
-        selection_frequency=selection_frequency,
         sentence=sentence,
     )
 
@@ -248,8 +242,6 @@ def played_pair(**sizes):
 def disagreement(force=True, **changed):
     floors = np.array([12.0, 3.0, 0.8, *([5.0, 4.0, 70.0] if force else [np.nan] * 3)])
     rng = np.random.default_rng(1)
-    cells = np.outer(np.linspace(-1, 1, 12), np.ones(12)) * 0.01
-    cells[0, :5] = np.nan
     known = CHANNELS[: 6 if force else 3]
     pairs = [(channel, "thrust", 0.9, 0.004) for channel in known] + [(channel, "yaw", 0.6, 0.3) for channel in known]
     data = {
@@ -261,20 +253,12 @@ def disagreement(force=True, **changed):
         "residual/time": np.tile(np.arange(WINDOWS // 2) * 0.2, 2),
         "residual/flight": np.repeat([0, 1], WINDOWS // 2),
         "residual/value": rng.standard_normal((WINDOWS, 6)) * floors * 0.01,
-        "state/name": texts("thrust", "yaw"),
-        "state/value": np.zeros((WINDOWS, 2)),
         **table(
             "stretch",
             ("flight", "start", "end", "'channel", "floors"),
             [(1, 1.0, 2.0, "torque x", 33.3), (0, 3.0, 4.0, "torque y", 9.9)],
         ),
         **table("dependence", ("'channel", "'signal", "r2", "p_value"), pairs),
-        "heat_map/channel": np.array("torque x"),
-        "heat_map/signal": texts("thrust", "yaw"),
-        "heat_map/first_edge": np.linspace(50, 70, 13),
-        "heat_map/second_edge": np.linspace(-3, 3, 13),
-        "heat_map/mean": cells,
-        "heat_map/count": np.ones((12, 12)),
         **playback("model", "nothing-moves", "rate-stays"),
         **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
         **audit(),
@@ -285,15 +269,9 @@ def disagreement(force=True, **changed):
         repeatability=None,
         worst=stretches(data),
         dependence=tuple(Dependence(*row) for row in rows(data, "dependence", "channel", "signal", "r2", "p_value")),
-        heat_map=HeatMap(
-            channel=str(data["heat_map/channel"]),
-            signals=tuple(data["heat_map/signal"].tolist()),
-            **{name: data[f"heat_map/{name}"] for name in ("first_edge", "second_edge", "mean", "count")},
-        ),
         not_excited=unseen(data),
         audit=audited(data),
         residual=part(ResidualWindows, data, "residual"),
-        states=States(name=tuple(data["state/name"].tolist()), value=data["state/value"]),
         playback=along(AlongFlights, data),
         warnings=tuple(data["warning"].tolist()),
         base=VehicleModel(vehicle=VehicleSettings()),
@@ -303,12 +281,12 @@ def disagreement(force=True, **changed):
 
 def effects(*rows):
     rows = [{**EFFECT, **row} for row in rows]
-    order = ("name", "kind", "named", "p_value", "share", "selection_frequency", "sentence")
+    order = ("name", "kind", "named", "p_value", "share", "sentence")
     coefficients = [(row["name"], *NUMBERS.get(row["kind"], OFFSET)) for row in rows]
     return {
         **table(
             "effect",
-            ("'name", "'kind", "named", "p_value", "share", "selection_frequency", "'sentence"),
+            ("'name", "'kind", "named", "p_value", "share", "'sentence"),
             [[row[key] for key in order] for row in rows],
         ),
         **table(
@@ -339,11 +317,6 @@ def pictures():
     time = np.arange(200) * 0.01
     waves = np.sin(3 * time)[:, None] * np.ones(3)
     return {
-        "whiteness/lag": np.arange(1, LAGS + 1) * 0.4,
-        "whiteness/before": np.full((LAGS, 6), 0.6),
-        "whiteness/after": np.zeros((LAGS, 6)),
-        "whiteness/p_value_before": np.zeros(6),
-        "whiteness/p_value_after": np.full(6, 0.4),
         "picture/flight": np.array("two.csv"),
         "picture/channel": np.array("torque x"),
         "picture/time": time,
@@ -360,7 +333,7 @@ def pictures():
     }
 
 
-def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alone=(), sets=(), force=True, **changed):
+def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), sets=(), force=True, **changed):
     data = {
         "verdict": np.array(verdict),
         "share": 0.973,
@@ -402,12 +375,10 @@ def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), alo
         not_excited=unseen(data),
         vehicle_numbers=numbers_of(data),
         gap=part(GapChange, chosen, "gap"),
-        torque_alone=tuple(TorqueAlone(*row) for row in alone),
         notes=tuple(map(str, listed["note"])),
         playback=along(PlaybackChange, data),
         worst=stretches(data),
         residual=part(ResidualChange, data, "residual"),
-        whiteness=part(WhitenessChange, data, "whiteness"),
         picture=part(
             WorstWindows,
             data | {f"picture/{name}": str(data[f"picture/{name}"]) for name in ("flight", "channel")},

@@ -112,12 +112,6 @@ class WeakFlight:
             return np.zeros((len(self), *columns.direct.shape[1:]))
         return self.of_channels(self.windows.alternating().derivative(columns.momentum))
 
-    def without_force(self) -> WeakFlight:
-        """Drop the force balance."""
-        known = self.known & (np.arange(6) < 3)
-        seen = {key: rows * known[:, None] for key, rows in self.seen.items()}
-        return replace(self, known=known, seen=seen)
-
     def as_stated(self, axes: BoolArray) -> WeakFlight:
         """Hold the inertia about some body axes, shape (3,), at what the config states."""
         return replace(self, turns=self.turns * shown(~axes))

@@ -20,7 +20,7 @@ from cpfls_cli.gap.naming.ranking import RankedStep, Scored, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in_place_of
 from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
-from cpfls_cli.rounding import ascending, at_most
+from cpfls_cli.rounding import ascending
 
 _MATTERS = 0.02  # Relative error of a moment of inertia or of the thrust from which on it is named.
 
@@ -53,7 +53,6 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
             numbers=numbers,
             p_value=step.p_value(own.gain) if chance is None else chance,
             share=share,
-            selection_frequency=_frequency(own, ranking),
             sentence=effect_sentence(candidate.effect, numbers, hypothesis.vehicle),
         )
         rivals, compared = _rivals(own, ranking, step, settings)
@@ -82,15 +81,6 @@ def _rivals(
         if np.isfinite(other.gain) and own.candidate.effect.name not in other.candidate.effect.holds
     }
     return tuple(alternatives(own, ranking, step.above_floor, settings)), compared
-
-
-def _frequency(chosen: Scored, ranking: Sequence[Scored]) -> float:
-    """Compute the share of blocks whose omission leaves the effect the best candidate."""
-    if not np.isfinite(chosen.gain):
-        return 0.0
-    error = np.array([each.block_error for each in [chosen, *ranking] if np.isfinite(each.gain)])
-    total = error.sum(axis=1, keepdims=True) - error
-    return float(at_most(total[0], total).all(axis=0).mean())
 
 
 def likely_sets(judged: Sequence[JudgedEffect]) -> tuple[LikelySet, ...]:
@@ -223,6 +213,5 @@ def _without_columns(
         numbers=numbers,
         p_value=p_value,
         share=share,
-        selection_frequency=1.0,
         sentence=sentence,
     )

@@ -61,7 +61,6 @@ class NamedEffect:
     numbers: tuple[Estimate, ...] = part(brief=False)
     p_value: float = about("probability that chance explains as much, over the whole catalogue")
     share: float = about("part of the gap above the floor that returns without it")
-    selection_frequency: float = about("share of the blocks without which it is still the first choice")
     sentence: str = about("what it means, in plain words")
 
     @property
@@ -85,14 +84,6 @@ class NamedEffect:
         shape = dict(self.shape)
         entry = effect(self.name).form(len(self.linear), shape)
         return Candidate(entry, shape) if entry.kind in _EVALUATED and len(shape) == len(entry.shapes) else None
-
-
-@dataclass(frozen=True)
-class TorqueAlone:
-    """An effect that a look at the torques alone would choose first."""
-
-    name: str = about("identifier of the effect")
-    share: float = about("share of the gap that it would explain")
 
 
 @dataclass(frozen=True)
@@ -228,7 +219,6 @@ class Conclusion:
     not_excited: tuple[NotExcited, ...] = part()
     vehicle_numbers: tuple[Estimate, ...] = part(brief=False)
     gap: GapChange = part(brief=False)
-    torque_alone: tuple[TorqueAlone, ...] = part()
     notes: tuple[str, ...] = about("what a reader should know", "remark")
 
     @property
@@ -240,12 +230,6 @@ class Conclusion:
     def effects_of_motion(self) -> tuple[str, ...]:
         """Effects that the verdict names and that torque and force show, by identifier."""
         return tuple(each.name for each in self.effects if each.kind in _EVALUATED)
-
-    @property
-    def forces_decide(self) -> bool:
-        """Whether the torques alone would name another effect first than torque and force together."""
-        alone, named = self.torque_alone, self.effects_of_motion
-        return bool(alone and named and self.gap.has_force and alone[0].name not in named)
 
     @property
     def rivals(self) -> dict[str, list[Alternative]]:

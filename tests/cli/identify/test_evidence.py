@@ -15,7 +15,7 @@ from cpfls_cli.result import datasets
 from cpfls_cli.validation import validate
 from tests.builders.identified_models import write_changed
 
-EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "period", "verdict")
+EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "steps", "physics", "verdict")
 VALIDATION = [path for path, _ in datasets(IdentifiedModel) if path.split("/")[0] in EVIDENCE]
 WORDS = {
     "good-for-control": "Good for control",
@@ -44,20 +44,10 @@ def validated(cpfls, study, pipeline, tmp_path_factory):
 
 def test_every_dataset_is_there_and_good(validated, cpfls):
     with h5py.File(validated[0]) as file:
-        # The input map of the study is data-range: one period away there is nothing to judge.
-        missing = {path for path in VALIDATION if path not in file}
-        assert missing == {"period/parts", "period/mse", "period/max_error"}
+        assert not [path for path in VALIDATION if path not in file]
         assert file["judged/vaf"].shape == file["judged/r2"].shape
         assert file["steps/part"][()] == file["residuals/part"][()] == b"held-out rest"
     cpfls.done("check", validated[0])
-
-
-def test_one_period_away_where_inputs_go_all_the_way_round(cpfls, study, pipeline, tmp_path):
-    output = tmp_path / "model.h5"
-    cpfls.done("identify", study, pipeline.flight, "--set", "identification.input_map=full-circle", "-o", output)
-    with h5py.File(output) as file:
-        here = file["judged/mse"][list(file["judged/models"]).index(b"model"), 0]
-        np.testing.assert_allclose(file["period/mse"][0], here, rtol=1e-6)
 
 
 def test_the_verdict_is_printed_with_its_reasons(validated):

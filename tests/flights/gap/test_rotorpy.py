@@ -38,5 +38,3 @@ def test_aerodynamics_are_told_apart_by_the_forces_to_ten_percent(answer_of, coe
     assert {effect["name"] for effect in answer["effects"]} == {effect for effect, _ in stated}
     for (effect, name), value in stated.items():
         assert coefficients_of(answer, effect)[name]["value"] == pytest.approx(value, rel=0.1)
-    # The hubs lie in the plane of the centre of mass, so that about the axes it looks like damping.
-    assert answer["torque_alone"][0]["name"] == "linear_damping"

@@ -2,11 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
-from scipy.stats import binned_statistic_2d, kstest
 
-from cpfls_cli.gap.residual.views import heat_map, stretches, whiteness
-from cpfls_cli.weak_form.windows import windows
+from cpfls_cli.gap.residual.views import stretches
 
 HOP = 0.2
 CENTRES = np.tile(0.3 + HOP * np.arange(200), 2)
@@ -46,59 +43,3 @@ def test_noise_alone_has_no_stretch_and_many_bursts_are_cut_to_the_largest():
     assert len(found) == 3
     assert found[0].rms_floors >= found[-1].rms_floors
     assert {one.channel for one in found} == {"force y"}
-
-
-def test_cells_hold_the_mean_and_count_every_known_window():
-    rng = np.random.default_rng(0)
-    first, second, residual = rng.standard_normal((3, 500))
-    second[::50] = np.nan
-    found = heat_map("torque x", residual, ("first", "second"), {"first": first, "second": second}, bins=6)
-    edges = (found.first_edge, found.second_edge)
-    known = np.isfinite(second)
-    inside = [np.clip(s[known], e[0], e[-1]) for s, e in zip((first, second), edges, strict=True)]
-    expected = binned_statistic_2d(*inside, residual[known], "mean", bins=list(edges)).statistic
-    np.testing.assert_allclose(found.mean, expected)
-    assert found.count.sum() == known.sum()
-
-
-def test_a_signal_that_stands_still_has_one_filled_column():
-    found = heat_map(
-        "torque x", np.arange(4.0), ("still", "moves"), {"still": np.ones(4), "moves": np.arange(4.0)}, bins=3
-    )
-    assert (found.count.sum(axis=1) > 0).sum() == 1
-    assert np.isnan(found.mean).any()
-
-
-def test_no_windows_leave_the_map_empty():
-    found = heat_map("torque x", np.zeros(3), ("a", "b"), {"a": np.full(3, np.nan), "b": np.zeros(3)})
-    assert found.count.sum() == 0
-
-
-def test_noise_seen_through_overlapping_windows_is_noise():
-    through = windows(0.01, 0.4, 0.75)
-    rng = np.random.default_rng(0)
-    p_values = []
-    for _ in range(60):
-        rows = np.concatenate([through.average(rng.standard_normal((6040, 2))) for _ in range(2)])
-        p_values += list(whiteness(rows, np.repeat([0, 1], len(rows) // 2), stride=4).p_value)
-    assert kstest(p_values, "uniform").pvalue > 0.01
-    assert whiteness(rows, np.repeat([0, 1], len(rows) // 2), stride=1).p_value.max() < 1e-6
-
-
-def test_a_correlated_residual_is_not_noise_and_shows_its_correlation():
-    rng = np.random.default_rng(1)
-    rows = np.zeros((600, 6))
-    rows[:, 0] = lfilter([1], [1, -0.9], rng.standard_normal(600))
-    rows[:, 1] = rng.standard_normal(600) + 100.0 * LONG_FLIGHT_INDEX
-    found = whiteness(rows, LONG_FLIGHT_INDEX)
-    assert found.autocorrelation[0, 0] == pytest.approx(0.81, abs=0.08)
-    assert found.p_value[0] < 1e-6
-    assert found.p_value[1] > 0.01
-    assert found.p_value[2:] == pytest.approx(1)
-    assert (found.autocorrelation.shape, found.windows) == ((10, 6), 300)
-
-
-def test_short_flights_have_fewer_lags():
-    assert whiteness(np.ones((9, 6)), np.zeros(9, dtype=int)).autocorrelation.shape == (1, 6)
-    empty = whiteness(np.ones((2, 6)), np.zeros(2, dtype=int))
-    assert (empty.autocorrelation.shape, empty.p_value.tolist()) == ((0, 6), [1.0] * 6)

@@ -21,7 +21,7 @@ BROKEN = made.texts("rotor 2 looks saturated")
         ("compare", made.disagreement()),
         ("compare", made.disagreement(force=False)),
         ("compare", made.disagreement(**{"gap/floors": np.linspace(1.0, 1.5, 6)})),
-        ("diagnose", made.diagnosis(alone=[("torque_bias", 0.9)])),
+        ("diagnose", made.diagnosis()),
         ("diagnose", made.diagnosis("AMBIGUOUS", alternatives=RIVALS)),
         ("diagnose", made.diagnosis("UNEXPLAINED", named=({"named": 0},), unexplained=LEFT)),
         ("diagnose", made.diagnosis("NO_GAP", named=(), force=False)),
