@@ -26,7 +26,7 @@ from cpfls_cli.validation.replay import StepErrors
 from cpfls_cli.validation.residuals import ResidualAnalysis
 from cpfls_cli.validation.structures import StructureComparison
 from cpfls_cli.validation.trust import Trust
-from cpfls_cli.validation.validate import Curves, Validation
+from cpfls_cli.validation.validate import Curves, RoundTrip, Validation
 from cpfls_cli.validation.verdict import Verdict
 
 WELL_CONDITIONED = 100.0
@@ -79,6 +79,7 @@ class IdentifiedModel(AnyModel):
     residuals: ResidualAnalysis | None = part(default=None)
     uncertainty: Draws | None = part(default=None)
     curves: Curves | None = part(default=None)
+    round_trip: RoundTrip | None = part(default=None)
     steps: StepErrors | None = part(default=None)
     physics: Physics | None = part(default=None)
     verdict: Verdict | None = part(default=None)

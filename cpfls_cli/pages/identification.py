@@ -14,8 +14,10 @@ from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING, J
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.comparison import COMPARISON_WORDS
 from cpfls_cli.pages.identified_figures import (
+    ENTRIES,
     PREDICTORS,
     STEP_ROWS,
+    entry_of,
     first_objective,
     has_partitions,
     weight_words,
@@ -26,7 +28,7 @@ from cpfls_cli.report.source import Source
 from cpfls_cli.rounding import at_most
 from cpfls_cli.validation.bands import band
 from cpfls_cli.validation.replay import StepErrors
-from cpfls_cli.validation.validate import Curves
+from cpfls_cli.validation.validate import Curves, RoundTrip
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MODELS = {
@@ -173,6 +175,12 @@ def _inertia_bands(r: IdentifiedModel, vehicle: VehicleSettings) -> Iterator[tup
         )
 
 
+def _round_trip(round_trip: RoundTrip) -> list[str]:
+    """Say of each entry of D(q) in what share of the visited points a second identification was within the band."""
+    shares = ((entry, float(entry_of(round_trip.inside, entry))) for entry in ENTRIES)
+    return [f"{entry} {percent(share)}" for entry, share in shares if np.isfinite(share)]
+
+
 def _same_as_rigid(curves: Curves, curve: int) -> bool:
     """Tell whether a model is its rigid body along a curve, up to rounding."""
     values, rigid = curves.inertia[curve], curves.rigid_body[curve]
@@ -222,6 +230,7 @@ WORDS: Mapping[str, Any] = {
     "has_partitions": has_partitions,
     "inertia_bands": _inertia_bands,
     "r_squared": r_squared,
+    "round_trip_words": _round_trip,
     "same_as_rigid": _same_as_rigid,
     "scores": _scores,
     "steps_rows": _steps,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.fuzzy.membership import join_ends, memberships
 from cpfls_cli.identification.cross_validation import RidgeCurve
@@ -56,6 +56,10 @@ _DECADE = 10.0
 _NAMED = 3
 _OTHERS: dict[str, Any] = {"color": "#b5b5b5", "linewidth": 0.7, "zorder": 1.5}
 _NOISE: dict[str, Any] = {"color": "#d9d9d9", "zorder": 0}
+_QUARTILE = 0.6745
+_FILL: dict[str, Any] = {"color": "#9db8d6", "edgecolor": "#1b4f8a", "linewidth": 0.3}
+_NORMAL: dict[str, Any] = {**BASELINE, "color": "black"}
+_AGAIN = {**style_of(1), "linewidth": 1.2}
 _VISITED = "#eef3e6"
 _ROOM, _LEAST = 0.6, 0.02
 _BAND = "95 % band of"
@@ -169,12 +173,48 @@ def _draw_correlations(axes: Axes, lag: Array, values: Array, inputs: tuple[str,
         axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_NAMED, borderaxespad=0.1)
 
 
+def _draw_distribution(r: IdentifiedModel, figure: Figure) -> None:
+    """Draw histogram and quantiles of the torque error by axis, each with the normal distribution."""
+    residuals = _residuals(r)
+    normal = residuals.normal_quantile
+    upper, lower = _by_axis(figure, rows=2)
+    for index, quantiles in enumerate(residuals.quantile.T):
+        # Median and quartiles give a normal distribution that outliers do not move.
+        low, middle, high = np.interp([-_QUARTILE, 0.0, _QUARTILE], normal, quantiles)
+        deviation = (high - low) / (2 * _QUARTILE)
+        edges, counts = residuals.histogram_edge[:, index], residuals.histogram_count[:, index]
+        _histogram(upper[index], edges, counts, middle, deviation)
+        lower[index].plot(normal, quantiles, "o", markersize=2.4, color=style_of(0)["color"])
+        ends = normal[[0, -1]]
+        lower[index].plot(ends, middle + deviation * ends, **_NORMAL)
+    upper[0].set_ylabel("errors in a bin")
+    upper[1].set_xlabel("error, N m")
+    lower[0].set_ylabel("quantile of the error, N m")
+    lower[1].set_xlabel("quantile of the standard normal distribution")
+    legend_over(figure, upper[0])
+
+
+def _histogram(axes: Axes, edges: Array, counts: IntArray, middle: float, deviation: float) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    widths = np.diff(edges)
+    axes.bar(edges[:-1], counts, widths, align="edge", label="errors", **_FILL)
+    if deviation > 0 and (widths > 0).all():
+        x = np.linspace(edges[0], edges[-1], 201)
+        density = np.exp(-0.5 * ((x - middle) / deviation) ** 2) / (deviation * np.sqrt(2 * np.pi))
+        axes.plot(x, counts.sum() * widths.mean() * density, label="normal distribution", **_NORMAL)
+    axes.grid(visible=False, axis="x")
+    axes.xaxis.set_major_locator(MaxNLocator(3, symmetric=True))
+    plain_ticks(axes.xaxis)
+
+
 def _draw_curve(curve: int, r: IdentifiedModel, figure: Figure) -> None:
-    """Draw the six entries of D(q) along one curve of attitudes."""
+    """Draw the six entries of D(q) along one curve of attitudes, with what a second identification gave."""
     assert r.curves is not None, "drawn only where there are some"
+    again = None if r.round_trip is None else r.round_trip.inertia[curve]
     panels = _panels(figure, r.curves.name[curve])
     for axes, entry in zip(panels, ENTRIES, strict=True):
-        _draw_entry(axes, r.curves, curve, entry)
+        _draw_entry(axes, r.curves, curve, entry, again)
     legend_over(figure, panels[0])
 
 
@@ -213,7 +253,7 @@ def _along(curves: Curves, curve: int, entry: str) -> tuple[Array, BoolArray, Ar
     return angle, ~curves.outside[curve], values, low, high, rigid
 
 
-def _draw_entry(axes: Axes, curves: Curves, curve: int, entry: str) -> None:
+def _draw_entry(axes: Axes, curves: Curves, curve: int, entry: str, again: Array | None) -> None:
     from matplotlib.ticker import MaxNLocator
 
     angle, visited, values, low, high, rigid = _along(curves, curve, entry)
@@ -222,6 +262,8 @@ def _draw_entry(axes: Axes, curves: Curves, curve: int, entry: str) -> None:
     band(axes, angle, low, high, color="#9db8d6", alpha=0.7, label="95 % band")
     axes.plot(angle, rigid, label="rigid body", **{**BASELINE, "linewidth": 1.6})
     axes.plot(angle, values, label="model", **{**style_of(0), "linewidth": 1.6})
+    if again is not None:
+        axes.plot(angle, entry_of(again, entry), label="identified again", **_AGAIN)
     axes.set_xlim(angle[0], angle[-1])
     axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 2, 3, 4.5, 5, 6, 9, 10]))
     _keep_scale(axes, [rigid, values, low[visited], high[visited]], [curves])
@@ -341,6 +383,9 @@ FIGURES: Mapping[str, Drawn] = {
     ),
     "cross-correlation": Drawn(
         "Correlation of the torque error with each input over the lag", 5.6, _draw_cross_correlation, _has_residuals
+    ),
+    "error-distribution": Drawn(
+        "Histogram and quantile plot of the torque error by axis", 4.6, _draw_distribution, _has_residuals
     ),
     **{
         f"inertia-curves-{curve + 1}": Drawn(

@@ -1,4 +1,4 @@
-"""Residual analysis of the torque of a model: whiteness, bias, correlation with its inputs."""
+"""Residual analysis of the torque of a model: whiteness, bias, correlation with its inputs, distribution."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, stdtr
+from scipy.special import chdtrc, ndtri, stdtr
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import FEWEST_BLOCKS, MOST_COMPARED, mean_error
@@ -20,6 +20,8 @@ from cpfls_cli.validation.timeline import lagged_pairs, sample_numbers, sample_p
 _MOST_SAMPLES = 200_000
 # Sixteen digits, less those that a badly conditioned solution and a chain of rotations cost.
 _ROUNDING = 1e-9
+_BINS = 41
+_PROBABILITIES = np.arange(1, 100) / 100
 
 # Normal errors lie within it in 95 of 100 cases.
 _BAND = 1.96
@@ -59,6 +61,21 @@ class ResidualAnalysis:
     correlation: Array = about(
         "of error and input", "input", "input_lag", "axis", frame="Euler angles (intrinsic ZYX)", gaps=True, brief=False
     )
+    histogram_edge: Array = about(
+        "edges of the bins", "edge", "axis", unit="N m", frame="Euler angles (intrinsic ZYX)", brief=False
+    )
+    histogram_count: IntArray = about(
+        "errors in each bin", "bin", "axis", frame="Euler angles (intrinsic ZYX)", brief=False
+    )
+    normal_quantile: Array = about("quantiles of the standard normal distribution", "quantile", brief=False)
+    quantile: Array = about(
+        "the same quantiles of the errors",
+        "quantile",
+        "axis",
+        unit="N m",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
     exact: BoolArray = about(
         "1 where errors are rounding, which is never white", "axis", frame="Euler angles (intrinsic ZYX)"
     )
@@ -77,6 +94,7 @@ def examine_residuals(
     exact = np.max(np.abs(errors), axis=0) <= _ROUNDING * np.max(np.abs(data.torque))
     correlated, p_value = autocorrelation(errors, number, exact, lags)
     inputs = model_inputs(data, predicted)
+    edges, counts = _histogram(errors)
     return ResidualAnalysis(
         part=part,
         samples=len(data),
@@ -91,8 +109,19 @@ def examine_residuals(
         input=inputs.name,
         input_lag=period * np.arange(-lags, lags + 1, dtype=float),
         correlation=cross_correlation(errors, inputs, number, exact, lags),
+        histogram_edge=edges,
+        histogram_count=counts,
+        normal_quantile=np.asarray(ndtri(_PROBABILITIES)),
+        quantile=np.quantile(errors, _PROBABILITIES, axis=0),
         exact=exact,
     )
+
+
+def _histogram(errors: Array) -> tuple[Array, IntArray]:
+    largest = np.max(np.abs(errors), axis=0)
+    edges = np.linspace(-1.0, 1.0, _BINS + 1)[:, None] * np.where(largest > 0, largest, 1.0)
+    counts = [np.histogram(axis, bins=edge)[0] for axis, edge in zip(errors.T, edges.T, strict=True)]
+    return edges, np.stack(counts, axis=1)
 
 
 def autocorrelation(errors: Array, number: IntArray, without: BoolArray, lags: int) -> tuple[Array, Array]:

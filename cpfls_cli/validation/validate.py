@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,8 +11,9 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics.equations_of_motion import Predictor
 from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
 from cpfls_cli.dynamics.rigid_body import inertia_matrix
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.closed_loop import source_of
-from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.data import OtherTorque, TorqueData, TorqueSource
 from cpfls_cli.identification.identify import TRAINING, Identification, model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
@@ -27,6 +28,7 @@ from cpfls_cli.validation.physical import Physics, physical_sense
 from cpfls_cli.validation.replay import StepErrors, replay_steps
 from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
+from cpfls_cli.validation.timeline import TimeBlocks, time_blocks
 from cpfls_cli.validation.verdict import Verdict, beside_loop, verdict
 
 Tell = Callable[[str], None]
@@ -47,6 +49,8 @@ class Validation:
         Of the block bootstrap.
     curves : Curves
         D_ij(q) with their bands.
+    round_trip : RoundTrip
+        What is identified from a simulation of the model.
     steps : StepErrors
         Measured torques replayed, on the same part as the residuals, by the predictors as they are.
     """
@@ -55,6 +59,7 @@ class Validation:
     residuals: ResidualAnalysis
     uncertainty: Draws
     curves: Curves
+    round_trip: RoundTrip
     steps: StepErrors
     physics: Physics
     verdict: Verdict
@@ -86,13 +91,15 @@ def validate(
     """
     asked, model = settings.validation, result.model
     part, source = next(iter(held_out.items()), (TRAINING, training))
-    (drawing,) = rng.spawn(1)
+    drawing, _, simulating = rng.spawn(3)
     tell("compares structures")
     freed_data = source_of(result.freed, training, learned)
     structures = compare_structures(*freed_data, settings) if asked.structures else None
     tell("draws bands")
     draws = bootstrap(model_evaluator(*freed_data, settings), freed_data[0], model, result.fit, asked, drawing)
     drawn = curves(model, draws, result.rigid_body, training)
+    tell("identifies its own simulation")
+    again = round_trip(*freed_data, settings, model, drawn, simulating)
     tell("replays measured torques")
     predictors: dict[str, Predictor] = {MODEL: model, RIGID_BODY: result.rigid_body}
     steps = replay_steps(part, source, predictors, asked.horizon_samples, asked.windows)
@@ -116,7 +123,7 @@ def validate(
         definite=definite_share(model, draws),
     )
     judged = beside_loop(verdict(evidence), result.loop, by_past=result.freed is not None)
-    return Validation(structures, residuals, draws, drawn, steps, physics, judged)
+    return Validation(structures, residuals, draws, drawn, again, steps, physics, judged)
 
 
 POINTS = 181
@@ -129,6 +136,9 @@ _SMALLEST_MARGIN = np.deg2rad(2.0)
 
 # Of a long flight every so many samples are enough to say where it was.
 _LOOKED_AT = 100_000
+
+# Share of the largest inertia that rounding may take a curve out of a band of no width.
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,3 +246,96 @@ def _ends(angle: Array) -> tuple[float, float]:
         return -np.pi, np.pi
     margin = max(_MARGIN_SHARE * (highest - lowest), _SMALLEST_MARGIN)
     return lowest - margin, highest + margin
+
+
+def simulated_torque(source: TorqueSource, model: InertiaFunctions, blocks: TimeBlocks, factor: Array) -> OtherTorque:
+    """Take the motion of a source with the torque of a model, and what it missed as noise, times a factor by block."""
+
+    def simulated(data: TorqueData) -> Array:
+        predicted = model.torque(data.motion)
+        return predicted + factor[blocks.number(data.time), None] * (data.torque - predicted)
+
+    return OtherTorque(source, simulated)
+
+
+@dataclass(frozen=True, eq=False)
+class RoundTrip:
+    """D(q) identified again from torque that the model gave."""
+
+    inertia: Array = about(
+        "D_ij(q) identified from a simulation of the model",
+        "curve",
+        "point",
+        "axis",
+        "axis",
+        unit="kg m^2",
+        frame="Euler angles (intrinsic ZYX)",
+        brief=False,
+    )
+    inside: Array = about(
+        "share of visited points within the band; not known of an entry that is zero",
+        "axis",
+        "axis",
+        frame="Euler angles (intrinsic ZYX)",
+        gaps=True,
+    )
+
+
+def round_trip(
+    training: TorqueSource,
+    learned: TorqueSource,
+    settings: IdentificationSettings,
+    model: InertiaFunctions,
+    curves: Curves,
+    rng: np.random.Generator,
+) -> RoundTrip:
+    """Identify a model again from torque that it gave itself.
+
+    The torque of the model along the training motion gets the model's own errors as noise, those of each block of
+    samples times +1 or -1: noise as strong and as correlated as in the flight, none where the model misses nothing. It
+    is larger than the errors by what the fit has followed of it. Nothing is integrated in time: the motion is the
+    recorded one, and only the torque is evaluated anew.
+
+    The partitions are the model's: a search would find others that fit as well, and the question here is whether the
+    samples determine the inertia, not the breakpoints. The ridge weight is chosen anew, and its pull towards a rigid
+    body is shared by both models: a model that it pulled too far comes back all the same. `ComputationError` where the
+    simulation gives no finite model.
+    """
+    again = _identified_again(_simulated(training, learned, settings, model, rng), settings, model)
+    inertia = again.inertia(curves.attitude.reshape(-1, 3)).value.reshape(curves.inertia.shape)
+    return RoundTrip(inertia, _inside(inertia, curves))
+
+
+def _simulated(
+    training: TorqueSource,
+    learned: TorqueSource,
+    settings: IdentificationSettings,
+    model: InertiaFunctions,
+    rng: np.random.Generator,
+) -> tuple[TorqueSource, TorqueSource]:
+    blocks = time_blocks(training, settings.validation.block_s)
+    rows, parameters = 3 * len(learned), len(model.coefficients)
+    strength = np.sqrt(rows / max(rows - parameters, 1))
+    factor = strength * rng.choice([-1.0, 1.0], len(blocks.starts) + 1)
+    whole = simulated_torque(training, model, blocks, factor)
+    return whole, whole if learned is training else simulated_torque(learned, model, blocks, factor)
+
+
+def _identified_again(
+    sources: tuple[TorqueSource, TorqueSource], settings: IdentificationSettings, model: InertiaFunctions
+) -> InertiaFunctions:
+    solver = model_evaluator(*sources, settings).solver
+    fit = solver.fit(model.partitions)
+    if fit is None:
+        raise ComputationError("identifying the simulation of the model gives no finite model")
+    exact, _ = solver.exact(model.partitions, fit)
+    return replace(model, coefficients=exact.coefficients, rigid_body=exact.rigid_body)
+
+
+def _inside(inertia: Array, curves: Curves) -> Array:
+    visited, slack = ~curves.outside, _ROUNDING * float(np.max(np.abs(curves.inertia)))
+    inside = (inertia >= curves.low - slack) & (inertia <= curves.high + slack)
+    zero = np.all(curves.inertia == 0.0, axis=(0, 1)) & np.all(inertia == 0.0, axis=(0, 1))
+    if not visited.any():
+        return np.full((3, 3), np.nan)
+    return np.where(zero, np.nan, np.mean(inside[visited], axis=0))

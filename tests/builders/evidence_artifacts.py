@@ -1,6 +1,7 @@
 """Evidence on a model with known numbers, as `cpfls identify` stores it."""
 
 import numpy as np
+from scipy.stats import norm
 
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.store import read, write
@@ -13,6 +14,7 @@ REASONS = ("R2 of body torque is 0.97 or more on held-out data", "errors follow 
 
 def residuals(rng):
     lag = np.arange(1, LAGS + 1)
+    probability = norm.ppf(np.arange(1, 100) / 100)
     input_lag = np.arange(-LAGS, LAGS + 1)
     follows = 0.4 * np.exp(-(((input_lag - 6) / 9) ** 2))
     correlation = 0.02 * rng.standard_normal((INPUTS, len(input_lag), 3))
@@ -31,7 +33,12 @@ def residuals(rng):
         "residuals/input": ("roll", "pitch", "p_dot", "yaw", "p", "q", "a|b <i>"),
         "residuals/input_lag": input_lag * 0.01,
         "residuals/correlation": correlation,
+        "residuals/histogram_edge": np.linspace(-4, 4, 42)[:, None] * np.array([1e-3, 2e-3, 3e-3]),
+        "residuals/histogram_count": np.int64(400 * np.exp(-0.5 * np.linspace(-4, 4, 41)[:, None] ** 2))
+        * np.ones(3, dtype=int),
         "residuals/exact": np.array([False, False, True]),
+        "residuals/normal_quantile": probability,
+        "residuals/quantile": (probability + 0.05 * probability**3)[:, None] * np.array([1e-3, 2e-3, 3e-3]),
     }
 
 
@@ -52,6 +59,8 @@ def curves():
         "curves/high": inertia + half,
         "curves/rigid_body": np.tile(np.diag([0.61, 0.62, 1.21]), (2, POINTS, 1, 1)),
         "curves/outside": np.tile(outside, (2, 1)),
+        "round_trip/inertia": inertia + 0.004,
+        "round_trip/inside": np.where(np.eye(3) > 0, 0.96, np.nan),
     }
 
 

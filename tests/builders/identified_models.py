@@ -6,7 +6,7 @@ from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.result import described_fields
 from cpfls_cli.store import read, write
 
-EVIDENCE_PARTS = (*("structures", "residuals", "uncertainty", "curves", "steps", "physics", "verdict"),)
+EVIDENCE_PARTS = (*("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "verdict"),)
 
 
 def changed(given, path, value):

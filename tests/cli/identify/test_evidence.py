@@ -15,7 +15,7 @@ from cpfls_cli.result import datasets
 from cpfls_cli.validation import validate
 from tests.builders.identified_models import write_changed
 
-EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "steps", "physics", "verdict")
+EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "verdict")
 VALIDATION = [path for path, _ in datasets(IdentifiedModel) if path.split("/")[0] in EVIDENCE]
 WORDS = {
     "good-for-control": "Good for control",

@@ -19,7 +19,7 @@ from tests.builders.identified_models import EVIDENCE_PARTS, write_changed
 EVIDENCE = ["what it leaves unexplained", "how sure the inertia is", "prediction by horizon"]
 FIGURES = [
     f"identify-1-{name}"
-    for name in ("autocorrelation", "cross-correlation", "inertia-curves-1", "inertia-curves-2",
+    for name in ("autocorrelation", "cross-correlation", "error-distribution", "inertia-curves-1", "inertia-curves-2",
                  "steps")
 ]  # fmt: skip
 
@@ -164,7 +164,7 @@ def test_residuals_that_are_rounding_are_not_drawn(report, model):
     exact = {"residuals/autocorrelation": np.full((40, 3), np.nan), "residuals/ljung_box": np.full(3, np.nan)}
     page = report(model(**exact))
     assert "Nothing but rounding is left over" in section(page, "identify")
-    assert not set(FIGURES[:2]) & set(page.figures)
+    assert not set(FIGURES[:3]) & set(page.figures)
 
 
 def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipeline):
@@ -177,6 +177,12 @@ def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipe
     assert last["Ixx"] == "inside"
     assert "Iyy" in last
     assert last["Iyy"] == "◂"
+
+
+def test_the_round_trip_is_told_with_its_share(page, report, model):
+    assert "D22 96.0 %, D33 96.0 %, D11 96.0 %" in section(page, "identify")
+    without = report(model(**{"round_trip/inertia": None, "round_trip/inside": None}))
+    assert "Round trip" not in section(without, "identify")
 
 
 def test_a_prediction_that_is_lost_is_a_dash_and_the_least_error_is_marked(page):

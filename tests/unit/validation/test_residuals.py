@@ -124,6 +124,17 @@ def test_rounding_is_not_called_coloured():
 def test_no_torque_and_no_error_at_all():
     found = examined(flight_of_errors(np.zeros((50, AXES))))
     assert found.exact.all()
+    np.testing.assert_array_equal(found.histogram_count.sum(axis=0), 50)
+
+
+def test_histogram_and_quantiles():
+    errors = np.random.default_rng(52).standard_normal((4000, AXES)) * [1.0, 2.0, 0.5]
+    found = examined(flight_of_errors(errors))
+    np.testing.assert_array_equal(found.histogram_count.sum(axis=0), 4000)
+    np.testing.assert_allclose(found.histogram_edge[-1], np.abs(errors).max(axis=0))
+    np.testing.assert_allclose(found.histogram_edge, -found.histogram_edge[::-1], atol=1e-12)
+    slope = [np.polyfit(found.normal_quantile, own, 1)[0] for own in found.quantile.T]
+    np.testing.assert_allclose(slope, [1.0, 2.0, 0.5], rtol=0.05)
 
 
 @pytest.mark.parametrize("missing", [0.02, 0.1])
