@@ -17,7 +17,7 @@ from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import BODY, GapSize, NotExcited
 from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
 from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
-from cpfls_cli.gap.residual.views import GapStretch, stretches
+from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.gap.whole_vehicle import with_effects
 from cpfls_cli.playback.errors import STATED, AlongFlights
@@ -70,6 +70,7 @@ class Comparison:
     repeatability: Repeatability | None = part(None)
     worst: tuple[GapStretch, ...] = part(brief=False)
     dependence: tuple[Dependence, ...] = part()
+    heat_map: HeatMap | None = part(None)
     not_excited: tuple[NotExcited, ...] = part()
     audit: Audit = part()
     residual: ResidualWindows = part(brief=False)
@@ -151,6 +152,7 @@ def compare(
         repeatability=None if repeated is None else repeated.split(hypothesis, extended.linear),
         worst=stretches(residual / floor, centres, index),
         dependence=dependence,
+        heat_map=_worst(residual, rms / floor, dependence, states),
         not_excited=not_excited(hypothesis, effects, floor),
         audit=audited,
         residual=ResidualWindows(time=centres, flight=index, value=np.where(known, residual, np.nan)),
@@ -165,3 +167,13 @@ def _activity(hypothesis: System, known: BoolArray) -> Array:
     size = np.maximum(known_size(taken, known), known_size(given, known))
     # Sideways, too, a vehicle is moved by its thrust.
     return np.concatenate([size[:3], np.full(3, np.sqrt((size[3:] ** 2).sum()))])
+
+
+def _worst(
+    residual: Array, floors: Array, dependence: Sequence[Dependence], states: dict[str, Array]
+) -> HeatMap | None:
+    channel = int(np.nanargmax(floors))
+    names = [entry.signal for entry in dependence if entry.channel == CHANNELS[channel]][:2]
+    if len(names) < 2:
+        return None
+    return heat_map(CHANNELS[channel], residual[:, channel], (names[0], names[1]), states)

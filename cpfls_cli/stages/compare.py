@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cpfls_cli.arguments import FlightsArgument, ModelOption
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.disagreement import Disagreement
 from cpfls_cli.artifacts.job import Job, Progress, go_on
 from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
@@ -24,14 +24,16 @@ from cpfls_cli.flights.models import is_found, is_identified, learned_by, read_m
 from cpfls_cli.flights.recordings import Recordings, read_flights
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import compare as compare_flights
+from cpfls_cli.gap.residual.views import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
-from cpfls_cli.pages.gap import channel_words
+from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
 from cpfls_cli.pages.repeats import repeatability_drawn
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.canvas import Drawn, in_columns, line, stacked
+from cpfls_cli.report.canvas import Drawn, in_columns, line, plain_ticks, stacked
 from cpfls_cli.report.content import Command
+from cpfls_cli.report.numbers import plain
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.weak_form.windows import Recording
@@ -39,11 +41,28 @@ from cpfls_cli.words import did_you_mean
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import PatchCollection
     from matplotlib.figure import Figure
 
-_STRETCHES, _SIGNALS, _COLUMNS = 5, 4, 2
+_STRETCHES, _SIGNALS, _COLUMNS, _LEVELS = 5, 4, 2, 8
 _BLUE, _SHADE = "#1b4f8a", "#f3d9b8"
 _LABEL = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+_SIGNAL_UNITS = {
+    "time": "s",
+    "body rate": "rad/s",
+    "roll": "rad",
+    "pitch": "rad",
+    "yaw": "rad",
+    "air velocity": "m/s",
+    "speed": "m/s",
+    "horizontal speed": "m/s",
+    "vertical speed": "m/s",
+    "height": "m",
+    "rotor speed": "rad/s",
+    "thrust": "N",
+    "rotor torque": "N m",
+    "voltage": "share of full",
+}
 
 
 def _draw_gap(r: Disagreement, figure: Figure) -> None:
@@ -108,6 +127,48 @@ def _draw_dependence(r: Disagreement, figure: Figure) -> None:
         last.tick_params(labelbottom=True)
 
 
+def _draw_heat_map(r: Disagreement, figure: Figure) -> None:
+    """Draw the mean gap over the two signals that explain it best."""
+    from matplotlib.colors import BoundaryNorm
+    from matplotlib.ticker import MaxNLocator
+
+    assert r.heat_map is not None, "asked before"
+    found: HeatMap = r.heat_map
+    mean, edges = found.mean.T, (found.first_edge, found.second_edge)
+    largest = float(np.nanmax(np.abs(mean), initial=1e-12))
+    limits = MaxNLocator(_LEVELS, symmetric=True).tick_values(-largest, largest)
+    axes = figure.subplots()
+    axes.set_facecolor("white")
+    mesh = axes.pcolormesh(*edges, np.ma.masked_invalid(mean), cmap="PuOr", norm=BoundaryNorm(limits, 256))
+    axes.add_collection(_hatched(*edges, mean < 0))
+    bar = figure.colorbar(mesh, ax=axes, ticks=limits)
+    bar.ax.set_yticklabels([plain(float(limit), smallest=1e-4) for limit in limits])
+    bar.set_label(f"mean gap, {channel_unit(found.channel)}")
+    axes.grid(visible=False)
+    axes.set_xlabel(_signal_words(found.signals[0]))
+    axes.set_ylabel(_signal_words(found.signals[1]))
+    for axis in (axes.xaxis, axes.yaxis):
+        plain_ticks(axis)
+
+
+def _hatched(first: Array, second: Array, marked: BoolArray) -> PatchCollection:
+    """Hatch cells, so that a sign is seen without colour."""
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Rectangle
+
+    cells = [
+        Rectangle((first[column], second[row]), first[column + 1] - first[column], second[row + 1] - second[row])
+        for row, column in np.argwhere(marked)
+    ]
+    return PatchCollection(cells, facecolor="none", edgecolor="#6b6b6b", linewidth=0.0, hatch="////")
+
+
+def _signal_words(signal: str) -> str:
+    """Name a signal with its unit."""
+    unit = _SIGNAL_UNITS.get(signal) or _SIGNAL_UNITS.get(signal.rsplit(" ", 1)[0])
+    return f"{signal}, {unit}" if unit else signal
+
+
 FIGURES = {
     "repeatable": repeatability_drawn(lambda r: (r.repeatability, None)),
     "gap-over-time": Drawn(
@@ -121,6 +182,12 @@ FIGURES = {
         lambda r: 0.6 + 1.25 * ceil(len(r.followed_channels) / _COLUMNS),
         _draw_dependence,
         lambda r: r.followed_channels,
+    ),
+    "heat-map": Drawn(
+        "Mean gap over the two signals that explain it best",
+        3.9,
+        _draw_heat_map,
+        lambda r: r.followed_channels and r.heat_map is not None,
     ),
     "playback": playback_drawn(),
 }

@@ -25,7 +25,7 @@ from cpfls_cli.gap.naming.results import (
 from cpfls_cli.gap.recorded import RecordedFlight
 from cpfls_cli.gap.residual.dependence import Dependence
 from cpfls_cli.gap.residual.repeated import Repeatability
-from cpfls_cli.gap.residual.views import GapStretch
+from cpfls_cli.gap.residual.views import GapStretch, HeatMap
 from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.source import source_of_result
@@ -242,6 +242,8 @@ def played_pair(**sizes):
 def disagreement(force=True, **changed):
     floors = np.array([12.0, 3.0, 0.8, *([5.0, 4.0, 70.0] if force else [np.nan] * 3)])
     rng = np.random.default_rng(1)
+    cells = np.outer(np.linspace(-1, 1, 12), np.ones(12)) * 0.01
+    cells[0, :5] = np.nan
     known = CHANNELS[: 6 if force else 3]
     pairs = [(channel, "thrust", 0.9, 0.004) for channel in known] + [(channel, "yaw", 0.6, 0.3) for channel in known]
     data = {
@@ -269,6 +271,14 @@ def disagreement(force=True, **changed):
         repeatability=None,
         worst=stretches(data),
         dependence=tuple(Dependence(*row) for row in rows(data, "dependence", "channel", "signal", "r2", "p_value")),
+        heat_map=HeatMap(
+            channel="torque x",
+            signals=("thrust", "yaw"),
+            first_edge=np.linspace(50, 70, 13),
+            second_edge=np.linspace(-3, 3, 13),
+            mean=cells,
+            count=np.ones((12, 12)),
+        ),
         not_excited=unseen(data),
         audit=audited(data),
         residual=part(ResidualWindows, data, "residual"),

@@ -1,6 +1,6 @@
-"""Views of a residual: its worst stretches of time, its mean over two signals, and its correlation over lags."""
+"""Views of a residual: its worst stretches of time, and its mean over two signals."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -8,7 +8,8 @@ from scipy.ndimage import binary_closing, uniform_filter1d
 
 from cpfls_cli.arrays import Array, IntArray, runs
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.result import About
+from cpfls_cli.gap.residual.dependence import OUTER_PERCENT
+from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import ascending
 
 _WORST_SHARE = 0.1  # Of the time is called worst.
@@ -68,3 +69,56 @@ def _of_channel(
             rms = float(np.sqrt(np.mean(residual[inside] ** 2)))
             start, end = float(centres[inside[0]]) - hop / 2, float(centres[inside[-1]]) + hop / 2
             yield GapStretch(int(flight_index[rows[0]]), start, end, CHANNELS[channel], rms)
+
+
+@result
+class HeatMap:
+    """Mean gap of a channel in the cells of a grid over two signals."""
+
+    channel: str = about("channel with the largest gap in floors")
+    signals: tuple[str, ...] = about("the two signals that explain it best", "2")
+    first_edge: Array = about("edges of the cells along the first signal", "edge", unit="SI", brief=False)
+    second_edge: Array = about("edges of the cells along the second signal", "edge", unit="SI", brief=False)
+    mean: Array = about(
+        "mean gap in each cell, N m or N; NaN in empty ones", "first", "second", unit="SI", gaps=True, brief=False
+    )
+    count: Array = about("windows in each cell", "first", "second", brief=False)
+
+
+def heat_map(
+    channel: str, residual: Array, signals: tuple[str, str], states: Mapping[str, Array], bins: int = 12
+) -> HeatMap:
+    """Average a residual over the cells of two signals.
+
+    The outer cells also take the half per cent of windows beyond each end of the grid, so that a few windows do not
+    stretch it.
+
+    `residual`, shape (window,): of the channel.
+    `states`, each shape (window,): by signal; windows where one is not a number are left out.
+    `bins`: cells along each signal.
+    """
+    first, second = (states[name] for name in signals)
+    known = np.isfinite(residual) & np.isfinite(first) & np.isfinite(second)
+    values = [first[known], second[known]]
+    edges = [_edges(each, bins) for each in values]
+    cells = [np.clip(np.searchsorted(e, v, side="right") - 1, 0, bins - 1) for e, v in zip(edges, values, strict=True)]
+    flat = cells[0] * bins + cells[1]
+    count = np.bincount(flat, minlength=bins**2).astype(float)
+    total = np.bincount(flat, weights=residual[known], minlength=bins**2)
+    mean = np.divide(total, count, out=np.full(bins**2, np.nan), where=count > 0)
+    return HeatMap(
+        channel=channel,
+        signals=signals,
+        first_edge=edges[0],
+        second_edge=edges[1],
+        mean=mean.reshape(bins, bins),
+        count=count.reshape(bins, bins),
+    )
+
+
+def _edges(signal: Array, bins: int) -> Array:
+    if not len(signal):
+        return np.linspace(0.0, 1.0, bins + 1)
+    low, high = np.percentile(signal, [OUTER_PERCENT, 100 - OUTER_PERCENT])
+    # A signal that stands still still needs cells of some width.
+    return np.linspace(low, high if high > low else low + max(1e-9, 1e-9 * abs(low)), bins + 1)

@@ -23,7 +23,7 @@ from tests.builders.studies import VEHICLE
 FIGURES = [
     "diagnose-1-free-runs", "diagnose-1-gap-picture", "diagnose-1-gap-sizes", "diagnose-1-playback",
     "diagnose-1-intervals", "compare-1-gap-over-time", "compare-1-dependence",
-    "compare-1-playback",
+    "compare-1-heat-map", "compare-1-playback",
 ]  # fmt: skip
 
 STAGES = {Diagnosis: "diagnose", Disagreement: "compare", Extended: "extend"}
@@ -115,7 +115,7 @@ def test_what_is_lacking_is_left_out_and_said(tmp_path):
 
 
 def test_a_disagreement_alone_says_where_and_how_to_go_on(tmp_path):
-    page = shown(tmp_path, replace(made.disagreement(force=False), playback=None))
+    page = shown(tmp_path, replace(made.disagreement(force=False), heat_map=None, playback=None))
     assert page.summary["figures"] == ["compare-1-gap-over-time", "compare-1-dependence"]
     assert "The gap is largest in the torque about x (roll): 12.0 noise floors." in page.text
     assert "It follows thrust most." in page.text

@@ -83,6 +83,8 @@ def test_gap_follows_the_signal_that_makes_it():
     best = {channel: next(d for d in found.dependence if d.channel == channel) for channel in ("torque x", "torque y")}
     assert [best[channel].signal for channel in best] == ["body rate x", "body rate y"]
     assert all(d.r2 > 0.9 and d.p_value < 0.05 for d in best.values())
+    assert found.heat_map is not None
+    assert found.heat_map.signals[0].endswith(found.heat_map.channel[-1])
 
 
 def test_stretch_is_where_the_gap_is():

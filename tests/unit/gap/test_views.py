@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.stats import binned_statistic_2d
 
-from cpfls_cli.gap.residual.views import stretches
+from cpfls_cli.gap.residual.views import heat_map, stretches
 
 HOP = 0.2
 CENTRES = np.tile(0.3 + HOP * np.arange(200), 2)
@@ -43,3 +44,29 @@ def test_noise_alone_has_no_stretch_and_many_bursts_are_cut_to_the_largest():
     assert len(found) == 3
     assert found[0].rms_floors >= found[-1].rms_floors
     assert {one.channel for one in found} == {"force y"}
+
+
+def test_cells_hold_the_mean_and_count_every_known_window():
+    rng = np.random.default_rng(0)
+    first, second, residual = rng.standard_normal((3, 500))
+    second[::50] = np.nan
+    found = heat_map("torque x", residual, ("first", "second"), {"first": first, "second": second}, bins=6)
+    edges = (found.first_edge, found.second_edge)
+    known = np.isfinite(second)
+    inside = [np.clip(s[known], e[0], e[-1]) for s, e in zip((first, second), edges, strict=True)]
+    expected = binned_statistic_2d(*inside, residual[known], "mean", bins=list(edges)).statistic
+    np.testing.assert_allclose(found.mean, expected)
+    assert found.count.sum() == known.sum()
+
+
+def test_a_signal_that_stands_still_has_one_filled_column():
+    found = heat_map(
+        "torque x", np.arange(4.0), ("still", "moves"), {"still": np.ones(4), "moves": np.arange(4.0)}, bins=3
+    )
+    assert (found.count.sum(axis=1) > 0).sum() == 1
+    assert np.isnan(found.mean).any()
+
+
+def test_no_windows_leave_the_map_empty():
+    found = heat_map("torque x", np.zeros(3), ("a", "b"), {"a": np.full(3, np.nan), "b": np.zeros(3)})
+    assert found.count.sum() == 0

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.stages.compare import _offsets
+from cpfls_cli.stages.compare import _offsets, _signal_words
 from tests.builders import gap_artifacts as made
 from tests.builders.forms import in_all_forms
 
@@ -48,3 +48,11 @@ def test_flights_stand_one_after_another_without_overlap(flights):
     shifted = clock + _offsets(flight, clock)[flight]
     assert shifted[0] == pytest.approx(0.0, abs=1e-9)
     assert np.all(np.diff(shifted) > -1e-9)
+
+
+@pytest.mark.parametrize(
+    ("signal", "words"),
+    [("body rate x", "body rate x, rad/s"), ("height", "height, m"), ("rotor speed 2", "rotor speed 2, rad/s")],
+)
+def test_signals_carry_their_units(signal, words):
+    assert _signal_words(signal) == words
