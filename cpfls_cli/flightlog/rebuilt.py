@@ -21,11 +21,11 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flightlog.airframe import stated_airframe, usual_airframe
 from cpfls_cli.flightlog.conversion import as_mapped
-from cpfls_cli.flightlog.layouts import Parameters, lifting_rotors
 from cpfls_cli.flightlog.names import column_groups, is_of, named_signals
 from cpfls_cli.flightlog.recognised import Guess, LogTable, holding_values
 from cpfls_cli.flightlog.rotor_columns import FASTER, RotorColumns, find_rotors, left_for_commands, too_slow
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.flightlog.stated_vehicle import Parameters, lifting_rotors
 from cpfls_cli.flightlog.topics import REBUILT, STAMP, Topics, logged_hz
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
 from cpfls_cli.lag import fit_delay

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog.importing import apply_rotor_lag
-from cpfls_cli.flightlog.results import LogSignals
+from cpfls_cli.flightlog.results import ImportedFlight
 
 TAU, PERIOD = 0.07, 0.004
 
@@ -16,8 +16,8 @@ def stepped(make_signals):
 @pytest.fixture
 def make_signals():
     def call(time, command):
-        empty = dict.fromkeys(LogSignals.__dataclass_fields__)
-        return LogSignals(**{**empty, "time": time, "rotor_command": command})
+        empty = dict.fromkeys(ImportedFlight.__dataclass_fields__)
+        return ImportedFlight(**{**empty, "time": time, "rotor_command": command})
 
     return call
 
