@@ -42,8 +42,6 @@ class RotorBalance:
     rotor: int = about("number of the rotor, as the autopilot counts")
     share: Estimate | None = part(default=None)
     expected: float = about("share where all rotors are equal and the centre of mass is where the autopilot has it")
-    scatter: float = about("standard deviation of the share over windows", gaps=True)
-    drift: Estimate | None = part(default=None)
 
 
 @result
@@ -125,7 +123,10 @@ def balance_of(flight: LogFlight) -> Balance | None:
         lacks="steady flight" if means is None else "places" if trims is None else "",
         steady_s=len(shares) * WINDOW_S,
         blocks=means.blocks if means else 0,
-        rotors=_rows(windows, shares, means, expected),
+        rotors=tuple(
+            RotorBalance(rotor=k + 1, share=means.estimate(k) if means else None, expected=float(expected[k]))
+            for k in range(len(expected))
+        ),
         roll=trims.known.estimate(0) if trims else None,
         pitch=trims.known.estimate(1) if trims else None,
         yaw=trims.known.estimate(2) if trims and flight.spins is not None else None,
@@ -178,26 +179,6 @@ def _expected(flight: LogFlight, rotors: int) -> Array:
         return np.ones(rotors)
     thrust = np.linalg.pinv(np.column_stack([np.ones(rotors), columns]).T)[:, 0]
     return np.asarray(thrust / thrust.mean())
-
-
-def _rows(windows: Windows, shares: Array, means: Known | None, expected: Array) -> tuple[RotorBalance, ...]:
-    middle = windows.begin + 0.5 * windows.length_s
-
-    def drift(kept: BoolArray) -> Array:
-        apart = middle[kept] - middle[kept].mean()
-        return np.asarray(apart @ shares[kept] / max(apart @ apart, 1e-12) * np.ptp(middle))
-
-    drifts = jackknifed(drift, len(shares))
-    return tuple(
-        RotorBalance(
-            rotor=k + 1,
-            share=means.estimate(k) if means else None,
-            expected=float(expected[k]),
-            scatter=float(shares[:, k].std(ddof=1)) if means else np.nan,
-            drift=drifts.estimate(k) if drifts else None,
-        )
-        for k in range(len(expected))
-    )
 
 
 def _length(known: Known, first: int) -> Estimate:

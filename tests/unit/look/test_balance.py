@@ -136,10 +136,3 @@ def test_what_is_lacking_is_named():
     assert balance_of(replace(flight, places=None)).lacks == "places"
     assert balance_of(replace(flight, spins=None)).yaw is None
     assert balance_of(replace(flight, rotors=Samples(np.empty(0), np.empty((0, 0))))) is None
-
-
-def test_a_slope_along_the_flight_is_drift():
-    flight = hovering(EVEN, gusts=0.001, **CURVE)
-    grown = flight.rotors.values * (1 + np.outer(np.linspace(0, 0.08, len(flight.time)), [1, -1, 0, 0]))
-    balance = balance_of(replace(flight, rotors=flight.rotors._replace(values=grown)))
-    assert balance.rotors[0].drift.value == pytest.approx(0.08, rel=0.1)
