@@ -1,6 +1,6 @@
 """How well thinned motors are rebuilt, and what wrong ones do to the constants that are found with them.
 
-Simulated flights under the laws of PX4, ArduPilot and Betaflight, in gusts, with commands that reach their limits.
+Simulated flights under the laws of PX4 and ArduPilot, in gusts, with commands that reach their limits.
 Their motors are thinned to what each autopilot logs by default, rebuilt, and compared with all of its steps. Then the
 angular acceleration is explained by commands with a lag: what is found with all steps, with the thinned ones, with
 rebuilt ones, and with rebuilt ones that are made worse. Logs that are given are rebuilt and compared in the same way.
@@ -18,25 +18,23 @@ from cpfls_cli.flightlog.rebuilt import Rebuilt, rebuilt_rotors
 from cpfls_cli.flightlog.smoothing import low_pass
 from cpfls_cli.lag import lagged
 from cpfls_cli.logs.formats import log_contents
-from tests.builders.thinned_logs import AP, BF, CA, COPTER, Flown
+from tests.builders.thinned_logs import AP, CA, COPTER, Flown
 
 BAND_HZ = 10.0
 LAGS_S = np.arange(0.0, 0.2, 0.002)
 SEEDS = range(1, 5)
-COLUMNS = "flight | Hz | roll | pitch | yaw | mean | lag, ms | scale | error, % | limited, % | refused"
+COLUMNS = "flight | Hz | roll | pitch | yaw | mean | lag, ms | scale | error, % | refused"
 
 
 def main(logs: list[Path] | None = None) -> None:
     rows = []
     for size in (0.25, 0.9):
         px4, copter = Flown("px4", seconds=20.0, size=size), Flown("ardupilot", AP, seconds=20.0, size=size)
-        flat = Flown("betaflight", {"pid_process_denom": 16.0}, seconds=6.0, size=size)
         rows.append(row(f"PX4, {size:g}", rebuilt_rotors(px4.px4_topics(), CA, "PX4 1.15.0")))
         rows.append(row(f"PX4, stamps apart, {size:g}", rebuilt_rotors(px4.px4_topics(motors_hz=9.7), CA, "PX4 1.15")))
         for late in (0.0, 0.05):
             found = rebuilt_rotors(copter.ardupilot_topics(late_s=late), COPTER, "ArduCopter 4.5.1")
             rows.append(row(f"ArduPilot, {1e3 * late:g} ms late, {size:g}", found))
-        rows.append(row(f"Betaflight, {size:g}", rebuilt_rotors({"": flat.betaflight_columns()}, BF, "Betaflight 4.5")))
     table("rebuilt-motors", COLUMNS, rows)
     table("rebuilt-constants", "commands | effectiveness | lag, ms | explained", constants())
     known = [(path, log_contents(path)) for path in logs or ()]
@@ -48,14 +46,13 @@ def main(logs: list[Path] | None = None) -> None:
 def row(name: str, found: Rebuilt | None) -> tuple[str, ...]:
     """Write a line of a flight."""
     if found is None:
-        return (name, *["-"] * 9, "nothing to rebuild")
+        return (name, *["-"] * 8, "nothing to rebuild")
     shares = (*found.by_axis, found.common)
     numbers = (f"{own:.4f}" for own in shares)
     rest = (
         f"{1e3 * found.lag:.1f}",
         f"{found.scale:.3f}",
         f"{100 * found.error:.2f}",
-        f"{100 * found.limited.mean():.0f}",
     )
     return (name, f"{found.logged_hz:.0f} to {found.rate_hz:.0f}", *numbers, *rest, found.refused or "no")
 

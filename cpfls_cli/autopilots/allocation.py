@@ -1,8 +1,8 @@
 """From commands of thrust and turning to those of rotors as autopilots allocate them, for many samples at once.
 
 Body axes are forward, right, down: roll to the right, pitch nose up and yaw clockwise are positive. Written from the
-public descriptions and sources of PX4 (control allocation with sequential desaturation), ArduPilot (AP_MotorsMatrix)
-and Betaflight (mixer); where all fits between no and full thrust, all three are one product of matrices.
+public descriptions and sources of PX4 (control allocation with sequential desaturation) and ArduPilot
+(AP_MotorsMatrix); where all fits between no and full thrust, both are one product of matrices.
 """
 
 from __future__ import annotations
@@ -16,16 +16,14 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.motors import MixerRule, ThrustCurve, inverse_mix
 
-Spread = Literal["none", "linear", "dynamic"]
 _ZERO = 1e-7
 """Share of a rotor below which it has no part in an axis."""
 _YAW_ROOM = 0.15
 """Of PX4: the share above full up to which yaw may go before thrust gives way."""
 _WEAK = 0.05
 """Of PX4: effect of rotors along an axis up to which the axis is not controlled."""
-_BEST_THROTTLE, _HALF = 0.5, 0.5
-"""Of ArduPilot: throttle with most room for turning; of Betaflight: throttle below which turning weakens without
-airmode."""
+_BEST_THROTTLE = 0.5
+"""Of ArduPilot: throttle with most room for turning."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,22 +32,19 @@ class Limits:
 
     Attributes
     ----------
-    by : {"px4", "ardupilot", "betaflight"}
+    by : {"px4", "ardupilot"}
     airmode : int
-        MC_AIRMODE of PX4 (0 none, 1 for roll and pitch, 2 for yaw too); of Betaflight 0 or 1.
+        MC_AIRMODE of PX4 (0 none, 1 for roll and pitch, 2 for yaw too).
     yaw_headroom : float
         Share of yaw that ArduPilot keeps (MOT_YAW_HEADROOM).
     throttle_mean : float
         Of ArduPilot, to which the mean thrust may be raised to keep turning: half of what hovers.
-    spread : Spread
-        How Betaflight lifts the mix between no and full throttle (mixer_type).
     """
 
-    by: Literal["px4", "ardupilot", "betaflight"]
+    by: Literal["px4", "ardupilot"]
     airmode: int = 0
     yaw_headroom: float = 0.2
     throttle_mean: float = 0.0
-    spread: Spread = "none"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,21 +73,12 @@ class Allocation:
         turning : array, shape (sample, 3)
             Roll, pitch and yaw, shares of the full command.
         """
-        limit = {"px4": _as_px4, "ardupilot": _as_ardupilot, "betaflight": _as_betaflight}[self.limits.by]
+        limit = {"px4": _as_px4, "ardupilot": _as_ardupilot}[self.limits.by]
         return np.asarray(np.clip(limit(self.mix, np.asarray(thrust), np.asarray(turning), self.limits), 0.0, 1.0))
 
     def commands(self, thrust: Array, turning: Array, battery: Array | float = 1.0) -> Array:
         """Give what is sent to the motors, shape (sample, rotor), shares of full; `battery` as in `ThrustCurve`."""
-        if self.limits.by == "betaflight" and self.curve.expo:
-            # The stick's throttle is bent back, so that it hovers where it did.
-            amount = self.curve.expo - 0.5 * self.curve.expo**2
-            thrust = np.asarray(thrust) / (1 + amount * (1 - np.asarray(thrust)) ** 2)
         return np.asarray(self.curve.signal(self.thrusts(thrust, turning), battery))
-
-    def limited(self, thrust: Array, turning: Array) -> Array:
-        """Mark the samples that do not fit and are changed, shape (sample,)."""
-        wanted = np.column_stack([thrust, turning]) @ self.mix.T
-        return np.asarray((wanted.min(axis=1) < 0.0) | (wanted.max(axis=1) > 1.0))
 
 
 def px4_mix(rule: MixerRule, parameters: Mapping[str, float | str], rotors: list[int]) -> Array:
@@ -189,17 +175,3 @@ def _as_ardupilot(mix: Array, thrust: Array, turning: Array, limits: Limits) -> 
     low, high = low * scale, high * scale
     base = np.where(scale < 1.0, -low, np.clip(thrust, -low, 1.0 - high))
     return np.asarray(base[:, None] + scale[:, None] * turned)
-
-
-def _as_betaflight(mix: Array, thrust: Array, turning: Array, limits: Limits) -> Array:
-    """Scale what is wider than the range, then move throttle until it fits."""
-    thrust = np.clip(thrust, 0.0, 1.0)
-    turned = turning @ mix[:, 1:].T
-    width = np.ptp(turned, axis=1)
-    part = np.ones(len(thrust)) if limits.airmode else np.clip(_HALF + thrust, _HALF, 1.0)
-    if limits.spread != "none":
-        lift = _HALF * (part * width)[:, None] if limits.spread == "linear" else np.abs(turned)
-        turned = turned + lift * (1 - 2 * thrust[:, None])
-    turned = turned * (part / np.maximum(width, 1.0))[:, None]
-    base = np.clip(thrust, np.maximum(-turned.min(axis=1), 0.0), np.maximum(1.0 - turned.max(axis=1), 0.0))
-    return np.asarray(base[:, None] + turned)

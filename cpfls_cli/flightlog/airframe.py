@@ -12,8 +12,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import blocks_of_time, half_width, jackknife_error
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.layouts import LAYOUTS, USUAL, Parameters, is_open, lifting_rotors, stated_frame
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
+from cpfls_cli.flightlog.stated_vehicle import LAYOUTS, USUAL, Parameters, is_open, lifting_rotors, stated_frame
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.rounding import largest
 

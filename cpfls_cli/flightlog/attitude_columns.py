@@ -63,27 +63,22 @@ class Attitude(NamedTuple):
     scalar_last: bool = False
 
 
-class Clocks(NamedTuple):
-    """Stamps of an attitude, s, and the clock that it is put on."""
-
-    time: Array
-    grid: Array
-
-    def read(self, rotation: Rotation, order: Order, sign: Sign, price: int, *kind: bool) -> Attitude:
-        """Make a way to read columns of what they make."""
-        own = agreement.on_clock(rotation, self.time, self.grid)
-        return Attitude(own, float(own.as_matrix()[:, 2, 2].mean()), order, sign, price, *kind)
-
-
 class Witnesses(NamedTuple):
     """What an attitude is held against."""
 
+    time: Array  # Stamps of the attitude, s, and the clock that it is put on.
+    grid: Array
     rate_hz: float
     turning: Array | None  # Shape (time, 3), or None; what is slow of the gyroscope, in any unit and any axes.
     ground: Ground | None  # What is slow of the acceleration over ground; the third axis is vertical.
     lift: Array | None  # Shape (time,), or None; what grows with the thrust.
     sensed: float  # Sign of what an accelerometer reads along its third axis; 0 without one.
     known: str | None  # Body axes that the kind of log is known for.
+
+    def read(self, rotation: Rotation, order: Order, sign: Sign, price: int, *kind: bool) -> Attitude:
+        """Make a way to read columns of what they make."""
+        own = agreement.on_clock(rotation, self.time, self.grid)
+        return Attitude(own, float(own.as_matrix()[:, 2, 2].mean()), order, sign, price, *kind)
 
 
 class Reading(NamedTuple):
@@ -147,7 +142,7 @@ def _changed(order: Sequence[int], sign: Sequence[float]) -> int:
     return sum(place != index or own < 0 for index, (place, own) in enumerate(zip(order, sign, strict=True)))
 
 
-def euler_readings(angles: Array, clocks: Clocks) -> Iterator[Attitude]:
+def euler_readings(angles: Array, witnesses: Witnesses) -> Iterator[Attitude]:
     """Go through roll, pitch and yaw, rad, with every sign, as named first, and with roll and pitch swapped."""
     from scipy.spatial.transform import Rotation
 
@@ -157,10 +152,10 @@ def euler_readings(angles: Array, clocks: Clocks) -> Iterator[Attitude]:
     for order, sign in product(((0, 1, 2), (1, 0, 2)), signs):
         rotation = Rotation.from_euler("ZYX", (np.asarray(sign) * angles[:, order])[:, ::-1])
         price = (0 if sign == usual[0] else 1 if sign in usual else 2) + 2 * (order != (0, 1, 2))
-        yield clocks.read(rotation, order, sign, price)
+        yield witnesses.read(rotation, order, sign, price)
 
 
-def quaternion_readings(values: Array, named: bool, clocks: Clocks) -> Iterator[Attitude]:
+def quaternion_readings(values: Array, named: bool, witnesses: Witnesses) -> Iterator[Attitude]:
     """Go through the usual ways to read four columns: of body to world and the inverse, w first and w last.
 
     Where their names say which is w, they are in the order w, x, y, z, or its names are one off.
@@ -170,10 +165,10 @@ def quaternion_readings(values: Array, named: bool, clocks: Clocks) -> Iterator[
     for inverse, (order, scalar_last, price) in product((False, True), ways):
         rotation = agreement.rotations_of(values[:, order], "xyzw" if scalar_last else "wxyz", inverse)
         back: Sign = (-1.0, -1.0, -1.0, 1.0) if scalar_last else (1.0, -1.0, -1.0, -1.0)
-        yield clocks.read(rotation, order, back if inverse else (1.0,) * 4, price + inverse, inverse, scalar_last)
+        yield witnesses.read(rotation, order, back if inverse else (1.0,) * 4, price + inverse, inverse, scalar_last)
 
 
-def permuted_quaternions(values: Array, clocks: Clocks, most: int) -> Iterator[Attitude]:
+def permuted_quaternions(values: Array, witnesses: Witnesses, most: int) -> Iterator[Attitude]:
     """Go through four columns in every order and with every sign that costs no more than a price."""
     squares = (values**2).mean(axis=0)
     upright = {order: abs(squares @ np.array([1, -1, -1, 1])[np.argsort(order)]) for order in permutations(range(4))}
@@ -182,7 +177,7 @@ def permuted_quaternions(values: Array, clocks: Clocks, most: int) -> Iterator[A
         if upright[order] > max(upright.values()) - _AS_LEVEL and 0 < price <= most:
             sign = (1.0, *rest)
             rotation = agreement.rotations_of(values[:, order] * sign, "wxyz")
-            yield clocks.read(rotation, order, sign, price, rest == (-1.0, -1.0, -1.0))
+            yield witnesses.read(rotation, order, sign, price, rest == (-1.0, -1.0, -1.0))
 
 
 def read_axes(usual: Iterable[Attitude], witnesses: Witnesses) -> TakenReading:
@@ -199,12 +194,12 @@ def read_axes(usual: Iterable[Attitude], witnesses: Witnesses) -> TakenReading:
     return TakenReading(best, tuple(tied), tuple(readings))
 
 
-def read_quaternion(values: Array, named: bool, clocks: Clocks, witnesses: Witnesses) -> TakenReading:
+def read_quaternion(values: Array, named: bool, witnesses: Witnesses) -> TakenReading:
     """Read four columns as usual, or in another order and with other signs where that leaves less to explain away."""
-    verdict = read_axes(quaternion_readings(values, named, clocks), witnesses)
+    verdict = read_axes(quaternion_readings(values, named, witnesses), witnesses)
     if verdict.best.price < _ODD_ENOUGH:
         return verdict
-    more = permuted_quaternions(values, clocks, verdict.best.price)
+    more = permuted_quaternions(values, witnesses, verdict.best.price)
     found = read_axes((*(own.attitude for own in verdict.others[::2]), *more), witnesses)
     return found._replace(others=(*verdict.others, *found.others))
 
@@ -255,14 +250,13 @@ def read_attitude(seen: Seen) -> TakenReading | None:
             break
         time, values = seen.log.values(named.group.columns)
         if float(np.median(np.abs(np.linalg.norm(values, axis=1) - 1))) < 0.05:
-            clocks = Clocks(time, seen.log.grid[seen.part])
-            verdict = read_quaternion(values, named.group.kind == "wxyz", clocks, _witnesses(seen))
+            verdict = read_quaternion(values, named.group.kind == "wxyz", _witnesses(seen, time))
             _take_quaternion(seen, named, verdict)
             return verdict
     return None if euler is None else _read_euler(seen, euler)
 
 
-def _witnesses(seen: Seen) -> Witnesses:
+def _witnesses(seen: Seen, time: Array) -> Witnesses:
     gyro, sensed, lift = seen.first("body_rate"), 0.0, None if seen.level is None else seen.level[seen.part] ** 2
     position, velocity, rate_hz = seen.first("position"), seen.first("velocity"), seen.rate_hz
     for values in map(seen.grid, seen.candidates.get("acceleration", ())):
@@ -279,6 +273,8 @@ def _witnesses(seen: Seen) -> Witnesses:
     elif velocity is not None:
         moving = agreement.first_derivative(seen.grid(velocity), rate_hz)
     return Witnesses(
+        time,
+        seen.log.grid[seen.part],
         rate_hz,
         None if gyro is None else agreement.slow(seen.grid(gyro), rate_hz),
         None if moving is None else Ground.of(moving, rate_hz),
@@ -290,13 +286,13 @@ def _witnesses(seen: Seen) -> Witnesses:
 
 def _read_euler(seen: Seen, named: Named) -> TakenReading:
     time, values = seen.log.values(named.group.columns)
-    clocks, witnesses = Clocks(time, seen.log.grid[seen.part]), _witnesses(seen)
-    flown = (time >= clocks.grid[0]) & (time <= clocks.grid[-1])
+    witnesses = _witnesses(seen, time)
+    flown = (time >= witnesses.grid[0]) & (time <= witnesses.grid[-1])
     unit, reason, sure, rivals = _angle_unit(named, named.scale * values[flown if flown.any() else slice(None)])
     if named.unit not in (None, unit):
         seen.disagree(named, unit)
     for _ in range(2):
-        verdict = read_axes(euler_readings(named.scale * known_unit(unit).factor * values, clocks), witnesses)
+        verdict = read_axes(euler_readings(named.scale * known_unit(unit).factor * values, witnesses), witnesses)
         best = verdict.best
         if best.lean is None:
             break

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from scipy.ndimage import binary_closing, binary_dilation, binary_opening, correlate1d
@@ -97,14 +97,14 @@ class Signs:
         return replace(self, **{name: own[::every] for name, own in held.items() if own is not None})
 
 
-class EarlyEnd(NamedTuple):
-    """What ended a flight before its time, and its first sample."""
-
-    first: int
-    what: str
-    # What happened and when, s, as `Signs` has it: ``loss of control``, ``free fall``,
-    # ``impact``, ``rests with its rotors on``, ``rotors stop in the air``.
-    moments: tuple[tuple[str, float], ...] = ()
+# How a flight ends before its time, and how that is said of its moment, s.
+MOMENTS: Final = {
+    "loss of control": "loss of control at {:.1f} s",
+    "free fall": "it falls freely from {:.1f} s on",
+    "impact": "impact at {:.1f} s",
+    "rests with its rotors on": "from {:.1f} s on it rests on something, with its rotors on",
+    "rotors stop in the air": "the rotors stop in the air at {:.1f} s",
+}
 
 
 def upright_of(attitude: Array | None, quaternion: Array | None, order: Literal["wxyz", "xyzw"]) -> Array | None:
@@ -209,8 +209,8 @@ def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
     return np.asarray(stuck)
 
 
-def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd | None:
-    """Say what ended a stretch of flight before its time; None where it landed, or the log ends in flight.
+def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str, int]:
+    """Give the samples of what ended a stretch of flight before its time; none where it landed, or the log ends.
 
     A crash is a motion beyond all that the flight before held, from which it does not recover: right after it the
     vehicle rests, its rotors stop, or the log ends.
@@ -226,11 +226,9 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd
     lost = lost and not (stops and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S)
     # Who flips and lands, or ends the log in a flip, has lost nothing.
     if lost and (len(hits) or lies_then or stops or _ignores_rotors(signs, part, int(troubled[0]))):
-        return _crash(signs, troubled, hits, strained, after)
+        return _crash(signs, troubled, hits, strained)
     if rests_then:
-        begin = float(signs.time[after])
-        what = f"from {begin:.1f} s on it rests on something, with its rotors on"
-        return EarlyEnd(after, what, (("rests with its rotors on", begin),))
+        return {"rests with its rotors on": after}
     if stops:
         hit = next((hit for fall, hit in _falls(signs) if 0 <= (fall - after) * signs.period < _THEN_S), None)
         if hit is None and signs.felt is not None:
@@ -239,15 +237,11 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> EarlyEnd
             least = max(_HARD, _BEYOND * float(size[slice(*part)].max()))
             struck = after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
             hit = int(struck[0]) if len(struck) else None
-        what, at = f"the rotors stop in the air at {signs.time[after]:.1f} s", [float(signs.time[after])]
-        if hit is not None:
-            what += f", impact at {signs.time[hit]:.1f} s"
-            at.append(float(signs.time[hit]))
-        return EarlyEnd(after, what, tuple(zip(("rotors stop in the air", "impact"), at, strict=False)))
-    return None
+        return {"rotors stop in the air": after} | ({} if hit is None else {"impact": hit})
+    return {}
 
 
-def _crash(signs: Signs, troubled: IntArray, hits: IntArray, strained: IntArray, after: int) -> EarlyEnd:
+def _crash(signs: Signs, troubled: IntArray, hits: IntArray, strained: IntArray) -> dict[str, int]:
     """Say where a crash began: where it hit, or lost control before that."""
     begin = _last_burst(troubled, signs.period)
     struck = hits[(hits - begin) * signs.period > -_AT_ONCE_S / 2]
@@ -256,17 +250,9 @@ def _crash(signs: Signs, troubled: IntArray, hits: IntArray, strained: IntArray,
     origin = _last_burst(np.append(strained[strained < begin], begin), signs.period)
     for fall, hit in _falls(signs):
         if fall < origin and abs(hit - origin) * signs.period < _AT_ONCE_S / 2:
-            what = f"it falls freely from {signs.time[fall]:.1f} s on, impact at {signs.time[hit]:.1f} s"
-            moments = (("free fall", float(signs.time[fall])), ("impact", float(signs.time[hit])))
-            return EarlyEnd(min(fall, after), what, moments)
-    if at_once and origin == begin:
-        at = float(signs.time[begin])
-        return EarlyEnd(min(begin, after), f"impact at {at:.1f} s", (("impact", at),))
-    what, times = f"loss of control at {signs.time[origin]:.1f} s", [float(signs.time[origin])]
-    if len(struck):
-        what += f", impact at {signs.time[struck[0]]:.1f} s"
-        times.append(float(signs.time[struck[0]]))
-    return EarlyEnd(min(origin, after), what, tuple(zip(("loss of control", "impact"), times, strict=False)))
+            return {"free fall": fall, "impact": hit}
+    hit_ground = {"impact": int(struck[0])} if len(struck) else {}
+    return {"impact": begin} if at_once and origin == begin else {"loss of control": origin} | hit_ground
 
 
 def _last_burst(samples: IntArray, period: float) -> int:

@@ -56,7 +56,7 @@ class FlownPart:
     stretches_s: tuple[tuple[float, float], ...] = ()  # Begin and end of each stretch that flies, in order.
     ended: str = ""  # How flight ended before its time, and what is used; empty where nothing ended it.
     used: str = ""
-    # What ended flights before their time, of all stretches, as `EarlyEnd` has it.
+    # What ended flights before their time, of all stretches, by the names of `crash.MOMENTS`, s.
     moments: tuple[tuple[str, float], ...] = ()
 
     def within(self, ended: str, looked_at: tuple[float, float]) -> Self:
@@ -309,40 +309,37 @@ def _dead_rates(signs: Signs) -> bool:
 def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> FlownPart:
     time, stretches = signs.time, runs(active)
     ends = [crash.ended_early(signs, rests, part) for part in stretches]
+    # The first sample that flies no more.
+    stops = [min(after, *own.values()) if own else after for (_, after), own in zip(stretches, ends, strict=True)]
     cut = []
-    for (first, after), early_end in zip(stretches, ends, strict=True):
+    for (first, _), stop, early_end in zip(stretches, stops, ends, strict=True):
         # What is close to the ground at either end is left out, but where the log begins or ends in flight.
-        stop = after if early_end is None else early_end.first
         begin, end = float(time[first]), float(time[stop - 1])
         margin = min(_MARGIN_S, (end - begin) / 10)
-        free = stop == len(time) or early_end is not None
+        free = stop == len(time) or early_end
         cut.append((begin + (margin if first > 0 else 0.0), end - (0.0 if free else margin)))
     chosen = max(range(len(cut)), key=lambda index: cut[index][1] - cut[index][0])
-    if cut[chosen][1] - cut[chosen][0] < SHORTEST_FLIGHT_S:
-        return FlownPart(None, (f"flies for {too_short(cut[chosen][1] - cut[chosen][0])}",), flies=False)
     (first, after), (begin, end) = stretches[chosen], cut[chosen]
+    if end - begin < SHORTEST_FLIGHT_S:
+        return FlownPart(None, (f"flies for {too_short(end - begin)}",), flies=False)
     reasons = []
-    early = [(index, each) for index, each in enumerate(ends) if each is not None]
-    if first > 0 and not any(index < chosen for index, _ in early):
+    early = [index for index, own in enumerate(ends) if own]
+    if first > 0 and not any(index < chosen for index in early):
         reasons.append(f"the first {begin - time[0]:.1f} s are cut: {_how(signs, slice(0, first), how)}")
-    if after < len(time) and ends[chosen] is None:
+    if after < len(time) and not ends[chosen]:
         last = float(time[-1]) - end
         reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), how)}")
-    others = [
-        f"{time[a]:.1f} to {time[b - 1] if own is None else time[own.first - 1]:.1f} s"
-        for (a, b), own in zip(stretches, ends, strict=True)
-        if a != first
-    ]
+    others = [f"{time[a]:.1f} to {time[b - 1]:.1f} s" for (a, _), b in zip(stretches, stops, strict=True) if a != first]
     if others:
-        words = ", ".join(others)
-        reasons.append(f"it also flies at {words}; import.crop_s takes one stretch, the longest")
-    whole = first == 0 and after == len(time) and ends[chosen] is None
+        reasons.append(f"it also flies at {', '.join(others)}; import.crop_s takes one stretch, the longest")
+    whole = first == 0 and after == len(time) and not ends[chosen]
     # How the stretch that is used ended matters more than how another one did.
-    index, why = max(early, key=lambda each: each[0] == chosen, default=(chosen, None))
+    index = chosen if ends[chosen] else early[0] if early else chosen
+    ended = ", ".join(crash.MOMENTS[what].format(time[at]) for what, at in ends[index].items())
     used = f"the {end - begin:.0f} s before it are used" if index == chosen else f"{begin:.1f} to {end:.1f} s are used"
     span = None if whole else (round(begin, 2), round(end, 2))
-    moments = tuple(moment for _, each in early if each is not None for moment in each.moments)
-    return FlownPart(span, tuple(reasons), True, tuple(cut), "" if why is None else why.what, used, moments)
+    moments = tuple((what, float(time[at])) for own in ends for what, at in own.items())
+    return FlownPart(span, tuple(reasons), True, tuple(cut), ended, used, moments)
 
 
 def _how(signs: Signs, part: slice, how: str) -> str:

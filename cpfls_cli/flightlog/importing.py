@@ -14,7 +14,7 @@ from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.flightlog import bandwidth, conversion, repair, stretches
 from cpfls_cli.flightlog.flown import flown_crop, warn_of_end
 from cpfls_cli.flightlog.repair import SignalTable
-from cpfls_cli.flightlog.results import DelayEstimate, ImportedFlight, ImportReport, LogSignals
+from cpfls_cli.flightlog.results import DelayEstimate, ImportedFlight, ImportReport
 from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
 from cpfls_cli.flightlog.topics import hold_asked, previous_rows
@@ -39,7 +39,7 @@ def import_log(
     columns: Mapping[str, Array],
     settings: ImportSettings,
     *,
-    rotor_torque: Callable[[LogSignals], Array] | None = None,
+    rotor_torque: Callable[[ImportedFlight], Array] | None = None,
     delay_share: float = 1.0,
     stamped_hz: Mapping[str, float] | None = None,
 ) -> ImportedFlight:
@@ -58,7 +58,7 @@ def import_log(
 
 def read_signals(
     columns: Mapping[str, Array], settings: ImportSettings, stamped_hz: Mapping[str, float] | None = None
-) -> LogSignals:
+) -> ImportedFlight:
     """Read the mapped columns of a log, drop bad rows, repair bad values, and resample to one uniform clock.
 
     The result has the log's median rate, time from 0, neither shifted nor filtered. A torque that the rotors are to
@@ -123,7 +123,7 @@ def read_signals(
     if "attitude" in setpoints and "attitude" in converted:
         # A full turn away from the vehicle's own is the same.
         setpoints["attitude"] = converted["attitude"] + rotations.wrapped(setpoints["attitude"] - converted["attitude"])
-    return LogSignals(time=clock - clock[0], setpoints=setpoints, report=report, **converted)
+    return ImportedFlight(time=clock - clock[0], setpoints=setpoints, report=report, **converted)
 
 
 def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
@@ -151,7 +151,7 @@ def _uniform_clock(time: Array, unit: str) -> tuple[Array, float, list[str]]:
     return time[0] + period * np.arange(samples), rate_hz, [words] if rate_hz >= _FASTEST_HZ else []
 
 
-def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlight:
+def derive_flight(signals: ImportedFlight, settings: ImportSettings) -> ImportedFlight:
     """Filter all signals alike, derive rates, accelerations and torques, and interpolate to `rate_hz` last.
 
     One filter for every signal keeps the torque equation: its linear part holds between filtered signals as it did
@@ -176,7 +176,7 @@ def derive_flight(signals: LogSignals, settings: ImportSettings) -> ImportedFlig
         if settings.rate_hz < report.log_rate_hz * 0.99 and (cutoff is None or cutoff >= settings.rate_hz / 2):
             warnings += (_ALIASING,)
         report = replace(report, rate_hz=settings.rate_hz, samples=len(time), warnings=warnings)
-    return ImportedFlight(time=time, setpoints=setpoints, report=report, **arrays)
+    return replace(signals, time=time, setpoints=setpoints, report=report, **arrays)
 
 
 def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
@@ -190,7 +190,7 @@ def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
     return np.arange(samples) / rate_hz
 
 
-def _derived(signals: LogSignals) -> dict[str, Array]:
+def _derived(signals: ImportedFlight) -> dict[str, Array]:
     body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
     derived = {} if body_rate is None else {"body_rate": body_rate}
     if signals.attitude is None or body_rate is None:
@@ -211,7 +211,7 @@ def _derived(signals: LogSignals) -> dict[str, Array]:
 # Commands aligned with the motion: the lag of the rotors, and the delay between torque command and motion.
 
 
-def align_commands(signals: LogSignals, settings: ImportSettings, delay_share: float = 1.0) -> LogSignals:
+def align_commands(signals: ImportedFlight, settings: ImportSettings, delay_share: float = 1.0) -> ImportedFlight:
     """Shift torque, thrust and rotor commands by the delay, given or estimated, and drop the samples before it.
 
     Measured rotor speeds are motion and stay, unless the torque is computed from them. The signals are not yet
@@ -243,7 +243,7 @@ def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
     return tuple(sentence for sentence, so in holds.items() if so)
 
 
-def _shifted(signals: LogSignals, delay: float, speeds_command: bool) -> LogSignals:
+def _shifted(signals: ImportedFlight, delay: float, speeds_command: bool) -> ImportedFlight:
     if delay == 0:
         return signals
     period = signals.time[1] - signals.time[0]
@@ -339,7 +339,7 @@ def _window(time: Array, longest_s: float, lowpass_hz: float | None) -> slice:
     return slice(first, last)
 
 
-def apply_rotor_lag(signals: LogSignals, time_constant: float) -> LogSignals:
+def apply_rotor_lag(signals: ImportedFlight, time_constant: float) -> ImportedFlight:
     """Replace rotor commands by their first-order response in tau s, ``tau w' + w = u``, u held between samples."""
     command = signals.rotor_command
     if command is None or time_constant == 0:

@@ -10,12 +10,11 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.flightlog.airframe import Airframe, stated_airframe, usual_airframe
-from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.repair import common_rate, same_rate
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, SignalMap, SignalName
-from cpfls_cli.flightlog.stated_vehicle import plain, stated_vehicle, vehicles_apart
+from cpfls_cli.flightlog.stated_vehicle import Parameters, plain, stated_vehicle, vehicles_apart
 from cpfls_cli.flightlog.topics import Topics, column_names
 from cpfls_cli.units import UnitName, known_unit
 from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number

@@ -7,27 +7,25 @@ used.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.autopilots.allocation import Allocation, Limits, Spread, factor_mix, px4_mix
+from cpfls_cli.autopilots.allocation import Allocation, Limits, factor_mix, px4_mix
 from cpfls_cli.autopilots.motors import ThrustCurve
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flightlog.airframe import stated_airframe, usual_airframe
 from cpfls_cli.flightlog.conversion import as_mapped
-from cpfls_cli.flightlog.layouts import Parameters, lifting_rotors
 from cpfls_cli.flightlog.names import column_groups, is_of, named_signals
 from cpfls_cli.flightlog.recognised import Guess, LogTable, holding_values
 from cpfls_cli.flightlog.rotor_columns import FASTER, RotorColumns, find_rotors, left_for_commands, too_slow
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
+from cpfls_cli.flightlog.stated_vehicle import Parameters, lifting_rotors
 from cpfls_cli.flightlog.topics import REBUILT, STAMP, Topics, logged_hz
-from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
+from cpfls_cli.flightlog.vocabulary import ARDUPILOT, PX4
 from cpfls_cli.lag import fit_delay
 
 _PX4_NEW: Final = tuple(f"vehicle_{name}_setpoint.xyz[{axis}]" for name in ("torque", "thrust") for axis in range(3))
@@ -59,7 +57,6 @@ class Rebuilt(NamedTuple):
 
     time: Array  # Stamps of the log, s.
     commands: Array  # Shape (time, rotor), shares of full, as they are logged.
-    limited: Array  # Shape (time,); whether the autopilot had to change what it mixed.
     source: str
     rate_hz: float
     logged_hz: float
@@ -111,7 +108,7 @@ class _Mixed(NamedTuple):
 
 
 def rebuilt_rotors(topics: Topics, parameters: Parameters, system: str) -> Rebuilt | None:
-    """Rebuild the commands of the rotors of a log of PX4, ArduPilot or Betaflight, as its reader gives it.
+    """Rebuild the commands of the rotors of a log of PX4 or ArduPilot, as its reader gives it.
 
     None where the log holds nothing to rebuild from, or no commands to compare with; `refused` says what speaks against
     the others.
@@ -174,8 +171,6 @@ def _rebuilt(log: LogTable, command: Guess, parameters: Parameters, system: str)
             mixed = _of_px4(log, columns, parameters, new={*_PX4_NEW} <= names)
         elif is_of(system, ARDUPILOT) and {*_RATE} <= names:
             mixed = _of_ardupilot(log, columns, parameters)
-        elif is_of(system, BETAFLIGHT) and {"axisP[0]", "rcCommand[3]"} <= names:
-            mixed = _of_betaflight(log, columns, parameters)
         else:
             return None
     except (ComputationError, InputError):
@@ -184,8 +179,7 @@ def _rebuilt(log: LogTable, command: Guess, parameters: Parameters, system: str)
         return None
     slow, values = log.values(columns.columns)
     commands = mixed.allocation.commands(mixed.thrust, mixed.turning, mixed.battery)
-    limited = mixed.allocation.limited(mixed.thrust, mixed.turning)
-    found = Rebuilt(mixed.time, commands, limited, mixed.source, logged_hz(mixed.time), logged_hz(slow))
+    found = Rebuilt(mixed.time, commands, mixed.source, logged_hz(mixed.time), logged_hz(slow))
     found = _compared(found, mixed, slow, as_mapped(values, columns))
     return found._replace(refused=_refusal(found, mixed.late_s))
 
@@ -240,35 +234,6 @@ def _of_ardupilot(log: LogTable, columns: SignalMap, parameters: Parameters) -> 
     late_s = _READ_BACK_S if logged_hz(time) >= _OFTEN_HZ else 0.0
     thrust, turning = gain * values[:, 3], gain[:, None] * values[:, :3]
     return _Mixed("RATE and the frame", time, thrust, turning, allocation, battery, late_s)
-
-
-def _of_betaflight(log: LogTable, columns: SignalMap, parameters: Parameters) -> _Mixed:
-    own = AUTOPILOTS["betaflight"]
-    terms = [[f"axis{term}[{axis}]" for term in "PIDFS" if f"axis{term}[{axis}]" in log.names] for axis in range(3)]
-    time, values = log.values([name for names in terms for name in names])
-    ends = np.cumsum([0, *map(len, terms)])
-    sums = np.column_stack([values[:, begin:end].sum(axis=1) for begin, end in pairwise(ends)])
-    most = float(parameters.get("pidsum_limit", 500.0))
-    limit = np.array([most, most, float(parameters.get("pidsum_limit_yaw", 400.0))])
-    asked = np.clip(sums, -limit, limit) / 1000.0
-    throttle = "setpoint[3]" if "setpoint[3]" in log.names else "rcCommand[3]"
-    thrust = log.values([throttle])[1][:, 0] / 1000.0 - (throttle == "rcCommand[3]")
-    mix = _frame_mix("betaflight", {}, len(columns.columns), BETAFLIGHT)
-    # Its pitch is positive nose down, its yaw counter-clockwise.
-    turning = asked * (1.0, -1.0, -1.0)
-    motors = as_mapped(log.values(columns.columns)[1], columns)
-    yaw = (motors - motors.mean(axis=1, keepdims=True)) @ mix[:, 3]
-    if len(yaw) == len(turning) and float(yaw @ turning[:, 2]) < 0:
-        # Rotors that turn the other way round, which no header states.
-        mix = mix * (1.0, 1.0, 1.0, -1.0)
-    spread: Spread = _SPREADS.get(str(parameters.get("mixer_type", "")), "none")
-    limits = Limits(by="betaflight", airmode=1, spread=spread)
-    curve = ThrustCurve(0.01 * float(parameters.get("thrust_linear", 0.0)), series=own.series)
-    allocation = Allocation(mix=mix, limits=limits, curve=curve)
-    return _Mixed("axisP, axisI, axisD, axisF", time, thrust, turning, allocation)
-
-
-_SPREADS: Final[Mapping[str, Spread]] = {"LINEAR": "linear", "DYNAMIC": "dynamic"}
 
 
 def _frame_mix(autopilot: str, parameters: Parameters, count: int, kind: str) -> Array:

@@ -16,7 +16,6 @@ from cpfls_cli.flightlog.attitude_columns import BODY_OF, Reading, doubt_reading
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, find_flown, rotor_shares
-from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals, nameless_signals
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
 from cpfls_cli.flightlog.recognised import Load, LogTable, Recognition, Rival, Seen, called
@@ -24,7 +23,7 @@ from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import take_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
-from cpfls_cli.flightlog.stated_vehicle import VehicleKind, forward_flight, refuse_other_vehicle
+from cpfls_cli.flightlog.stated_vehicle import Parameters, VehicleKind, forward_flight, refuse_other_vehicle
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.rounding import largest

@@ -1,7 +1,7 @@
 """Results of an import: the signals on one clock, the flight derived from them, and the report."""
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
@@ -86,50 +86,38 @@ class ImportReport:
         return {what: count for what, count in counts.items() if count}
 
 
-@result
-class LogSignals:
-    """Signals of a log on a uniform clock, in SI, body frame FLU, world frame ENU; None where the log lacks one."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ImportedFlight:
+    """Signals of a log on a uniform clock, in SI, body frame FLU, world frame ENU; None where the log lacks one.
 
-    time: Array = about("uniform, from 0", "time", unit="s")
-    attitude: Array | None = about(
-        "roll, pitch, yaw; roll and yaw without jumps of a full turn", "time", "axis", unit="rad", default=None
-    )
-    body_rate: Array | None = about("body rate", "time", "axis", unit="rad/s", frame="body", default=None)
-    body_torque: Array | None = about("body torque", "time", "axis", unit="N m", frame="body", default=None)
-    thrust: Array | None = about("along body z", "time", unit="N", frame="body", default=None)
-    position: Array | None = about("position", "time", "axis", unit="m", frame="world", default=None)
-    velocity: Array | None = about("velocity", "time", "axis", unit="m/s", frame="world", default=None)
-    acceleration: Array | None = about(
-        "acceleration over ground", "time", "axis", unit="m/s^2", frame="world", default=None
-    )
-    specific_force: Array | None = about(
-        "what an accelerometer senses, R^T (a + g e_z)", "time", "axis", unit="m/s^2", frame="body", default=None
-    )
-    rotor_speed: Array | None = about("rotor speeds", "time", "rotor", unit="rad/s", default=None)
-    rotor_command: Array | None = about("in the SI unit of the signal's `unit`", "time", "rotor", default=None)
-    voltage: Array | None = about("V, or 1 as a share of the full battery's", "time", default=None)
-    setpoints: Mapping[str, Array] = about(
-        "what was asked for, by the names of `SETPOINTS`, neither shifted nor filtered; NaN where nothing was",
-        "time",
-        "column",
-    )
-    report: ImportReport = part()
+    Shapes are (time, 3), of thrust and voltage (time,), of rotors (time, rotor); the flight's file describes each
+    (`flights.flight.Flight`). What is derived with an attitude is None until then.
+    """
+
+    time: Array  # Shape (time,), s, from 0.
+    attitude: Array | None = None  # Roll, pitch, yaw, rad; roll and yaw without jumps of a full turn.
+    body_rate: Array | None = None
+    body_torque: Array | None = None
+    thrust: Array | None = None
+    position: Array | None = None
+    velocity: Array | None = None
+    acceleration: Array | None = None  # Over ground.
+    specific_force: Array | None = None  # What an accelerometer senses, R^T (a + g e_z).
+    rotor_speed: Array | None = None
+    rotor_command: Array | None = None  # In the SI unit of the signal's `unit`.
+    voltage: Array | None = None  # V, or 1 as a share of the full battery's.
+    # What was asked for, by the names of `SETPOINTS`, shape (time, column), neither shifted nor filtered; NaN where
+    # nothing was.
+    setpoints: Mapping[str, Array]
+    report: ImportReport
+    # Derived: Euler rates W^-1 omega, rad/s, their derivatives, and the generalised torque on the Euler coordinates,
+    # W^T tau_body, N m.
+    attitude_rate: Array | None = None
+    attitude_acceleration: Array | None = None
+    torque: Array | None = None
 
     @property
     def arrays(self) -> dict[str, Array]:
         """Signals that there are, by name, without the setpoints."""
-        names = sorted({entry.name for entry in fields(self)} - {"time", "setpoints", "report"})
-        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-
-
-@result
-class ImportedFlight(LogSignals):
-    """A flight: the signals of the log, aligned and filtered, and what is derived from them with an attitude."""
-
-    attitude_rate: Array | None = about("Euler rates, W^-1 omega", "time", "axis", unit="rad/s", default=None)
-    attitude_acceleration: Array | None = about(
-        "derivative of the Euler rates", "time", "axis", unit="rad/s^2", default=None
-    )
-    torque: Array | None = about(
-        "generalised torque on the Euler coordinates, W^T tau_body", "time", "axis", unit="N m", default=None
-    )
+        held = {name: own for name, own in vars(self).items() if name not in ("time", "setpoints", "report")}
+        return {name: held[name] for name in sorted(held) if held[name] is not None}

@@ -9,11 +9,21 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, runs
-from cpfls_cli.flightlog.layouts import Parameters, count_by_form, lifting_rotors, stated_count, whole
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, LogTable, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
-from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, MOTORS, SLOW_HZ, VTOL_TYPES, log_faster
+from cpfls_cli.flightlog.stated_vehicle import (
+    FAST_HZ,
+    MOTORS,
+    SLOW_HZ,
+    VTOL_TYPES,
+    Parameters,
+    count_by_form,
+    lifting_rotors,
+    log_faster,
+    stated_count,
+    whole,
+)
 from cpfls_cli.flightlog.topics import logged_hz
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, ASKED, BETAFLIGHT, CRAZYFLIE, PX4, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName

@@ -9,11 +9,11 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.flightlog.agreement import correlations, slow
 from cpfls_cli.flightlog.conversion import as_mapped, attitude_from_quaternion
-from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.names import column_groups, is_of, lists_all, wished_signals
 from cpfls_cli.flightlog.recognised import Guess, LogTable, Rival, Seen
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SETPOINTS, SignalMap, SignalName
+from cpfls_cli.flightlog.stated_vehicle import Parameters
 from cpfls_cli.flightlog.topics import hold_asked
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, CRAZYFLIE, KNOWN
 from cpfls_cli.units import UnitName, known_unit
@@ -50,19 +50,8 @@ class _Candidate(NamedTuple):
     called: str
     # Whether a kind of log is known for them, so that unit and signs are; else only words of the name say it.
     known: bool
-    states_unit: bool  # Whether the unit is known.
+    units: tuple[UnitName, ...] = ()  # That it may be in, where none is stated.
     doubts: tuple[str, ...] = ()  # Why they may be something else, however well they are followed.
-
-    @property
-    def what(self) -> str:
-        """What it is a setpoint of, in words."""
-        return SETPOINTS[self.signal].replace("_", " ")
-
-    @property
-    def units(self) -> dict[UnitName, float]:
-        """Units that what is asked for may be in, and the factor that makes SI units of it."""
-        units = () if self.states_unit else _UNITS[self.signal]
-        return {unit: known_unit(unit).factor for unit in units} or {self.columns.unit: 1.0}
 
 
 def take_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
@@ -102,7 +91,7 @@ def _of_known_logs(log: LogTable, parameters: Parameters, system: str) -> Iterat
                     required=False,
                 )
                 mapped = _in_stated_unit(log, name, mapped)
-                yield _Candidate(name, mapped, f"a log of {row.system} calls it so", True, True)
+                yield _Candidate(name, mapped, f"a log of {row.system} calls it so", True)
 
 
 def _in_stated_unit(log: LogTable, signal: SignalName, mapped: SignalMap) -> SignalMap:
@@ -116,15 +105,19 @@ def _by_words(seen: Seen) -> Iterator[_Candidate]:
         columns, unit = named.group.columns, named.unit
         if named.group.kind == "wxyz" and seen.quaternion_order == "xyzw":
             columns = (*columns[1:], columns[0])
-        usual = next(iter(_UNITS.get(named.signal, ())), None)
-        if unit is None and usual is None:
+        units = _UNITS.get(named.signal, ())
+        if unit is None and not units:
             seen.left_out.append(f"{named.group.pattern}: looks like a commanded thrust, but in no stated unit")
             continue
-        mapped = SignalMap(columns=columns, unit=unit or usual or "1", scale=named.scale, required=False)
+        mapped = SignalMap(columns=columns, unit=unit or units[0], scale=named.scale, required=False)
         mapped = _in_stated_unit(seen.log, named.signal, mapped)
-        known = unit is not None or mapped.columns[0] in seen.log.units
+        units = () if unit is not None or mapped.columns[0] in seen.log.units else units
         doubts = (_REFERENCE,) if {"ref", "reference"} & {*named.group.words} else ()
-        yield _Candidate(named.signal, mapped, f"called {named.group.pattern}", False, known, doubts)
+        yield _Candidate(named.signal, mapped, f"called {named.group.pattern}", False, units, doubts)
+
+
+def _what(own: _Candidate) -> str:
+    return SETPOINTS[own.signal].replace("_", " ")
 
 
 def _changes(log: LogTable, own: _Candidate) -> bool:
@@ -140,19 +133,20 @@ def _judged(seen: Seen, own: _Candidate) -> Guess | str:
     asked = known_unit(own.columns.unit).factor * as_mapped(np.column_stack(held), own.columns)
     if own.signal in ("setpoint_thrust", "sticks"):
         return _by_range(own, asked)
-    measured, columns = _measured(seen, own.signal), ", ".join(own.columns.columns)
+    measured, columns, what = _measured(seen, own.signal), ", ".join(own.columns.columns), _what(own)
     if measured is None:
-        against = f"there is no {own.what} to compare it with"
+        against = f"there is no {what} to compare it with"
         if own.known:
             return Guess(own.signal, own.columns, f"{own.called}; {against}", "named")
-        return f"{columns}: looks like a setpoint of the {own.what}, but {against}"
+        return f"{columns}: looks like a setpoint of the {what}, but {against}"
     if own.signal == "setpoint_attitude":
         asked = _as_angles(seen, own, asked, measured)
-    fit = _follow(measured, asked, seen.rate_hz, tuple(own.units.values()))
+    factors = tuple(known_unit(unit).factor for unit in own.units) or (1.0,)
+    fit = _follow(measured, asked, seen.rate_hz, factors)
     if fit.followed.any():
         return _by_motion(own, fit)
     return (
-        f"{columns}: looks like a setpoint of the {own.what}, which does not follow it; if gusts are "
+        f"{columns}: looks like a setpoint of the {what}, which does not follow it; if gusts are "
         f"why, state it as import.signals.{own.signal}"
     )
 
@@ -174,28 +168,28 @@ def _by_range(own: _Candidate, asked: Array) -> Guess | str:
 
 def _by_motion(own: _Candidate, fit: "_Following") -> Guess | str:
     """Judge a setpoint that is followed: its unit by the size, its signs by the direction."""
-    columns, mapped, gain = own.columns.columns, own.columns, fit.gain
+    columns, mapped, gain, what = own.columns.columns, own.columns, fit.gain, _what(own)
     axes = columns if len(columns) == len(fit.along) else ("roll", "pitch", "yaw")
     opposed = [axis for axis, against in zip(axes, fit.opposed, strict=True) if against]
     if opposed and (own.known or axes is not columns):
-        return f"{', '.join(columns)}: {own.called}, but the {own.what} runs against {', '.join(opposed)}"
-    if not own.states_unit:
-        unit = min(own.units, key=lambda each: abs(np.log(gain / own.units[each])))
-        mapped, gain = replace(mapped, unit=unit), gain / own.units[unit]
+        return f"{', '.join(columns)}: {own.called}, but the {what} runs against {', '.join(opposed)}"
+    if own.units:
+        unit = min(own.units, key=lambda each: abs(np.log(gain / known_unit(each).factor)))
+        mapped, gain = replace(mapped, unit=unit), gain / known_unit(unit).factor
     most = _TIMES if own.known else _TIMES_BY_WORDS
     if not 1 / most < gain < most:
-        size = f"the {own.what} is {gain:.2g} times as large, which no unit explains"
+        size = f"the {what} is {gain:.2g} times as large, which no unit explains"
         return f"{', '.join(columns)}: {own.called}; {size}"
     if opposed:
         mapped = replace(mapped, sign=tuple(-1.0 if against else 1.0 for against in fit.opposed))
     share = f"{float(np.mean(np.abs(fit.along[fit.followed | fit.opposed]))):.2f}"
     turned = f" with {', '.join(opposed)} reversed" if opposed else ""
-    size = "" if own.states_unit else f", in {mapped.unit} by its size"
+    size = f", in {mapped.unit} by its size" if own.units else ""
     free = fit.moves & ~fit.followed & ~fit.opposed
     loose = [axis for axis, neither in zip(axes, free, strict=True) if neither]
     doubts = [*own.doubts, *([f"the measured motion does not follow {', '.join(loose)}"] if loose else [])]
     rivals = tuple(Rival(f"leave {own.signal} out", doubt) for doubt in doubts)
-    reason = f"{own.called}; the {own.what} follows it{turned} (correlation {share}){size}"
+    reason = f"{own.called}; the {what} follows it{turned} (correlation {share}){size}"
     return Guess(own.signal, mapped, reason, "guess" if rivals else "data", rivals)
 
 
@@ -219,7 +213,7 @@ def _as_angles(seen: Seen, own: _Candidate, asked: Array, measured: Array) -> Ar
     if not known.any():
         return angles
     angles[known] = attitude_from_quaternion(asked[known], seen.quaternion_order) if is_quaternion else asked[known]
-    if not (is_quaternion or own.states_unit) and float(np.max(np.abs(asked[known]))) > _LARGEST_ANGLE:
+    if own.units and not is_quaternion and float(np.max(np.abs(asked[known]))) > _LARGEST_ANGLE:
         turn = 360.0
     near = measured * turn / (2 * np.pi)
     error = np.mod(angles - near + turn / 2, turn) - turn / 2

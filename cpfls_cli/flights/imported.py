@@ -12,7 +12,7 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.importing import import_log
-from cpfls_cli.flightlog.results import ImportedFlight, LogSignals
+from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.stated_vehicle import stated_vehicle
 from cpfls_cli.logs.formats import LogColumns, read_log
 from cpfls_cli.units import SPEED_UNITS
@@ -58,10 +58,10 @@ def _naming(log: Path) -> Iterator[None]:
         raise type(error)("\n".join(f"{log}: {line}" for line in str(error).splitlines())) from None
 
 
-def _rotor_torque(study: Study) -> Callable[[LogSignals], Array]:
+def _rotor_torque(study: Study) -> Callable[[ImportedFlight], Array]:
     """Make the body torque of the rotors from their speeds, or from commands taken for speeds."""
 
-    def torque(signals: LogSignals) -> Array:
+    def torque(signals: ImportedFlight) -> Array:
         if study.import_.torque_source == "rotor-speed":
             speed = signals.rotor_speed
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import half_width
 from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.look.steady import (
@@ -42,13 +42,6 @@ class RotorBalance:
     rotor: int = about("number of the rotor, as the autopilot counts")
     share: Estimate | None = part(default=None)
     expected: float = about("share where all rotors are equal and the centre of mass is where the autopilot has it")
-    scatter: float = about("standard deviation of the share over windows", gaps=True)
-    drift: Estimate | None = part(default=None)
-    speed_per_command: Estimate | None = part(default=None)
-    at_upper: float = about("share of the time flown at the upper limit of the command")
-    at_lower: float = about("share of the time flown at the lower limit of the command")
-    longest_upper_s: float = about("longest time at the upper limit", unit="s")
-    longest_lower_s: float = about("longest time at the lower limit", unit="s")
 
 
 @result
@@ -61,7 +54,7 @@ class Cause:
     size: Estimate = part()
     forward: Estimate | None = part(default=None)
     right: Estimate | None = part(default=None)
-    unit: str = about("of the size: share of thrust, share of the arm, mm", default="share of thrust")
+    unit: str = about("of the size: share of thrust, share of the arm", default="share of thrust")
 
 
 @result
@@ -104,11 +97,11 @@ class Balance:
         return bool(halves) and not self.uneven and max(halves) <= _KNOWN
 
 
-def balance_of(flight: LogFlight, arm_m: float | None = None) -> Balance | None:
+def balance_of(flight: LogFlight) -> Balance | None:
     """Estimate the share of thrust of each rotor in steady flight; None where the log has no rotors.
 
     Windows of 2 s count where the body hardly turns, tilts less than 15 degrees and no rotor is at a limit. Intervals
-    are by a jackknife over blocks of neighbouring windows. The arm, m, is for the centre of mass in mm.
+    are by a jackknife over blocks of neighbouring windows.
     """
     stated = stated_curve(flight)
     source, measured_by = _thrusts(flight, stated)
@@ -130,7 +123,10 @@ def balance_of(flight: LogFlight, arm_m: float | None = None) -> Balance | None:
         lacks="steady flight" if means is None else "places" if trims is None else "",
         steady_s=len(shares) * WINDOW_S,
         blocks=means.blocks if means else 0,
-        rotors=_rows(flight, stated, windows, shares, means, expected),
+        rotors=tuple(
+            RotorBalance(rotor=k + 1, share=means.estimate(k) if means else None, expected=float(expected[k]))
+            for k in range(len(expected))
+        ),
         roll=trims.known.estimate(0) if trims else None,
         pitch=trims.known.estimate(1) if trims else None,
         yaw=trims.known.estimate(2) if trims and flight.spins is not None else None,
@@ -138,7 +134,7 @@ def balance_of(flight: LogFlight, arm_m: float | None = None) -> Balance | None:
         fixed_forward=lean.estimate(0) if lean else None,
         fixed_right=lean.estimate(1) if lean else None,
         wind=_length(lean, 2) if lean else None,
-        causes=trims.causes(lean, arm_m) if trims else (),
+        causes=trims.causes(lean) if trims else (),
         time=windows.begin + 0.5 * windows.length_s,
         shares=shares,
         heading=heading,
@@ -152,18 +148,13 @@ def _thrusts(flight: LogFlight, stated: StatedCurve) -> tuple[Samples, str]:
     return flight.rotors._replace(values=stated.thrusts(flight.rotors.values)), known
 
 
-def _limited(stated: StatedCurve, command: Array) -> tuple[BoolArray, BoolArray]:
-    """Tell where commands are at their upper and lower limits, shape (sample, rotor) each."""
-    low, high = (0.0, 1.0) if stated.thrust else (stated.curve.low, stated.curve.high)
-    near = _AT_LIMIT * (high - low)
-    return command >= high - near, command <= low + near
-
-
 def _steady(flight: LogFlight, stated: StatedCurve, source: Samples) -> Windows:
     windows = windows_of(flight)
     steady = calm(flight, windows)
     if flight.rotors.values.size:
-        limited = np.any(_limited(stated, flight.rotors.values), axis=0).astype(float)
+        low, high = (0.0, 1.0) if stated.thrust else (stated.curve.low, stated.curve.high)
+        command, near = flight.rotors.values, _AT_LIMIT * (high - low)
+        limited = ((command >= high - near) | (command <= low + near)).astype(float)
         steady &= ~(windows.means(flight.rotors._replace(values=limited)).max(axis=1) > _LIMITED)
     thrust = windows.means(source)
     return windows.keep(steady & np.isfinite(thrust).all(axis=1) & (thrust > 0).all(axis=1))
@@ -188,57 +179,6 @@ def _expected(flight: LogFlight, rotors: int) -> Array:
         return np.ones(rotors)
     thrust = np.linalg.pinv(np.column_stack([np.ones(rotors), columns]).T)[:, 0]
     return np.asarray(thrust / thrust.mean())
-
-
-def _rows(
-    flight: LogFlight, stated: StatedCurve, windows: Windows, shares: Array, means: Known | None, expected: Array
-) -> tuple[RotorBalance, ...]:
-    middle = windows.begin + 0.5 * windows.length_s
-
-    def drift(kept: BoolArray) -> Array:
-        apart = middle[kept] - middle[kept].mean()
-        return np.asarray(apart @ shares[kept] / max(apart @ apart, 1e-12) * np.ptp(middle))
-
-    drifts = jackknifed(drift, len(shares))
-    speed = _per_command(flight, stated, windows)
-    flown = np.interp(flight.rotors.time, flight.time, flight.flown.astype(float)) > 0.5
-    ends = _limited(stated, flight.rotors.values) if flight.rotors.values.size else (np.zeros((0, len(expected))),) * 2
-    rows = []
-    for k in range(len(expected)):
-        upper, lower = (_time_at(flight.rotors.time, end[:, k] & flown, flown) if len(end) else (0, 0) for end in ends)
-        rows.append(
-            RotorBalance(
-                rotor=k + 1,
-                share=means.estimate(k) if means else None,
-                expected=float(expected[k]),
-                scatter=float(shares[:, k].std(ddof=1)) if means else np.nan,
-                drift=drifts.estimate(k) if drifts else None,
-                speed_per_command=speed.estimate(k) if speed else None,
-                at_upper=upper[0],
-                at_lower=lower[0],
-                longest_upper_s=upper[1],
-                longest_lower_s=lower[1],
-            )
-        )
-    return tuple(rows)
-
-
-def _per_command(flight: LogFlight, stated: StatedCurve, windows: Windows) -> Known | None:
-    """Compare speeds with those that are commanded, over the mean of the rotors: what motors alone differ by."""
-    if flight.rotor_speed is None or not flight.rotors.values.size:
-        return None
-    command = stated.thrusts(flight.rotors.values)
-    asked = np.sqrt(command) if stated.name and stated.value != 0 else command
-    ratio = windows.means(flight.rotor_speed) / windows.means(flight.rotors._replace(values=asked))
-    ratio = ratio / ratio.mean(axis=1, keepdims=True)
-    return jackknifed(lambda kept: ratio[kept].mean(axis=0), len(ratio))
-
-
-def _time_at(time: Array, at: BoolArray, flown: BoolArray) -> tuple[float, float]:
-    """Give the share of the time flown that is marked, and the longest stretch of it, s."""
-    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    longest = max((time[after - 1] - time[first] + step for first, after in runs(at)), default=0.0)
-    return float(at.sum() / max(flown.sum(), 1)), float(longest)
 
 
 def _length(known: Known, first: int) -> Estimate:
@@ -282,25 +222,25 @@ class _Trims:
 
         return jackknifed(parted, len(shares))
 
-    def causes(self, lean: Known | None, arm_m: float | None) -> tuple[Cause, ...]:
+    def causes(self, lean: Known | None) -> tuple[Cause, ...]:
         """List what may cause a pattern that is larger than sound rotors make; what the flight excludes is left out."""
         if not self.uneven:
             return ()
         lever = self.apart.moved(self.lean) if lean is None else lean
-        unit, scale = ("share of the arm", 1.0) if arm_m is None else ("mm", 1e3 * arm_m)
+        unit = "share of the arm"
         flat, straight = self._explained(self.columns[:, :2]), self._explained(self.columns[:, 2:])
         found, yaw = self._single_rotors(), self.known.estimate(2)
         of_mass, of_wind = _length(lever, 0), _length(lever, 0) if lean is None else _length(lean, 2)
         if of_mass.low > 0 and of_mass.value > self.small:
-            ends = (self._as_thrust(lever.estimate(axis), scale) for axis in (0, 1))
-            size = self._as_thrust(of_mass, scale)
+            ends = (self._as_thrust(lever.estimate(axis)) for axis in (0, 1))
+            size = self._as_thrust(of_mass)
             found.append(
                 Cause(kind="centre of mass", alone=flat, size=size, unit=unit, forward=next(ends), right=next(ends))
             )
         if yaw.low * yaw.high > 0 and abs(yaw.value) > 0.5 * SOUND:
             found.append(Cause(kind="yaw torque", alone=straight, size=yaw))
         if of_wind.low > 0 and of_wind.value > self.small:
-            found.append(Cause(kind="wind", alone=flat, size=self._as_thrust(of_wind, 1.0), unit="share of the arm"))
+            found.append(Cause(kind="wind", alone=flat, size=self._as_thrust(of_wind), unit=unit))
         return tuple(found)
 
     def _single_rotors(self) -> list[Cause]:
@@ -335,8 +275,8 @@ class _Trims:
         covariance = wide * basis.T @ self.apart.covariance @ basis + SOUND**2 * np.eye(len(left))
         return bool(chdtrc(len(left), float(left @ np.linalg.solve(covariance, left))) > _RARE)
 
-    def _as_thrust(self, given: Estimate, scale: float) -> Estimate:
+    def _as_thrust(self, given: Estimate) -> Estimate:
         """Scale a share of commands to one of thrust, over all curves that may lie between them."""
         factors = _SIGNAL_TO_THRUST if self.measured_by == "command" else (1.0, 1.0)
-        ends = [scale * factor * end for factor in factors for end in (given.low, given.high)]
-        return Estimate(value=scale * 0.5 * sum(factors) * given.value, low=min(ends), high=max(ends))
+        ends = [factor * end for factor in factors for end in (given.low, given.high)]
+        return Estimate(value=0.5 * sum(factors) * given.value, low=min(ends), high=max(ends))

@@ -12,8 +12,8 @@ from cpfls_cli.autopilots.allocation import factor_mix
 from cpfls_cli.autopilots.motors import MixerRule, ThrustCurve
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.flightlog.airframe import Airframe
-from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.recognised import Guess
+from cpfls_cli.flightlog.stated_vehicle import Parameters
 from cpfls_cli.flightlog.topics import REBUILT
 from cpfls_cli.look.columns import FRD, LookedLog, along_each
 from cpfls_cli.look.flight import Samples

@@ -147,8 +147,6 @@ class AxisPlant:
     effectiveness: Estimate | None = part(default=None)
     total_delay: Estimate | None = part(default=None)
     """Delay and lag of torque behind the command at that frequency, s."""
-    delay: Estimate | None = part(default=None)
-    lag: Estimate | None = part(default=None)
     least_squares: Estimate | None = part(default=None)
     bound: Estimate | None = part(default=None)
     frequency: np.ndarray = about("of the curves", "frequency", unit="Hz", brief=False)
@@ -470,7 +468,6 @@ def _of_spectra(axis: str, source: str, spectra: BlockSpectra, filters: Numbers)
         total_delay=total if verdict == "identified" else None,
         least_squares=_direct(equations),
         bound=None if verdict == "identified" else _bound(equations, fit.values),
-        **_apart(fit, verdict),
         draws=_drawn(fit, at_hz) if verdict == "identified" else np.zeros((0, 5)),
         **_curves(equations, fit),
     )
@@ -529,23 +526,6 @@ def _bound(equations: _Equations, values: Array) -> Estimate | None:
         highs.append(high)
     low, high = min(lows), max(highs)
     return Estimate(value=np.nan, low=low, high=high) if low > 0 or np.isfinite(high) else None
-
-
-def _apart(fit: Fit, verdict: str) -> dict[str, Any]:
-    """Give delay and lag apart where the log halves what was known of their shares before."""
-    half = fit.half(np.eye(len(fit.values))[2])
-    if verdict != "identified" or half > _LAG_SPREAD:
-        return {}
-    share = [1 / (1 + np.exp(-(fit.values[2] + side * half))) for side in (0.0, -1.0, 1.0)]
-    total = _DELAY_UNIT_S * fit.values[1]
-    spread = _DELAY_UNIT_S * fit.half(np.eye(len(fit.values))[1])
-
-    def of(value: float, low: float, high: float) -> Estimate:
-        # Ends of share and of the whole delay, taken as independent.
-        below, above = (np.hypot(total * (value - end), spread * value) for end in (low, high))
-        return Estimate(value=float(total * value), low=float(total * value - below), high=float(total * value + above))
-
-    return {"lag": of(*share), "delay": of(1 - share[0], 1 - share[2], 1 - share[1])}
 
 
 def _drawn(fit: Fit, at_hz: float) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array, Numbers
 from cpfls_cli.autopilots.law import AXES, Law
 from cpfls_cli.autopilots.parameters import Autopilot, Parameter
 from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.look.effectiveness import AxisPlant
 from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.law import flown_feedback
 from cpfls_cli.look.vibration import Change
@@ -19,7 +20,8 @@ from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.gains import USUAL_LEADS, AskedMargins, Tuned, floored, lateness, parameter_of, tuned
 from cpfls_cli.tuning.margins import axis_loops, crossing_margins, disk_of, frequencies, is_stable, moved_by
 from cpfls_cli.tuning.noise import Noise, noise_of
-from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
+from cpfls_cli.tuning.plant import AxisPlant as LinearPlant
+from cpfls_cli.tuning.plant import HoverPlant
 
 DRAWS = 40
 """Plants that are tuned one by one: the least and the largest of their gains are the ends of a 95 % interval."""
@@ -54,34 +56,6 @@ _STICK_MOVES = {"roll": (0.4, 0.5, 4.0), "pitch": (0.4, 0.5, 4.0), "yaw": (0.6, 
 _STICK_S = 20.0
 _LOWEST_NOISE_HZ = 40.0
 """Below, a spectrum holds more motion than noise; then noise is taken for white."""
-
-
-class Plant(Protocol):
-    """What a log shows of the vehicle about one axis."""
-
-    @property
-    def axis(self) -> str:
-        """Name of the axis."""
-
-    @property
-    def identified(self) -> bool:
-        """Whether its numbers are of the vehicle."""
-
-    @property
-    def reason(self) -> str:
-        """Why they are not."""
-
-    @property
-    def parameters(self) -> Array:
-        """Gain, rad/s^2 per full command; delay, lag, s; damping, 1/s; lead, s; shape (5,)."""
-
-    @property
-    def band_hz(self) -> Array:
-        """Lowest and highest frequency at which it is identified, shape (2,)."""
-
-    @property
-    def draws(self) -> Array:
-        """The same of plants that are possible, shape (draw, 5)."""
 
 
 @result
@@ -177,12 +151,12 @@ class LogGains(TunedGains):
     filters: tuple[Change, ...] = part(default=())
 
 
-def tuned_gains(flight: LogFlight, plants: Sequence[Plant], asked: AskedMargins | None = None) -> TunedGains:
+def tuned_gains(flight: LogFlight, plants: Sequence[AxisPlant], asked: AskedMargins | None = None) -> TunedGains:
     """Find the gains of all axes that a log identifies.
 
     Parameters
     ----------
-    plants : sequence of Plant
+    plants : sequence of AxisPlant
         About roll, pitch, yaw.
     """
     asked = AskedMargins() if asked is None else asked
@@ -239,7 +213,7 @@ class _Work:
 
     autopilot: Autopilot
     flight: LogFlight
-    plants: Sequence[Plant]
+    plants: Sequence[AxisPlant]
     asked: AskedMargins
     values: Mapping[str, float]
 
@@ -305,8 +279,8 @@ class _Work:
 
         def of(
             autopilot: Autopilot,
-            best: Sequence[AxisPlant],
-            drawn: Sequence[tuple[AxisPlant, ...]],
+            best: Sequence[LinearPlant],
+            drawn: Sequence[tuple[LinearPlant, ...]],
             leads: Mapping[int, tuple[float, ...]],
         ) -> Tuned:
             hover = HoverPlant((best[0], best[1], best[2]), _ANY_SHARE, _ANY_SHARE, drawn=tuple(drawn))
@@ -324,7 +298,7 @@ class _Work:
         single = [of(self.open, [each[draw % len(each)] for each in self.possible], [], leads) for draw in range(DRAWS)]
         return of(self.autopilot, self.best, hardest, leads), single
 
-    def _hardest(self, axis: int, values: Mapping[str, float]) -> tuple[AxisPlant, ...]:
+    def _hardest(self, axis: int, values: Mapping[str, float]) -> tuple[LinearPlant, ...]:
         """Take the hardest of the plants with which gains have to hold: of all but 5 %."""
         plants = self.possible[axis]
         order = np.argsort(self._held(axis, values), kind="stable")
@@ -493,15 +467,15 @@ def _estimate(drawn: Array) -> Estimate:
     return Estimate(value=float(drawn[0]), low=float(min(low, drawn[0])), high=float(max(high, drawn[0])))
 
 
-def _draws(plant: Plant) -> Array:
+def _draws(plant: AxisPlant) -> Array:
     """Give the numbers of the plant that was found, then of those that are possible; any where it is not identified."""
     return np.concatenate([plant.parameters[None], plant.draws]) if plant.identified else np.array([_ANY, _ANY])
 
 
-def _plant(numbers: Array, law: Law) -> AxisPlant:
+def _plant(numbers: Array, law: Law) -> LinearPlant:
     """Make a plant that a step of the law and its hold come on top of: logs have both in the delay."""
     gain, delay, lag, damping, lead = (float(each) for each in numbers)
-    return AxisPlant(gain, gain * lead, 0.0, 1.0, damping, lag, delay - 1.5 * law.period)
+    return LinearPlant(gain, gain * lead, 0.0, 1.0, damping, lag, delay - 1.5 * law.period)
 
 
 def _of_rates(autopilot: Autopilot, axes: Sequence[str]) -> Autopilot:

@@ -11,7 +11,7 @@ from cpfls_cli.estimation.spectra import transforms, window_starts
 from cpfls_cli.estimation.whittle import most_likely
 from cpfls_cli.look.effectiveness import PlantModel
 from cpfls_cli.look.flight import AXES, LogFlight
-from cpfls_cli.look.steady import FEWEST_WINDOWS, Known, jackknifed
+from cpfls_cli.look.steady import FEWEST_WINDOWS, jackknifed
 from cpfls_cli.result import Estimate, about, part, result
 
 _PIECE_S = 8.0
@@ -32,10 +32,6 @@ class AxisGusts:
     in_band: Estimate = part()
     size: Estimate | None = part(default=None)
     memory: Estimate | None = part(default=None)
-    unexplained: float = about("share of the angular acceleration in the band that commands do not explain")
-    frequency: Array = about("frequencies of the fit", "frequency", unit="Hz", brief=False)
-    power: Array = about("what commands do not explain", "frequency", unit="(rad/s^2)^2/Hz", brief=False)
-    model: Array = about("gusts and noise as fitted", "frequency", unit="(rad/s^2)^2/Hz", brief=False)
 
 
 def gusts_of(flight: LogFlight, plants: Mapping[str, PlantModel]) -> tuple[AxisGusts, ...]:
@@ -61,7 +57,12 @@ def _about(flight: LogFlight, axis: int, plant: PlantModel) -> AxisGusts | None:
     known = jackknifed(lambda kept: _fitted(frequency[band], power[kept].mean(axis=0)), len(power))
     if known is None:
         return None
-    return _described(AXES[axis], known, frequency[band], power.mean(axis=0), scale * np.abs(moved) ** 2)
+    size, memory, in_band = (
+        Estimate(value=float(np.exp(each.value)), low=float(np.exp(each.low)), high=float(np.exp(each.high)))
+        for each in (known.estimate(k) for k in (0, 1, 3))
+    )
+    inside = _SEEN_S[0] < memory.low and memory.high < _SEEN_S[1]
+    return AxisGusts(axis=AXES[axis], in_band=in_band, size=size if inside else None, memory=memory if inside else None)
 
 
 def _spectrum(frequency: Array, logs: Array) -> tuple[Array, Array]:
@@ -97,21 +98,3 @@ def _fitted(frequency: Array, power: Array) -> Array:
     # A sum over frequencies would begin below the band, where long gusts are largest.
     band = np.arctan(2 * np.pi * memory * np.array(_BAND_HZ))
     return np.array([*logs, np.log(size) + 0.5 * np.log(2 / np.pi * (band[1] - band[0]))])
-
-
-def _described(axis: str, known: Known, frequency: Array, power: Array, moved: Array) -> AxisGusts:
-    size, memory, in_band = (
-        Estimate(value=float(np.exp(each.value)), low=float(np.exp(each.low)), high=float(np.exp(each.high)))
-        for each in (known.estimate(k) for k in (0, 1, 3))
-    )
-    inside = _SEEN_S[0] < memory.low and memory.high < _SEEN_S[1]
-    return AxisGusts(
-        axis=axis,
-        in_band=in_band,
-        size=size if inside else None,
-        memory=memory if inside else None,
-        unexplained=float(power.sum() / moved.mean(axis=0).sum()),
-        frequency=frequency,
-        power=power,
-        model=_spectrum(frequency, known.value[:3])[0],
-    )

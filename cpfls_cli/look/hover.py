@@ -19,8 +19,8 @@ from cpfls_cli.look.steady import (
     windows_of,
 )
 from cpfls_cli.result import Estimate, about, part, result
+from cpfls_cli.units import STANDARD_GRAVITY
 
-GRAVITY = 9.80665
 _HOVERS, _CLIMBS = 0.05, 0.3
 """Most difference of the vertical specific force from gravity, share, and climb rate, m/s."""
 _THIN_AIR, _FOR_VOLTAGE = 0.8, "MOT_BAT_VOLT_MAX"
@@ -135,7 +135,7 @@ def _hovering(flight: LogFlight, stated: StatedCurve) -> tuple[str, Windows, Arr
         for each in (flight.collective, flight.climb_rate, -flight.specific_force[:, 2])
     )
     level = calm(flight, windows) & ~(np.abs(climb) > _CLIMBS) & np.isfinite(collective)
-    by_force = level & (np.abs(up / GRAVITY - 1) < _HOVERS)
+    by_force = level & (np.abs(up / STANDARD_GRAVITY - 1) < _HOVERS)
     by_climb = level & np.isfinite(climb) & np.isfinite(windows.means(on_clock(flight, flight.attitude))[:, 0])
     found_by, at = ("specific force", by_force) if np.isfinite(up).any() else ("climb rate", by_climb)
     thrust = stated.thrusts(collective)
@@ -161,7 +161,7 @@ def _shape(flight: LogFlight, stated: StatedCurve) -> ThrustShape | None:
     up = -windows.means(on_clock(flight, flight.specific_force))[:, 2]
     low, high = (0.0, 1.0) if stated.thrust else (stated.curve.low, stated.curve.high)
     share = (collective - low) / (high - low)
-    used = (share > 0.02) & (share < 0.99) & (up > _LEAST_FORCE * GRAVITY)
+    used = (share > 0.02) & (share < 0.99) & (up > _LEAST_FORCE * STANDARD_GRAVITY)
     if used.sum() < 2 or np.divide(*np.percentile(share[used], [95, 5])) < _SPREAD:
         return None
     share, up, collective = share[used], up[used], collective[used]

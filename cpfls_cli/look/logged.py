@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 
 from cpfls_cli.arrays import Array, runs
-from cpfls_cli.flightlog.layouts import stated_frame
 from cpfls_cli.flightlog.recognised import Recognition
-from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, stated_frame
 from cpfls_cli.flightlog.topics import logged_hz
 from cpfls_cli.look.columns import LookedLog
 from cpfls_cli.look.flight import LogFlight, Samples

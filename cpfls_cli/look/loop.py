@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,7 +38,7 @@ _AGREES = 0.05
 _HALF_POWER = 0.5**0.5
 _TINY = float(np.finfo(float).tiny)
 Z, X, Y = 0, 1, 2
-_OVER_FREQUENCY = ("gain", "phase", "gain_error", "coherence", "law_gain", "law_phase")
+_OVER_FREQUENCY = ("gain", "phase", "gain_error")
 _OVER_TIME = ("step", "step_low", "step_high", "law_step")
 
 
@@ -65,20 +64,14 @@ class AxisLoop:
     instrument: str = about("signal that moves the vehicle and knows nothing of gusts; empty where there is none")
     windows: int = about("windows of the response, overlapping by half")
     clear_hz: float = about("frequency up to which the response is measured", unit="Hz", gaps=True)
-    tracking: float = about("root mean square of rate setpoint less body rate, over that of the setpoint", gaps=True)
     bandwidth_hz: Estimate | None = part(default=None)
     by_step: StepNumbers | None = part(default=None)
     """Of the measured response, deconvolved."""
     law_explains: bool = about("whether the stated law with the plant steps as measured, over the measured band")
-    by_law: StepNumbers | None = part(default=None)
-    """Of plant and law, over all frequencies; None where they do not explain what was measured."""
     frequency: np.ndarray = about("of the response", "frequency", unit="Hz", brief=False)
     gain: np.ndarray = about("of body rate by setpoint", "frequency", gaps=True, brief=False)
     phase: np.ndarray = about("of it, unwrapped", "frequency", unit="rad", gaps=True, brief=False)
     gain_error: np.ndarray = about("standard error of its logarithm", "frequency", gaps=True, brief=False)
-    coherence: np.ndarray = about("the smaller of both", "frequency", gaps=True, brief=False)
-    law_gain: np.ndarray = about("of plant and law", "frequency", gaps=True, brief=False)
-    law_phase: np.ndarray = about("of plant and law", "frequency", unit="rad", gaps=True, brief=False)
     time: np.ndarray = about("of the step", "time", unit="s", brief=False)
     step: np.ndarray = about("body rate by a unit step of its setpoint", "time", gaps=True, brief=False)
     step_low: np.ndarray = about("lower end of its 95 % interval", "time", gaps=True, brief=False)
@@ -111,13 +104,11 @@ def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) 
         reason = _why_not(flight, usable & np.isfinite(values))
     every = _measured(found, time, length) if found else {}
     loop = PlantAndLaw.of(plant, law, axis) if found else None
-    power = float(np.mean(asked[usable] ** 2)) if usable.any() else 0.0
     return AxisLoop(
         axis=AXES[axis],
         measured=found is not None,
         reason="" if found else reason,
         instrument=source if found else "",
-        tracking=float(np.sqrt(np.mean((asked - rate)[usable] ** 2) / power)) if power > 0 else np.nan,
         **_whole({**_nothing(), **every, **(loop.fields(time, flight.rate_hz, length, every) if loop else {})}),
     )
 
@@ -151,7 +142,6 @@ class _Response(NamedTuple):
     """Spectra of instrument, setpoint and rate, and up to which frequency they are clear."""
 
     spectra: BlockSpectra
-    coherence: Array
     clear_hz: float
 
     def gains(self) -> Numbers:
@@ -189,7 +179,7 @@ def _response(
     unclear = np.flatnonzero((1 - seen) / (2 * seen * spectra.windows.sum() / SHARED_BINS) > CLEAR**2)
     unclear = unclear[unclear > 1]
     ends = float(spectra.frequency[unclear[0]] if len(unclear) else spectra.frequency[-1])
-    return _Response(spectra, coherence, ends) if ends >= _FADES / _WINDOW_S * 2 else None
+    return _Response(spectra, ends) if ends >= _FADES / _WINDOW_S * 2 else None
 
 
 def _stepped(gains: Numbers, frequency: Array, ends: float, length: int, samples: int) -> Array:
@@ -216,12 +206,11 @@ def _measured(found: _Response, time: Array, length: int) -> dict[str, Any]:
         "windows": int(found.spectra.windows.sum()),
         "clear_hz": found.clear_hz,
         "bandwidth_hz": bandwidth,
-        "by_step": _numbers(time, steps, _jackknifed, bandwidth is not None),
+        "by_step": _numbers(time, steps, bandwidth is not None),
         "frequency": frequency,
         "gain": np.abs(gains[0]),
         "phase": np.unwrap(np.angle(gains[0])),
         "gain_error": jackknife_error(magnitude[1:]),
-        "coherence": found.coherence,
         "time": time,
         "step": steps[0],
         "step_low": steps[0] - half,
@@ -241,14 +230,6 @@ def _jackknifed(values: Array) -> Estimate | None:
     return Estimate.around(values[0], float(half_width(jackknife_error(values[1:]), len(values) - 1)))
 
 
-def _drawn(values: Array) -> Estimate | None:
-    """Give a number from its value and draws; infinite ends where draws are."""
-    if not np.isfinite(values[0]):
-        return None
-    low, high = np.quantile(values[1:], [1 - _CERTAIN, _CERTAIN], method="nearest")
-    return Estimate(value=float(values[0]), low=float(min(low, values[0])), high=float(max(high, values[0])))
-
-
 def _bandwidth(frequency: Array, gain: Array, ends: float) -> float:
     """Give the frequency at which a response has half its power; NaN where that is not below an end."""
     below = np.flatnonzero((gain < _HALF_POWER) & (frequency > 0))
@@ -262,9 +243,7 @@ def _bandwidth(frequency: Array, gain: Array, ends: float) -> float:
     return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
 
 
-def _numbers(
-    time: Array, steps: Array, of: Callable[[Array], Estimate | None], whole: bool = True
-) -> StepNumbers | None:
+def _numbers(time: Array, steps: Array, whole: bool) -> StepNumbers | None:
     """Read overshoot, of whole responses, and times from steps, shape (1 + other, time)."""
     settled = steps[:, (time >= _SETTLES_S[0]) & (time <= _SETTLES_S[1])].mean(axis=1)
     level = np.where(settled > 0, settled, np.nan)
@@ -277,8 +256,8 @@ def _numbers(
         part_ = (share * level - before) / np.where(first > 0, steps[rows, first] - before, 1.0)
         return np.where(above.any(axis=1), (first - 1 + np.where(first > 0, part_, 1.0)) * (time[1] - time[0]), np.nan)
 
-    over = of(steps.max(axis=1) - 1.0) if whole else None
-    rise, half = of(reached(0.9) - reached(0.1)), of(reached(0.5))
+    over = _jackknifed(steps.max(axis=1) - 1.0) if whole else None
+    rise, half = _jackknifed(reached(0.9) - reached(0.1)), _jackknifed(reached(0.5))
     if rise is None or half is None:
         return None
     return StepNumbers(overshoot=over, rise_s=rise, half_s=half)
@@ -321,13 +300,4 @@ class PlantAndLaw(NamedTuple):
         room = np.hypot(0.5 * (measured["step_high"] - measured["step_low"]), 0.5 * (high - low))
         if (np.abs(banded[0] - measured["step"]) > room + _AGREES).any():
             return {}
-        shown = measured["frequency"]
-        own = np.concatenate([[1.0], self.closed(shown[1:])[0]])
-        steps = self.steps(time, rate_hz, length)
-        return {
-            "by_law": _numbers(time, steps, _drawn),
-            "law_explains": True,
-            "law_step": steps[0],
-            "law_gain": np.abs(own),
-            "law_phase": np.unwrap(np.angle(own)),
-        }
+        return {"law_explains": True, "law_step": self.steps(time, rate_hz, length)[0]}

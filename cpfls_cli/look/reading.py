@@ -22,13 +22,12 @@ from cpfls_cli.flightlog.conversion import (
     attitude_to_enu_flu,
 )
 from cpfls_cli.flightlog.crash import ALIVE
-from cpfls_cli.flightlog.layouts import Parameters
 from cpfls_cli.flightlog.proposal import KnownLog, airframe_of
 from cpfls_cli.flightlog.recognised import Guess, Recognition
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.repair import unwrap_angles
 from cpfls_cli.flightlog.settings import SignalName
-from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, forward_flight, log_faster
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, Parameters, forward_flight, log_faster
 from cpfls_cli.flightlog.topics import REBUILT, Topics, column_names
 from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
 from cpfls_cli.look.driving import Rotors, as_shares, find_driving

@@ -16,7 +16,6 @@ from cpfls_cli.look.flight import AXES, LogFlight, Samples
 from cpfls_cli.look.law import flown_law
 from cpfls_cli.look.steady import Windows, number, windows_of
 from cpfls_cli.result import Estimate, about, part, result
-from cpfls_cli.tuning.noise import Noise
 
 _WINDOW_S, _FEWEST, _LEAST_SAMPLES = 0.25, 12, 32
 _ABOVE_HZ, _SHOWS_HZ = 20.0, 50.0
@@ -80,7 +79,6 @@ class StatedFilter:
     hz: float = about("cut-off or centre", unit="Hz")
     width_hz: float = about("of a notch", unit="Hz")
     delay_ms: float = about("that it costs at 5 Hz", unit="ms")
-    line_hz: float = about("the strongest fixed line, for a notch", unit="Hz", gaps=True)
 
 
 @result
@@ -104,9 +102,6 @@ class Vibration:
         "of the autopilot for an unfiltered accelerometer: doubtful, bad", "level", unit="m/s^2"
     )
     folds: bool = about("whether what is above half the logged rate may be folded below")
-    jitter: tuple[float, ...] = about(
-        "command about roll, pitch, yaw that noise above 20 Hz makes, rms", "command_axis"
-    )
     filters: tuple[StatedFilter, ...] = part()
     delay_ms: float = about("of the static filters of the gyroscope together, at 5 Hz", unit="ms", gaps=True)
     changes: tuple[Change, ...] = part()
@@ -135,10 +130,7 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
     main = parts.get("gyroscope before filters") or parts.get("gyroscope")
     lines = tuple(_lines(flight, main)) if main else ()
     law = flown_law(flight)
-    noise = main.noise() if main and law else None
-    if noise and law and filtered and before is None:
-        noise = noise.before_filters(law)
-    filters = tuple(_filters(flight, autopilot, law, lines)) if autopilot and law else ()
+    filters = tuple(_filters(flight, autopilot, law)) if autopilot and law else ()
     level, hz, db = _map(flight, main) if main else (np.empty(0), np.empty(0), np.empty((0, 0)))
     highest = 0.5 * (before or after).rate_hz
     # What ArduPilot logs as IMU is behind its low-pass of 20 Hz.
@@ -149,7 +141,6 @@ def vibration_of(flight: LogFlight) -> Vibration | None:
         lines_lack="" if main else "rate" if highest < _SHOWS_HZ else "time",
         limit=() if smooth else LIMITS.get(flight.autopilot, ()),
         folds=highest < _FOLDS_HZ,
-        jitter=tuple(float(each) for each in noise.of_commands(law)) if noise and law else (),
         filters=filters,
         delay_ms=sum(each.delay_ms for each in filters if each.stage == "measured") if filters else np.nan,
         changes=() if highest < _FOLDS_HZ else tuple(_changes(flight, filters, lines)),
@@ -198,11 +189,6 @@ class _Power(NamedTuple):
             frequency=self.frequency,
             density=self.density.mean(axis=0),
         )
-
-    def noise(self) -> Noise:
-        """Give the spectrum of vibration."""
-        shown = self.frequency > _ABOVE_HZ - 0.5 * self.frequency[1]
-        return Noise(frequency=self.frequency[shown], density=self.density[:, shown].mean(axis=0))
 
     def _above(self) -> Array:
         """Compute the root mean square above 20 Hz in the windows, shape (channel,): of spectra, fast turns leak."""
@@ -366,10 +352,9 @@ class _Table:
         above[np.abs(np.arange(above.shape[1]) - place) <= reach] = 0.0
 
 
-def _filters(flight: LogFlight, autopilot: Autopilot, law: Law, lines: tuple[Line, ...]) -> Iterator[StatedFilter]:
+def _filters(flight: LogFlight, autopilot: Autopilot, law: Law) -> Iterator[StatedFilter]:
     """List the filters of the law, one of several axes once."""
     back = np.exp(-2j * np.pi * np.array([_DELAY_HZ]) * law.period)
-    fixed = [line.hz for line in lines if line.kind == "fixed"]
     stated = autopilot.of_log(autopilot.in_log(flight.parameters))
     seen: set[tuple[str, Filter]] = set()
     for parameter in autopilot.parameters:
@@ -388,7 +373,6 @@ def _filters(flight: LogFlight, autopilot: Autopilot, law: Law, lines: tuple[Lin
                     hz=each.hz,
                     width_hz=each.width_hz,
                     delay_ms=1e3 * phase / (2 * np.pi * _DELAY_HZ),
-                    line_hz=fixed[0] if fixed and each.kind == "notch" else np.nan,
                 )
 
 

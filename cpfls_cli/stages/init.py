@@ -21,11 +21,10 @@ from cpfls_cli.config.load import ASK, how_to_fill_in, parse_config, validate
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.errors import ConfigError, CpflsError, InputError, about
 from cpfls_cli.flightlog.airframe import Airframe, RotorPlace, usual_airframe
-from cpfls_cli.flightlog.layouts import USUAL
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal, known_log, propose
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
 from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
-from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, USUAL, log_faster
 from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.models import found_vehicle, is_found
 from cpfls_cli.flights.recordings import check_flight, read_import, seen_twice

@@ -46,15 +46,11 @@ class Noise:
         """Highest frequency that the flights show; what is above is folded below it, if the log has no filter."""
         return float(self.frequency[-1])
 
-    def of_commands(self, law: Law) -> Array:
-        """Compute how much it makes the commands about each axis jitter, root mean square, shape (3,).
+    def of_command(self, law: Law, axis: int) -> float:
+        """Compute how much it makes the command about an axis jitter, root mean square.
 
         In shares of the full command, from 10 Hz on and as far as the flights show, without the answer of the vehicle.
         """
-        return np.array([self.of_command(law, axis) for axis in range(3)])
-
-    def of_command(self, law: Law, axis: int) -> float:
-        """Compute the same about one axis."""
         shown = (self.frequency >= 10.0) & (self.frequency < 0.49 * law.rate_hz)
         gain = np.abs(law.response(axis, self.frequency[shown]).feedback)
         spacing = float(self.frequency[1] - self.frequency[0])

@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli.filters import recursion
 from cpfls_cli.look.flight import LogFlight, Samples
-from cpfls_cli.look.hover import GRAVITY
+from cpfls_cli.units import STANDARD_GRAVITY as GRAVITY
 
 CROSS = np.array([[1, 1], [-1, -1], [1, -1], [-1, 1]]) / np.sqrt(2)
 SPINS = np.array([1.0, 1.0, -1.0, -1.0])

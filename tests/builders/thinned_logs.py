@@ -80,18 +80,7 @@ def mixed_by_ardupilot(mix, thrust, turning, headroom=0.2, mean=0.175):
     return [min(max(more - low + scale * share, 0.0), 1.0) for share in shares]
 
 
-def mixed_by_betaflight(mix, thrust, turning, airmode=1):
-    """One sample as the legacy mixer of Betaflight mixes it, motor by motor."""
-    thrust = min(max(thrust, 0.0), 1.0)
-    shares = [sum(row[1 + axis] * turning[axis] for axis in range(3)) for row in mix]
-    most, least = max(0.0, *shares), min(0.0, *shares)
-    part = 1.0 if airmode or thrust >= 0.5 else 0.5 + thrust
-    scale = part / (most - least) if most - least > 1.0 else part
-    throttle = min(max(thrust, -least * scale), 1.0 - most * scale)
-    return [min(max(throttle + scale * share, 0.0), 1.0) for share in shares]
-
-
-MIXED = {"px4": mixed_by_px4, "ardupilot": mixed_by_ardupilot, "betaflight": mixed_by_betaflight}
+MIXED = {"px4": mixed_by_px4, "ardupilot": mixed_by_ardupilot}
 FRD = np.array([1.0, -1.0, -1.0])
 NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 CA = {"CA_ROTOR_COUNT": 4.0} | {
@@ -105,7 +94,6 @@ CA = {"CA_ROTOR_COUNT": 4.0} | {
 AP = {"MOT_THST_EXPO": 0.6, "MOT_SPIN_MIN": 0.12, "MOT_SPIN_MAX": 0.9}
 COPTER = AP | {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0, "MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0}
 COPTER |= {"MOT_YAW_HEADROOM": 200.0, "MOT_THST_HOVER": 0.35}
-BF = {"motorOutput": "48,2047", "pidsum_limit": 1000.0, "pidsum_limit_yaw": 1000.0}
 
 
 class Flown:
@@ -200,16 +188,6 @@ class Flown:
             "RCOU": {"timestamp": self.time[slow]}
             | {f"C{index + 1}": np.round(1000 + 1000 * own) for index, own in enumerate(sent.T)},
         }
-
-    def betaflight_columns(self):
-        """What Betaflight logs of its mixer, flat: P, I, D and F in whole numbers of a thousand."""
-        fast, idle = self.at(500.0), self.law.curve.low
-        sent = np.round(48 + 1999 * (self.command[fast] - idle) / (1 - idle))
-        sums = np.round(1000 * FRD * self.turning[fast])
-        columns = {"time": self.time[fast], "rcCommand[3]": 1000 + 1000 * self.thrust[fast]}
-        for axis in range(3):
-            columns |= {f"axisP[{axis}]": sums[:, axis] - 7, f"axisI[{axis}]": np.full(len(fast), 7.0)}
-        return columns | {f"motor[{index}]": own for index, own in enumerate(sent.T)}
 
 
 def topic(time, name, values):

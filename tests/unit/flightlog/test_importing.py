@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.importing import read_signals
+from cpfls_cli.flightlog.importing import apply_rotor_lag, read_signals
+from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
 RATE = {"body_rate": SignalMap(columns=("p", "q", "r"), unit="rad/s")}
@@ -280,3 +281,24 @@ def test_a_slow_column_in_a_fast_log_is_told_from_a_wrong_clock():
     columns["r"][np.arange(201) % 20 != 0] = np.nan
     with pytest.raises(InputError, match=r"a mapped column has a value only every 0\.2 s"):
         read_signals(columns, settings())
+
+
+TAU, PERIOD = 0.07, 0.004
+
+
+def stepped(command=True):
+    time = PERIOD * np.arange(200)
+    steps = np.where(time[:, None] < 0.2 - 1e-9, 0.5, 0.8) * np.ones(4)
+    return ImportedFlight(time=time, rotor_command=steps if command else None, setpoints={}, report=None)
+
+
+def test_rotors_follow_a_step_as_an_exponential():
+    speed = apply_rotor_lag(stepped(), TAU).rotor_command[:, 2]
+    after = stepped().time - 0.2
+    expected = np.where(after < 0, 0.5, 0.8 - 0.3 * np.exp(-np.maximum(after, 0) / TAU))
+    assert speed == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(("own", "lag"), [(stepped(), 0.0), (stepped(command=False), TAU)])
+def test_no_lag_of_rotors_or_no_command_changes_nothing(own, lag):
+    assert apply_rotor_lag(own, lag) is own

@@ -7,28 +7,23 @@ import numpy as np
 import pytest
 
 from cpfls_cli.flightlog.rebuilt import rebuilt_rotors
-from tests.builders.thinned_logs import AP, BF, CA, COPTER, Flown
+from tests.builders.thinned_logs import AP, CA, COPTER, Flown
 
 
 @cache
 def flown(autopilot, *, size=0.9):
     """Asked for so much that rotors reach both of their limits."""
-    values = {"ardupilot": AP, "betaflight": {"pid_process_denom": 16.0}}.get(autopilot)
-    return Flown(autopilot, values, seconds=6.0, size=size)
+    return Flown(autopilot, AP if autopilot == "ardupilot" else None, seconds=6.0, size=size)
 
 
 def rebuilt(autopilot, **rates):
     own = flown(autopilot)
     if autopilot == "px4":
         return rebuilt_rotors(own.px4_topics(**rates), CA, "PX4 1.15.0")
-    if autopilot == "ardupilot":
-        return rebuilt_rotors(own.ardupilot_topics(**rates), COPTER, "ArduCopter 4.5.1")
-    return rebuilt_rotors({"": own.betaflight_columns()}, BF, "Betaflight 4.5.1")
+    return rebuilt_rotors(own.ardupilot_topics(**rates), COPTER, "ArduCopter 4.5.1")
 
 
-@pytest.mark.parametrize(
-    ("autopilot", "rate_hz", "within"), [("px4", 50.0, 1e-6), ("ardupilot", 400.0, 2e-3), ("betaflight", 500.0, 2e-3)]
-)
+@pytest.mark.parametrize(("autopilot", "rate_hz", "within"), [("px4", 50.0, 1e-6), ("ardupilot", 400.0, 2e-3)])
 def test_thinned_motors_are_rebuilt_saturated_ones_too(autopilot, rate_hz, within):
     found, own = rebuilt(autopilot), flown(autopilot)
     assert found.refused == ""
@@ -38,11 +33,9 @@ def test_thinned_motors_are_rebuilt_saturated_ones_too(autopilot, rate_hz, withi
     assert abs(found.lag) < 1e-3
     assert found.scale == pytest.approx(1.0, abs=3e-3)
     assert found.error < within
-    assert 0.1 < found.limited.mean() < 0.9
-    truth = own.command if autopilot != "betaflight" else (own.command - 0.055) / 0.945
-    idle = truth.min() <= 0.12 + 1e-9
-    assert idle
-    expected = np.column_stack([np.interp(found.time, own.time, column) for column in truth.T])
+    least = 0.12 if autopilot == "ardupilot" else 0.0
+    assert 0.1 < (own.command.min(axis=1) <= least + 1e-9).mean() < 0.9
+    expected = np.column_stack([np.interp(found.time, own.time, column) for column in own.command.T])
     assert np.sqrt(((found.commands - expected) ** 2).mean()) < 3e-3
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import stated_airframe, usual_airframe
-from cpfls_cli.flightlog.layouts import LAYOUTS
 from cpfls_cli.flightlog.proposal import known_log, propose
 from cpfls_cli.flightlog.recognition import recognise
+from cpfls_cli.flightlog.stated_vehicle import LAYOUTS
 from tests.builders.topic_logs import ardupilot, maps, proposed, topic
 from tests.builders.unknown_logs import FLIP, flat_log, flight, named, quaternion, with_ground
 

@@ -46,15 +46,15 @@ def test_a_single_rotor_is_one_cause_of_several():
     assert rotor.size.low < (1 / 0.75 - 1) / mean < rotor.size.high
 
 
-def test_a_centre_of_mass_is_found_in_mm():
-    """Rotors of an X at 0.2 m that hold a mass 10 mm ahead of the middle: sum of place times thrust."""
+def test_a_centre_of_mass_is_found():
+    """Rotors of an X that hold a mass 5 % of the arm ahead of the middle: sum of place times thrust."""
     ahead = 0.05 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0]
-    balance = balance_of(hovering(1 + ahead, gusts=0.005, **CURVE), arm_m=0.2)
+    balance = balance_of(hovering(1 + ahead, gusts=0.005, **CURVE))
     (cause,) = (cause for cause in balance.causes if cause.kind == "centre of mass")
     assert cause.alone
-    assert cause.unit == "mm"
-    assert cause.forward.value == pytest.approx(10, abs=0.5)
-    assert cause.right.value == pytest.approx(0, abs=0.5)
+    assert cause.unit == "share of the arm"
+    assert cause.forward.value == pytest.approx(0.05, abs=0.0025)
+    assert cause.right.value == pytest.approx(0, abs=0.0025)
     assert kinds(balance) == {("centre of mass", 0), ("wind", 0)}
 
 
@@ -109,28 +109,22 @@ def test_unknown_thrust_curves_widen_the_centre_of_mass():
     assert cause.forward.high == pytest.approx(0.1, abs=0.006)
 
 
-def test_squared_speeds_share_thrust_and_show_the_motor():
+def test_squared_speeds_share_thrust():
     """Equal speeds at a command a tenth larger: the motor of rotor 1, not its load."""
     flight = hovering(EVEN, gusts=0.001, weak={0: 1 / 1.1}, **CURVE)
     speed = Samples(flight.time, np.full_like(flight.rotors.values, 500.0))
     balance = balance_of(replace(flight, rotor_speed=speed))
     assert balance.measured_by == "rotor speed"
     assert shares(balance) == pytest.approx(1, abs=1e-9)
-    truth = np.sqrt([1 / 1.1, 1, 1, 1])
-    ratio = [rotor.speed_per_command.value for rotor in balance.rotors]
-    assert ratio == pytest.approx(truth / truth.mean(), abs=2e-3)
 
 
-def test_limits_are_counted_and_kept_out():
+def test_limits_are_kept_out():
     flight = hovering(EVEN, gusts=0.001, **CURVE)
     command = flight.rotors.values.copy()
     command[100:120, 1] = 1.0
     command[200:210, 1] = 1.0
     command[300:304, 3] = 0.0
     balance = balance_of(replace(flight, rotors=flight.rotors._replace(values=command)))
-    assert balance.rotors[1].at_upper == pytest.approx(30 / len(command))
-    assert balance.rotors[1].longest_upper_s == pytest.approx(1.0)
-    assert balance.rotors[3].longest_lower_s == pytest.approx(0.2)
     assert shares(balance) == pytest.approx(1, abs=0.003)
 
 
@@ -142,10 +136,3 @@ def test_what_is_lacking_is_named():
     assert balance_of(replace(flight, places=None)).lacks == "places"
     assert balance_of(replace(flight, spins=None)).yaw is None
     assert balance_of(replace(flight, rotors=Samples(np.empty(0), np.empty((0, 0))))) is None
-
-
-def test_a_slope_along_the_flight_is_drift():
-    flight = hovering(EVEN, gusts=0.001, **CURVE)
-    grown = flight.rotors.values * (1 + np.outer(np.linspace(0, 0.08, len(flight.time)), [1, -1, 0, 0]))
-    balance = balance_of(replace(flight, rotors=flight.rotors._replace(values=grown)))
-    assert balance.rotors[0].drift.value == pytest.approx(0.08, rel=0.1)

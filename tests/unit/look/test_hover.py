@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.look.flight import Samples
-from cpfls_cli.look.hover import GRAVITY, hover_of
+from cpfls_cli.look.hover import hover_of
+from cpfls_cli.units import STANDARD_GRAVITY as GRAVITY
 from tests.builders.look_flights import correlated, still_flight
 
 RATE = 20.0

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.flight import Samples
 from cpfls_cli.look.vibration import vibration_of
 from tests.builders.look_flights import correlated, still_flight
@@ -113,16 +112,6 @@ def test_filters_are_listed_with_what_they_cost():
     part = 5 / 120
     assert notch.delay_ms == pytest.approx(np.arctan(20 / 120 * part / (1 - part**2)) / (2 * np.pi * 5) * 1e3, rel=0.1)
     assert vibration.delay_ms == pytest.approx(low.delay_ms + notch.delay_ms)
-
-
-def test_jitter_is_what_the_law_makes_of_the_noise():
-    """White noise through P and D of the law behind their filters, summed over frequency."""
-    flight, _ = shaking(size=0.0, autopilot="px4", parameters=PX4)
-    law = AUTOPILOTS["px4"].law(AUTOPILOTS["px4"].of_log(PX4))
-    frequency = np.arange(20.0, 392.0, 0.5)
-    gain = np.abs(law.response(0, frequency).feedback)
-    expected = 0.1 * np.sqrt(np.sum(gain**2) * 0.5 / 500)
-    assert vibration_of(flight).jitter[0] == pytest.approx(expected, rel=0.03)
 
 
 def test_a_notch_beside_the_fixed_line_is_moved_to_it():

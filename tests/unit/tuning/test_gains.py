@@ -79,8 +79,8 @@ def test_a_line_in_the_noise_is_found_beside_its_floor():
     assert line.above_db > 10.0
     spacing = noise.frequency[1] - noise.frequency[0]
     assert np.sqrt(noise.density.sum(axis=0) * spacing) == pytest.approx(rate.std(axis=0), rel=0.05)
-    quiet, loud = (noise.of_commands(AUTOPILOTS["px4"].law({"MC_ROLLRATE_K": k})) for k in (1.0, 2.0))
-    assert loud[0] == pytest.approx(2 * quiet[0])
+    quiet, loud = (noise.of_command(AUTOPILOTS["px4"].law({"MC_ROLLRATE_K": k}), 0) for k in (1.0, 2.0))
+    assert loud == pytest.approx(2 * quiet)
     assert noise_of([(time[:20], rate[:20])]) is None
 
 
