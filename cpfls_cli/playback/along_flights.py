@@ -156,16 +156,22 @@ def playback(
 
 
 def _worst(played: Sequence[Played], windows: ReplayWindows, starts: Array, horizon: int) -> Iterator[WorstRun]:
-    for at in windows.worst(horizon, _WORST):
-        own = played[windows.flight[at]]
-        run = drawn_runs(own, windows.start[[at]], horizon)
+    chosen = windows.worst(horizon, _WORST)
+    ran: dict[int, tuple[Array, Array]] = {}
+    # Those of a flight are played back side by side, which takes no longer than one.
+    for flight in {int(windows.flight[at]) for at in chosen}:
+        own = sorted(at for at in chosen if windows.flight[at] == flight)
+        runs = drawn_runs(played[flight], windows.start[own], horizon)
+        ran |= zip(own, zip(runs.measured, runs.model, strict=True), strict=True)
+    for at in chosen:
+        measured, model = ran[at]
         yield WorstRun(
-            flight=own.flight.name,
+            flight=played[windows.flight[at]].flight.name,
             start_s=float(starts[at]),
             error_rad_s=float(windows.of_model[at]),
             nothing_moves_rad_s=float(windows.size[PREDICTIONS.index(NOTHING_MOVES), at]),
-            measured=run.measured[0],
-            model=run.model[0],
+            measured=measured,
+            model=model,
         )
 
 

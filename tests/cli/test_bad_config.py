@@ -71,11 +71,6 @@ def test_one_wrong_value(wrong, content, message):
     assert wrong(content, whole=True) == [message]
 
 
-def test_negative_inertia_names_its_key(wrong):
-    (line,) = wrong("vehicle: {inertia_kg_m2: [-0.6, 0.6, 1.2]}", whole=True)
-    assert line == "FILE: vehicle.inertia_kg_m2.0 = -0.6: must be greater than 0"
-
-
 def test_a_key_gives_a_terminal_no_orders(wrong):
     (line,) = wrong('"\\e[31mred\\e[0m": 1', whole=True)
     assert line.startswith("FILE: \\x1b[31mred\\x1b[0m = 1: unknown key")

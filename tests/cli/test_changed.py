@@ -122,21 +122,20 @@ def test_what_the_comparison_lacks_is_said(changed, folder, tmp_path):
     slow = save(tmp_path / "slow.csv", flight_table(31, rate_hz=50.0), HEADER)
     speeds = save(tmp_path / "speeds.csv", flight_table(32), HEADER.replace("c1,c2,c3,c4,volts", "om1,om2,om3,om4,no"))
     short = save(tmp_path / "short.csv", flight_table(33, duration=2.0), HEADER)
-    notes = changed(slow, short, options=["-v"]).stderr
+    dead = save(tmp_path / "dead.csv", flight_table(34), HEADER.replace("volts", "no"))
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes((folder / "same.csv").read_bytes())
+    notes = changed(slow, short, dead, "same.csv", copy, options=["-v"]).stderr
     assert "without attitude: all flights; how any flight is flown is not known" in notes
     assert "another sampling rate than the usual one of the reference, 100 Hz: slow.csv (50 Hz)" in notes
     assert "note: left out: short.csv: flies for " in notes
     assert "not compared, for not all flights have it: vibration gyroscope x" in notes
+    assert "without the battery's voltage: dead.csv; an emptier battery looks like a heavier vehicle" in notes
+    assert "copy.csv: is given twice, also as same.csv; counted once" in notes
     # A flight that is not compared is said first, not behind "more notes".
     assert "note: left out: short.csv: flies for only 2 s" in changed(slow, short).stderr.splitlines()[0]
     notes = changed(speeds, options=["-v"]).stderr
     assert "speeds of rotors in speeds.csv, commands in before1.csv, " in notes
-    dead = save(tmp_path / "dead.csv", flight_table(34), HEADER.replace("volts", "no"))
-    without = "without the battery's voltage: dead.csv; an emptier battery looks like a heavier vehicle"
-    assert without in changed(dead, options=["-v"]).stderr
-    copy = tmp_path / "copy.csv"
-    copy.write_bytes((folder / "same.csv").read_bytes())
-    assert "copy.csv: is given twice, also as same.csv; counted once" in changed("same.csv", copy).stderr
 
 
 def test_what_a_user_gets_wrong_is_refused(cpfls, refuse, folder, tmp_path):

@@ -31,15 +31,6 @@ def test_readme_begins_with_it():
     assert page.index(sheet("    ")) < page.index("## Install")
 
 
-def test_each_workflow_is_two_to_four_commands():
-    assert [title for title, _ in WORKFLOWS if title.startswith("I want")] == [
-        "I want gains",
-        "I want to plan a flight",
-        "I want the paper",
-    ]
-    assert all(2 <= len(commands) <= 4 for _, commands in WORKFLOWS)
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_each_command_is_taken_as_it_stands(command):
     program, name, *words = shlex.split(command)

@@ -22,12 +22,6 @@ def test_shipped_configs_load_and_print_the_same_study(cpfls, configs, tmp_path)
         assert load_study(path) == load_study(config), config
 
 
-def test_resolving_twice_changes_nothing(cpfls, configs, tmp_path):
-    path = tmp_path / "resolved.yaml"
-    path.write_text(cpfls("config", configs[0]).stdout)
-    assert cpfls("config", path).stdout == path.read_text()
-
-
 def test_any_yaml_reader_reads_it_as_the_json_says(cpfls, configs):
     for config in configs:
         as_json = cpfls.told("config", config)

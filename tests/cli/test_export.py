@@ -7,11 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
-import cpfls_cli
 from cpfls_cli.validation.verdict import Reason, Verdict
 from tests.builders.artifacts import edited, with_fields
 from tests.builders.exported_vehicles import on_numpy
@@ -70,17 +68,6 @@ def test_the_model_of_a_study_is_exported(cpfls, pipeline, tmp_path, form):
     if form == "c":
         done = compile_and_test(output, tmp_path)
         assert done.returncode == 0, done.stdout
-
-
-def test_exported_torque_is_that_of_predict(cpfls, pipeline, tmp_path):
-    assert cpfls("export", pipeline.model, "--format", "jax", "-o", tmp_path / "quad.py").exit_code == 0
-    names = on_numpy((tmp_path / "quad.py").read_text())
-    prediction = cpfls_cli.load_model(pipeline.model).predict(pipeline.flight)
-    with h5py.File(pipeline.flight) as flight:
-        motion = [flight[name][::10] for name in ("attitude", "attitude_rate", "attitude_acceleration")]
-        torque, body = np.array([names["torque"](*row) for row in zip(*motion, strict=True)]).swapaxes(0, 1)
-        assert np.max(np.abs(torque - prediction.torque[::10])) < 1e-12 * np.max(np.abs(torque))
-        assert np.max(np.abs(body - prediction.body_torque[::10])) < 1e-12 * np.max(np.abs(body))
 
 
 @pytest.mark.parametrize("form", ENDINGS)
@@ -198,14 +185,6 @@ def test_output_rules(cpfls, refuse, model, tmp_path):
     assert line.endswith("C includes its header by name; use letters, digits and any of _ . + - in it")
 
 
-def test_dry_run_writes_nothing(cpfls, pipeline, tmp_path):
-    output = tmp_path / "m.c"
-    result = cpfls("export", pipeline.model, "--format", "c", "-o", output, "--dry-run")
-    assert result.exit_code == 0
-    assert result.stdout.startswith(f"{tmp_path / 'm.h'}: would be written")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_names(cpfls, refuse, pipeline, tmp_path):
     words = ("export", pipeline.model, "--format", "c", "-o", tmp_path / "2-m.c")
     assert cpfls(*words).exit_code == 0
@@ -214,11 +193,6 @@ def test_names(cpfls, refuse, pipeline, tmp_path):
     assert "#define QUAD_7_OUTSIDE 1u" in (tmp_path / "2-m.h").read_text()
     (line,) = refuse(*words, "--force", "--name", "x; int y")
     assert line == "--name x; int y: not an identifier; use letters, digits and underscores, a letter first"
-
-
-def test_an_empty_name_is_shown(refuse, pipeline, tmp_path):
-    (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.c", "--name", "")
-    assert line == "--name '': not an identifier; use letters, digits and underscores, a letter first"
 
 
 def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):
@@ -311,13 +285,6 @@ def test_formats_are_named(cpfls, pipeline, tmp_path):
     result = cpfls("export", pipeline.model, "--format", "sdff", "-o", tmp_path / "m.sdf")
     assert result.stderr.splitlines()[-1].startswith("Error: Invalid value for '--format': 'sdff' is not one of 'json'")
     assert result.stderr.endswith("'csv' (did you mean 'sdf'?)\n")
-
-
-def test_verbose_says_what_is_read_and_written(cpfls, pipeline, tmp_path):
-    result = cpfls("export", pipeline.model, "--format", "json", "-o", tmp_path / "m.json", "-v")
-    said = [line for line in result.stderr.splitlines() if line.startswith("export: ")]
-    assert said[0].startswith(f"export: reads {pipeline.model}")
-    assert said[-1].startswith(f"export: wrote {tmp_path / 'm.json'}")
 
 
 PAGE = Path(__file__).parents[2] / "docs" / "export.md"

@@ -83,9 +83,3 @@ def test_wrong_usage(cpfls, words, message):
     assert result.exit_code == 2
     assert result.stdout == ""
     assert message in result.stderr
-
-
-def test_help_of_a_search_names_what_it_leaves(cpfls):
-    said = " ".join(cpfls("identify", "--help").stdout.split())
-    assert "a search that was stopped, from OUTPUT.checkpoint" in said
-    assert "from one or more flights" in said

@@ -1,7 +1,5 @@
 """A body that cannot be: struck through where it is shown, in no export unless it is asked for, and then first."""
 
-import json
-
 import pytest
 
 from tests.builders.autopilots import STUDY, crossed, found_vehicle
@@ -50,5 +48,6 @@ def test_who_asks_for_it_reads_it_first(cpfls, folder, tmp_path, output):
     assert f"IMPOSSIBLE NUMBERS, which no such vehicle has: {HEAVY}." in result.stdout
     written = (tmp_path / output).read_text()
     assert written.index("IMPOSSIBLE NUMBERS") < written.index("Vehicle: 1.2 kg")
-    told = cpfls("export", folder / "vehicle.h5", "-o", tmp_path / output, *form, "--anyway", "--force", "--json")
-    assert json.loads(told.stdout)["impossible"] == HEAVY
+    if output == "v.c":
+        told = cpfls.told("export", folder / "vehicle.h5", "-o", tmp_path / output, "--anyway", "--force")
+        assert told["impossible"] == HEAVY

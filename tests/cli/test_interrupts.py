@@ -100,8 +100,10 @@ def test_signal_while_a_model_is_judged(pipeline, study, tmp_path, tmp_path_fact
     assert sorted(path.name for path in tmp_path.iterdir()) == [*found, "model.h5.checkpoint"]
 
 
-@pytest.mark.parametrize("swallow", [False, True])
-@pytest.mark.parametrize("module", ["typer", "pydantic", "numpy", "h5py", "scipy.linalg"])
+@pytest.mark.parametrize(
+    ("module", "swallow"),
+    [("typer", False), ("pydantic", True), ("numpy", True), ("h5py", False), ("scipy.linalg", True)],
+)
 def test_interrupt_while_loading(pipeline, study, tmp_path, module, swallow):
     words = ["cpfls", "identify", str(study), str(pipeline.flight), "-o", str(tmp_path / "model.h5")]
     code = INTERRUPTED_IMPORT.format(module=module, swallow=swallow, words=words)

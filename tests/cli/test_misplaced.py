@@ -70,11 +70,6 @@ def test_a_name_with_spaces_can_be_pasted(refuse, log, tmp_path):
     assert line.endswith(f": cpfls import CONFIG '{spaced}' -o 'my log.h5'")
 
 
-def test_a_config_where_an_artifact_belongs(refuse, study):
-    (line,) = refuse("info", study)
-    assert line == f"{study}: is a config, and this takes what cpfls made; `cpfls config {study}` shows it"
-
-
 def test_what_needs_no_import_is_told_so(refuse, pipeline, study, log_study, tmp_path):
     (line,) = refuse("import", log_study, pipeline.flight, "-o", tmp_path / "out.h5")
     assert line == (

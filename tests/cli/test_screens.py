@@ -148,14 +148,14 @@ def _of_open_numbers(show, folder):
         rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
     config.write_text(yaml.safe_dump(data))
     show("open: trajectory", "trajectory", "open.yaml", output="open-path.h5")
-    for name, taken in (("guessed", ("--accept-guesses",)), ("found", ("--model", "own/vehicle.h5"))):
-        own = f"{name}-"
-        show(f"{name}: trajectory", "trajectory", "open.yaml", *taken, output=f"{own}path.h5")
-        show(f"{name}: simulate", "simulate", "open.yaml", "open-path.h5", *taken, *COARSE, output=f"{own}flight.h5")
-        show(f"{name}: compare", "compare", "open.yaml", "flight_1.csv", *taken, output=f"{own}compared.h5")
-        show(f"{name}: response", "response", "open.yaml", "flight_1.csv", *taken, output=f"{own}response.h5")
-        show(f"{name}: diagnose", "diagnose", "open.yaml", f"{own}compared.h5", *taken, output=f"{own}named.h5")
-        show(f"{name}: gap", "gap", "open.yaml", "flight_1.csv", *taken, output=f"{own}gap")
+    guesses, model = ("--accept-guesses",), ("--model", "own/vehicle.h5")
+    show("guessed: trajectory", "trajectory", "open.yaml", *guesses, output="guessed-path.h5")
+    show("guessed: simulate", "simulate", "open.yaml", "open-path.h5", *guesses, *COARSE, output="guessed-flight.h5")
+    show("guessed: compare", "compare", "open.yaml", "flight_1.csv", *guesses, output="guessed-compared.h5")
+    show("guessed: gap", "gap", "open.yaml", "flight_1.csv", *guesses, output="guessed-gap")
+    show("found: compare", "compare", "open.yaml", "flight_1.csv", *model, output="found-compared.h5")
+    show("found: response", "response", "open.yaml", "flight_1.csv", *model, output="found-response.h5")
+    show("found: diagnose", "diagnose", "open.yaml", "found-compared.h5", *model, output="found-named.h5")
     show("wide: compare", "compare", "open.yaml", "flight_1.csv", "--model", "own/wide.h5", output="wide-compared.h5")
 
 
@@ -170,13 +170,8 @@ NAMES = (
 OF_MODELS = ("replay", "report", "export", "spread")
 """Of these the words are held beside their flights."""
 OF_OPEN_NUMBERS = (
-    "open: trajectory",
-    *(
-        f"{how}: {command}"
-        for how in ("guessed", "found")
-        for command in ("trajectory", "simulate", "compare", "response", "diagnose", "gap")
-    ),
-    "wide: compare",
+    *("open: trajectory", "guessed: trajectory", "guessed: simulate", "guessed: compare", "guessed: gap"),
+    *("found: compare", "found: response", "found: diagnose", "wide: compare"),
 )
 
 

@@ -59,27 +59,6 @@ def test_held_out_part_and_other_flights_are_judged_by_name(cpfls, pipeline, stu
     assert {"mse", "relative_error", "baselines"} <= set(held_out["held-out rest"])
 
 
-def test_warnings_never_reach_standard_output(cpfls, pipeline, study, tmp_path):
-    # A few samples, evenly spread, stay below full rank, which is worth a warning.
-    few = ("--set", "reduction.criterion=even", "--set", "reduction.size=40")
-    words = ("reduce", study, pipeline.flight, *few, "--json")
-    result = cpfls.done(*words, "-o", tmp_path / "s.h5")
-    assert json.loads(result.stdout)["stalled"] is True
-    assert result.stderr.startswith("cpfls: note: ")
-
-
-def test_people_get_lines_and_no_json(cpfls, study, tmp_path):
-    result = cpfls("trajectory", study, "-o", tmp_path / "t.h5")
-    assert "549 samples over 54.86 s" in result.stdout
-    assert "{" not in result.stdout
-
-
-def test_verbose_reports_progress_on_standard_error_only(cpfls, pipeline, study, tmp_path):
-    result = cpfls("identify", study, pipeline.flight, "-o", tmp_path / "m.h5", "-v", "--json")
-    assert json.loads(result.stdout)
-    assert "identify: 100%  generation 1 of 1  best error" in result.stderr
-
-
 def test_an_import_tells_in_json_and_in_lines_what_it_read_and_what_it_did_about_it(cpfls, tmp_path):
     time = np.delete(np.arange(0.0, 4.0, 0.02), [50, 51, 52])
     angles = [0.2 * np.sin((2 + axis) * time) for axis in range(3)]

@@ -250,14 +250,6 @@ def test_streams_that_the_caller_closed(study, tmp_path):
     assert output.read_bytes().startswith(b"\x89HDF")
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no device that is full")
-def test_help_into_a_device_that_is_full():
-    with open("/dev/full", "w") as full:
-        words = [sys.executable, "-m", "cpfls_cli", "gap", "--help"]
-        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
-    assert (done.returncode, done.stderr) == (1, "cpfls: error: output: No space left on device\n")
-
-
 @pytest.mark.parametrize("order", ["\u202e", "\u2066", "\u200b", "\x1b[2J", "\u00ad"])
 def test_what_turns_or_hides_text_in_a_name_reaches_no_terminal_and_no_page(order):
     block = Text(f"gyro_x{order} is no column")

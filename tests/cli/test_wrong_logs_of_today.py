@@ -102,19 +102,34 @@ def test_a_log_with_other_columns_is_said_in_a_line_and_compared_without_them_if
     assert changed(cpfls, logs, "other.csv", "--anyway").exit_code == 0
 
 
-def test_logs_of_different_vehicles_are_refused_before_their_columns(cpfls, tmp_path):
-    for seed in (1, 2, 3, 4):
-        (tmp_path / f"before{seed}.ulg").write_bytes(ulog_of_flight(flight(seed=seed), MOT_POLE_COUNT=14))
+@pytest.fixture(scope="module")
+def stated(tmp_path_factory, cpfls):
+    """Reference flights whose logs state numbers of their vehicle, and the config of `init`."""
+    folder = tmp_path_factory.mktemp("stated")
+    for seed, more in ((1, {}), (2, {}), (3, {}), (4, {"PWM_MIN": 1000})):
+        (folder / f"before{seed}.ulg").write_bytes(ulog_of_flight(flight(seed=seed), MOT_POLE_COUNT=14, **more))
+    logs = [folder / f"before{seed}.ulg" for seed in (4, 1, 2, 3)]
+    cpfls.done("init", *logs, "-o", folder / "study.yaml", "--mass", MASS)
+    return folder
+
+
+def test_logs_of_different_vehicles_are_refused_before_their_columns(cpfls, stated):
     other = ulog_of_flight(TODAY, without="vehicle_local_position", MOT_POLE_COUNT=12)
-    (tmp_path / "other.ulg").write_bytes(other)
-    (tmp_path / "scaled.ulg").write_bytes(ulog_of_flight(TODAY, MOT_POLE_COUNT=14, PWM_MIN=1100))
-    (tmp_path / "before4.ulg").write_bytes(ulog_of_flight(flight(seed=4), MOT_POLE_COUNT=14, PWM_MIN=1000))
-    logs = [tmp_path / f"before{seed}.ulg" for seed in (4, 1, 2, 3)]
-    cpfls.done("init", *logs, "-o", tmp_path / "study.yaml", "--mass", MASS)
-    assert "of different vehicles (MOT_POLE_COUNT 14 and 12)" in changed(cpfls, tmp_path, "other.ulg").stderr
-    words = ("changed", tmp_path / "study.yaml", tmp_path / "scaled.ulg", "--since", *logs, "-o", tmp_path / "out")
-    result = cpfls(*words, "--force")
-    said = " ".join(result.stdout.split())
+    (stated / "lacks.ulg").write_bytes(other)
+    (stated / "scaled.ulg").write_bytes(ulog_of_flight(TODAY, MOT_POLE_COUNT=14, PWM_MIN=1100))
+    assert "of different vehicles (MOT_POLE_COUNT 14 and 12)" in changed(cpfls, stated, "lacks.ulg").stderr
+    since = [stated / f"before{seed}.ulg" for seed in (4, 1, 2, 3)]
+    words = (
+        "changed",
+        stated / "study.yaml",
+        stated / "scaled.ulg",
+        "--since",
+        *since,
+        "-o",
+        stated / "out",
+        "--force",
+    )
+    said = " ".join(cpfls(*words).stdout.split())
     assert not said.startswith("NO CHANGE:")
     assert (
         "The logs of before4.ulg and scaled.ulg state PWM_MIN 1000 and 1100: make sure that it is one vehicle." in said
@@ -122,25 +137,21 @@ def test_logs_of_different_vehicles_are_refused_before_their_columns(cpfls, tmp_
     assert "Commands of scaled.ulg are shares of another range" in said
 
 
-def test_logs_of_different_vehicles_are_refused_unless_asked(cpfls, tmp_path):
-    for seed in (1, 2, 3, 4):
-        (tmp_path / f"before{seed}.ulg").write_bytes(ulog_of_flight(flight(seed=seed)))
-    (tmp_path / "other.ulg").write_bytes(ulog_of_flight(TODAY, SYS_AUTOSTART=4601))
-    logs = [tmp_path / f"before{seed}.ulg" for seed in (1, 2, 3, 4)]
-    cpfls.done("init", *logs, "-o", tmp_path / "study.yaml", "--mass", MASS)
+def test_logs_of_different_vehicles_are_refused_unless_asked(cpfls, stated):
+    (stated / "other.ulg").write_bytes(ulog_of_flight(TODAY, SYS_AUTOSTART=4601, MOT_POLE_COUNT=14))
+    logs = [stated / f"before{seed}.ulg" for seed in (1, 2, 3, 4)]
     said = "before1.ulg and other.ulg are of different vehicles (SYS_AUTOSTART 4001 and 4601)"
-    refused = changed(cpfls, tmp_path, "other.ulg")
+    refused = changed(cpfls, stated, "other.ulg")
     assert refused.exit_code == 2
     assert f"{said}: compare flights of one vehicle, or give --anyway" in refused.stderr
-    words = ("trend", tmp_path / "study.yaml", *logs, tmp_path / "other.ulg", "-o", tmp_path / "trend")
+    words = ("trend", stated / "study.yaml", *logs, stated / "other.ulg", "-o", stated / "trend")
     assert said in cpfls(*words).stderr
-    asked = changed(cpfls, tmp_path, "other.ulg", "--anyway")
+    asked = changed(cpfls, stated, "other.ulg", "--anyway")
     assert asked.exit_code in (0, 1, 3)
     assert f"{said}, and are compared anyway" in " ".join(asked.stderr.split())
     # What `import` makes of a log keeps what it says of its vehicle.
-    flown = tmp_path / "other.h5"
-    cpfls.done("import", tmp_path / "study.yaml", tmp_path / "other.ulg", "-o", flown)
-    assert "are of different vehicles" in changed(cpfls, tmp_path, "other.h5").stderr
+    cpfls.done("import", stated / "study.yaml", stated / "other.ulg", "-o", stated / "other.h5")
+    assert "are of different vehicles" in changed(cpfls, stated, "other.h5").stderr
 
 
 def test_without_attitude_gravity_tells_the_unit_of_the_accelerometer(cpfls, by_torque):

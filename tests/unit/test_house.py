@@ -81,16 +81,6 @@ def repeats_signature(entry, section):
     return len(entry) == 1 and not re.search(r"[,\[\]()<>]", re.sub(r", optional$", "", kind))
 
 
-def test_first_lines_are_one_sentence():
-    wrong = []
-    for path in MODULES:
-        for name, node in documented(path):
-            first = (ast.get_docstring(node) or "").splitlines()[:1]
-            if not first or not first[0].rstrip().endswith((".", "``")):
-                wrong.append(f"{path.relative_to(PACKAGE)}: {name}")
-    assert wrong == []
-
-
 def test_docstrings_do_not_repeat_signatures():
     """A section stands where at least one of its entries adds shape, unit, frame, range or meaning."""
     bare, unknown = [], []

@@ -1,7 +1,6 @@
 """`cpfls export` of a model with effects, and the vehicle that stands in it."""
 
 import json
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +13,7 @@ from cpfls_cli.gap.before_after import LeftOut
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.store import read
-from tests.builders.artifacts import edited, with_fields
+from tests.builders.artifacts import with_fields
 from tests.builders.exported_vehicles import on_numpy
 
 
@@ -71,18 +70,6 @@ def test_an_identified_inertia_under_effects(cpfls, extended, pipeline, tmp_path
     document = json.loads((tmp_path / "over.json").read_text())
     assert document["inertia_kg_m2"] is None
     assert document["structure"] is not None
-
-
-@pytest.mark.parametrize(("name", "command"), [("extended", "extend"), ("vehicle", "vehicle"), ("model", "identify")])
-def test_one_of_before_is_refused(refuse, extended, tmp_path, name, command):
-    old = tmp_path / "old.h5"
-    shutil.copy(extended, old)
-    with edited(old) as file:
-        file.attrs["format"] = f"cpfls/{name}"
-        file.attrs["schema_version"] = 1
-        file.attrs.pop("kind", None)
-    (line,) = refuse("export", old, "-o", tmp_path / "m.c")
-    assert line.endswith(f"whose files this version does not read; make it again with `cpfls {command}`")
 
 
 def test_an_identified_model_holds_the_stated_vehicle(pipeline):

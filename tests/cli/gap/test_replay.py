@@ -235,11 +235,6 @@ def test_a_report_of_it_alone_has_a_title_of_its_own(cpfls, gap_config, of_vehic
     assert page.read_text().startswith("# What a model predicts of flights\n")
 
 
-def test_a_single_horizon(replayed, with_attitude):
-    answer, _ = replayed("vehicle", with_attitude[0], options=("--horizon", "0.01", "--every", "50"))
-    assert len(answer["horizon_s"]) == 1
-
-
 @pytest.fixture
 def refused(refuse, gap_config, tmp_path):
     def call(model, *flights, options=()):

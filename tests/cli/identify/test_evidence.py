@@ -103,16 +103,6 @@ def test_without_evidence_a_model_and_its_prediction_are_the_same_but_for_it(
         assert cpfls_cli.load_model(model).predict(pipeline.flight).inertia_band is None
 
 
-def test_equal_seeds_draw_equal_evidence_and_others_do_not(validated, cpfls, study, pipeline, tmp_path):
-    again, other = tmp_path / "again.h5", tmp_path / "other.h5"
-    words = ("identify", study, pipeline.flight, "--set", "identification.training_share=0.6", "-o")
-    cpfls.done(*words, again)
-    assert again.read_bytes() == validated[0].read_bytes()
-    cpfls.done(*words, other, "--seed", 2)
-    with h5py.File(other) as theirs, h5py.File(again) as ours:
-        assert not np.array_equal(theirs["uncertainty/best_rigid_body"][()], ours["uncertainty/best_rigid_body"][()])
-
-
 def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
     validated, cpfls, study, pipeline, tmp_path, monkeypatch
 ):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli import load_model
+from cpfls_cli.arguments import seconds
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.search.resumable import Watch
 from cpfls_cli.store import read
 
 NOTE = "cpfls: note: "
@@ -60,10 +60,12 @@ def test_interrupted_again_and_again_it_evaluates_nothing_twice(cpfls, words, wh
     output, option, runs = tmp_path / "model.h5", (), []
     while not runs or runs[-1].exit_code == 130:
         # The first runs do not even finish the initial population.
-        interrupt_at(5)
+        interrupt_at(12)
         runs.append(cpfls(*words, "-o", output, *option))
         option = ("--resume",)
-        assert stored(output, "history/evaluations")[-1] == min(5 * len(runs), stored(whole, "history/evaluations")[-1])
+        assert stored(output, "history/evaluations")[-1] == min(
+            12 * len(runs), stored(whole, "history/evaluations")[-1]
+        )
     assert runs[-1].exit_code == 0
     assert output.read_bytes() == whole.read_bytes()
     assert names(tmp_path) == ["model.h5"]
@@ -142,18 +144,8 @@ def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_p
 @pytest.mark.parametrize(
     ("text", "limit"), [("90", 90.0), ("90s", 90.0), ("1.5m", 90.0), ("2h", 7200.0), ("1e3", 1000.0)]
 )
-def test_time_limit_in_several_units(cpfls, words, tmp_path, monkeypatch, text, limit):
-    seen = []
-
-    class Seeing(Watch):
-        def __init__(self, job, time_limit_s):
-            seen.append(time_limit_s)
-            super().__init__(job, time_limit_s)
-
-    monkeypatch.setattr("cpfls_cli.stages.identify.Watch", Seeing)
-    quick = ("--set", "identification.membership_functions=1", "--set", "identification.validation.enabled=false")
-    cpfls.done(*words, "-o", tmp_path / "model.h5", *quick, "--time-limit", text)
-    assert seen == [limit]
+def test_time_limit_in_several_units(text, limit):
+    assert seconds(text) == limit
 
 
 @pytest.mark.parametrize("text", ["0", "-3s", "soon", "", "10 days", "nan", "inf", "h"])

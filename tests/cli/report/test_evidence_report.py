@@ -67,10 +67,6 @@ def page(report, model):
         return report(model())
 
 
-def test_the_made_evidence_keeps_to_its_description(model):
-    assert read(model(), IdentifiedModel)[0].verdict.reasons[0].text == REASONS[0]
-
-
 def test_all_evidence_is_shown(page):
     assert [name for name in EVIDENCE if name in section(page, "identify")] == EVIDENCE
     assert [name for name in page.figures if name in FIGURES] == FIGURES

@@ -33,8 +33,12 @@ def search(folder, output, seeds=2):
     return read(output, Sweep)[0]
 
 
-def test_a_run_is_that_of_reduce_and_identify(cpfls, folder, tmp_path):
-    found = search(folder, tmp_path / "s.h5")
+@pytest.fixture(scope="module")
+def found(folder):
+    return search(folder, folder / "whole.h5")
+
+
+def test_a_run_is_that_of_reduce_and_identify(cpfls, folder, found, tmp_path):
     assert found.complete
     assert [setting.runs for setting in found.settings] == [2] * 10
     setting = next(own for own in found.settings if own.name == "cpFLS, 30 samples by sigma_min, judged on learned")
@@ -47,22 +51,21 @@ def test_a_run_is_that_of_reduce_and_identify(cpfls, folder, tmp_path):
     assert alone["errors"]["mse"] == pytest.approx(run.mse[0], rel=1e-9)
 
 
-def test_stopped_it_goes_on_to_the_same_end(folder, tmp_path, monkeypatch):
-    whole = search(folder, tmp_path / "whole.h5")
+def test_stopped_it_goes_on_to_the_same_end(folder, found, tmp_path, monkeypatch):
     stops = iter([None] * 40 + ["time-limit"] * 99)
     with monkeypatch.context() as patch:
         patch.setattr(Watch, "should_stop", lambda _: next(stops))
         with pytest.raises(SystemExit):
             search(folder, tmp_path / "s.h5")
     partial = tmp_path / "s.h5.partial"
-    finished = read(partial, Sweep)[0].runs
-    assert 0 < finished < 20
+    kept = read(partial, Sweep)[0].runs
+    assert 0 < kept < 20
     assert not (tmp_path / "s.h5").exists()
     ran = []
     monkeypatch.setattr(searches, "run", lambda *given, own=searches.run: ran.append(given[2]) or own(*given))
     again = search(folder, tmp_path / "s.h5")
-    assert len(ran) == 20 - finished
+    assert len(ran) == 20 - kept
     assert not partial.exists()
-    for one, two in zip(whole.settings, again.settings, strict=True):
+    for one, two in zip(found.settings, again.settings, strict=True):
         assert [run.chromosome for run in one.replicates] == [run.chromosome for run in two.replicates]
         np.testing.assert_array_equal(one.errors, two.errors)

@@ -45,15 +45,6 @@ def test_a_held_vehicle_has_no_position(cpfls, tmp_path, study):
     cpfls.done("report", study(), tmp_path / "t.h5", "-o", tmp_path / "r.html")
 
 
-def test_another_seed_turns_otherwise(cpfls, tmp_path, study):
-    paths = []
-    for seed in (1, 2):
-        cpfls.done("trajectory", study(seed=seed), "-o", tmp_path / f"{seed}.h5")
-        with h5py.File(tmp_path / f"{seed}.h5") as file:
-            paths.append(file["attitude"][:])
-    assert np.abs(paths[0] - paths[1]).max() > 1
-
-
 def test_optimised_says_what_the_path_is_worth(cpfls, tmp_path, study):
     told = cpfls.told("trajectory", study("optimised"), "-o", tmp_path / "t.h5")
     assert told["condition_number"] <= told["random"]["best"] <= told["random"]["median"]

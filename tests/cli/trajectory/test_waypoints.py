@@ -95,15 +95,6 @@ def test_each_axis_goes_where_it_is_to_go_forwards_or_backwards(cpfls, tmp_path,
     assert (steps <= np.array([4, 3, 2]) * 0.05 * (1 + 1e-9)).all()
 
 
-def test_each_axis_takes_the_time_of_the_slowest(cpfls, tmp_path, config, points):
-    asked = ("--set", "trajectory.coordination=each-axis", "--set", "trajectory.displacement_measure=per-axis")
-    cpfls.done("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *asked)
-    with h5py.File(tmp_path / "t.h5") as file:
-        velocity = np.abs(file["velocity"][:])
-        np.testing.assert_allclose(file["position"][-1], [11, 12, 8], atol=1e-12)
-    assert velocity.max() <= 4 * (1 + 1e-12)
-
-
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -207,14 +198,6 @@ def test_a_move_too_short_to_be_looked_at_is_refused(refuse, tmp_path, config):
     short = ("--set", "trajectory.period_s=1e-5", "--set", "trajectory.displacement_m=1e-12")
     (message,) = refuse("trajectory", config, "-o", tmp_path / "t.h5", *short)
     assert "trajectory.sample_time_s = 0.05: moves have parts of 1e-05 s" in message
-
-
-def test_waypoints_that_numbers_cannot_hold_are_refused(refuse, tmp_path, config):
-    points = "[{position_m: [0, 0, 0]}, {position_m: [1e300, 0, 0]}]"
-    asked = ("--set", "trajectory.path=waypoints", "--set", f"trajectory.waypoints={points}")
-    (message,) = refuse("trajectory", config, "-o", tmp_path / "t.h5", *asked)
-    assert "trajectory.period_s" in message
-    assert "too large to compute with" in message
 
 
 def test_a_file_replaces_a_path_that_could_not_be_planned(cpfls, tmp_path, config, points):

@@ -28,7 +28,7 @@ def origins(draw):
 
 
 @pytest.mark.parametrize("stage", formats(), ids=lambda stage: stage.name)
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2, deadline=None)
 @given(st.integers(0, 2**32 - 1), origins())
 def test_round_trip(stage, seed, origin):
     kind, origin = stage.kind, store.Origin(stage=stage.name, **origin)

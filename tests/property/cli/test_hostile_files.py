@@ -8,8 +8,8 @@ from tests.builders.command_line import drawn
 from tests.builders.hostile_files import DAMAGED, KINDS, Good, tried
 
 # `make fuzz` tries ten thousand of each, with all figures drawn.
-EXAMPLES = {"YAML": 30, "HDF5 structure": 20, "HDF5 bytes": 25, "CSV": 40, "Parquet": 40, "ULog": 40}
-EXAMPLES |= {"names": 30, "rotors": 20, "ULog nested": 30, "bombs": 5, **dict.fromkeys(DAMAGED, 25)}
+EXAMPLES = {"YAML": 20, "HDF5 structure": 12, "HDF5 bytes": 15, "CSV": 25, "Parquet": 25, "ULog": 25}
+EXAMPLES |= {"names": 20, "rotors": 12, "ULog nested": 20, "bombs": 5, **dict.fromkeys(DAMAGED, 12)}
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ import pytest
 
 from cpfls_cli.artifacts.output import (
     EnduringFile,
-    atomic_path,
     check_folder,
     check_output,
     filled_folder,
@@ -17,14 +16,6 @@ from cpfls_cli.artifacts.output import (
     write_files,
 )
 from cpfls_cli.errors import OutputError
-
-
-def test_temporary_name_is_hidden_and_in_the_same_folder(tmp_path):
-    with atomic_path(tmp_path / "s.h5") as temporary:
-        assert temporary.parent == tmp_path
-        assert temporary.name.startswith(".s.h5.")
-        assert list(tmp_path.iterdir()) == [temporary]
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_only_what_was_half_written_of_an_output_is_tidied(tmp_path):
@@ -66,16 +57,6 @@ def test_an_interrupt_leaves_everything_in_a_folder_as_it_was(tmp_path, error):
     with pytest.raises(type(error)):
         fill(folder, error)
     assert {path.name: path.read_text() for path in folder.iterdir()} == {"a.txt": "old", "b.txt": "old"}
-    assert list(tmp_path.iterdir()) == [folder]
-
-
-def test_files_in_a_folder_of_an_earlier_run_go(tmp_path):
-    folder = tmp_path / "out"
-    folder.mkdir()
-    (folder / "b.txt").write_text("old")
-    (folder / "mine.txt").write_text("mine")
-    fill(folder)
-    assert {path.name: path.read_text() for path in folder.iterdir()} == {"a.txt": "new", "mine.txt": "mine"}
     assert list(tmp_path.iterdir()) == [folder]
 
 

@@ -13,7 +13,7 @@ from cpfls_cli.config.load import validate
 from cpfls_cli.config.study import resolved
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.evolution.settings import EvolutionSettings
-from cpfls_cli.identification.settings import PRESETS, IdentificationSettings
+from cpfls_cli.identification.settings import PRESETS
 
 METHOD = Path(__file__).parents[3] / "docs/method.md"
 ROW = re.compile(r"^\| `(\w+)` \| (\S+) \| (\S+) \|$", re.MULTILINE)
@@ -75,10 +75,6 @@ def test_the_other_values_would_be_noticed():
         assert value not in (yaml.safe_load(text) for text in PAGE[key].values())
 
 
-def test_without_a_preset_keys_have_their_defaults():
-    assert identification() == identification(preset="fast") == IdentificationSettings()
-
-
 def test_a_resolved_preset_reads_back_the_same():
     study = validate({"identification": {"preset": "paper", "population": 20}}, "study.yaml")
     assert validate(resolved(study), "study.yaml") == study
@@ -93,9 +89,3 @@ def test_the_paper_names_every_key_of_the_search():
 def test_an_unknown_preset_is_refused(preset):
     with pytest.raises(ConfigError, match=r"preset.*'fast' or 'paper'"):
         identification(preset=preset)
-
-
-@pytest.mark.parametrize("section", [[], "fast"])
-def test_a_section_that_is_no_mapping_is_told_as_before(section):
-    with pytest.raises(ConfigError, match="must be a section of keys"):
-        validate({"identification": section}, "study.yaml")

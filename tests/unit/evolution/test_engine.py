@@ -64,11 +64,14 @@ def run(evaluate, seed=1, settings=SETTINGS, gene_count=6, **options):
 
 
 @pytest.mark.parametrize(
-    "operators",
-    [PAPER, replace(PAPER, reinsertion="fitness"), EvolutionSettings()],
+    ("operators", "ranking"),
+    [
+        (PAPER, "quantity-dominance"),
+        (replace(PAPER, reinsertion="fitness"), "pareto-count"),
+        (EvolutionSettings(), "pareto-fronts"),
+    ],
     ids=["uniform", "fitness", "default"],
 )
-@pytest.mark.parametrize("ranking", ["quantity-dominance", "pareto-count", "pareto-fronts"])
 @pytest.mark.parametrize(("problem", "reference"), [(zdt1, (1.1, 6.0)), (dtlz2, (2.0, 2.0))])
 def test_evolution_beats_random_search_at_equal_evaluations(problem, reference, ranking, operators):
     settings = replace(operators, population=60, generations=30, ranking=ranking)

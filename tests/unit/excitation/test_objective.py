@@ -6,10 +6,8 @@ from cpfls_cli.excitation.objective import (
     conditioning,
     conditioning_gradient,
     design,
-    motion_gradient,
     path_of,
     penalty_gradient,
-    regressor_gradient,
     regressor_of,
     variables_of,
 )
@@ -95,58 +93,9 @@ def test_smoothed_value_falls_to_the_logarithm_of_the_condition_number():
     assert values[-1] >= exact
 
 
-def test_exponent_one_is_the_product_of_traces():
-    G = gram()
-    expected = 0.5 * np.log(np.trace(G) * np.trace(np.linalg.inv(G)))
-    assert conditioning(G, 1.0).smoothed == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("exponent", [1.0, 4.0])
-def test_slope_is_that_of_differences(exponent):
-    G, step = gram(), 1e-6
-    change = gram(seed=1)
-    values = [conditioning(G + sign * step * change, exponent).smoothed for sign in (1, -1)]
-    slope = np.sum(conditioning(G, exponent).slope * change)
-    assert slope == pytest.approx((values[0] - values[1]) / (2 * step), rel=1e-6)
-
-
 def test_a_path_without_pitch_excites_no_rule_of_pitch():
     sine, cosine = np.random.default_rng(0).standard_normal((2, 3, 4))
     sine[1] = cosine[1] = 0.0
     structure = model_structure(StructureSettings())
     path = RotationPath(np.zeros(3), np.array([1, 0, 1]), sine, cosine, 20.0)
     assert condition_number(path, structure, 400) > 1e14
-
-
-SEESAW = StructureSettings(consequents="seesaw", products="additive", membership_functions=5)
-
-
-@pytest.mark.parametrize("settings", [StructureSettings(), SEESAW], ids=["harmonic", "seesaw"])
-def test_slopes_by_rate_and_acceleration_are_those_of_differences(settings):
-    structure = model_structure(settings)
-    rng = np.random.default_rng(0)
-    motion, weights = rng.uniform(-3, 3, (3, 40, 3)), rng.standard_normal((40, 3, structure.parameters))
-    found = regressor_gradient(structure, motion, weights)
-    # Q is quadratic in the rates and linear in the accelerations, so that a step of one is exact.
-    expected = motion_gradient(lambda moved: regressor_of(structure, moved), motion, weights, 1.0)
-    np.testing.assert_allclose(found[1:], expected[1:], rtol=1e-9, atol=1e-9)
-    assert np.abs(expected[1:]).min(axis=(1, 2)).max() > 0
-
-
-def test_slopes_by_attitude_are_those_of_the_smooth_model():
-    structure = model_structure(StructureSettings(harmonic_order=1))
-    rng = np.random.default_rng(1)
-    motion, weights = rng.uniform(-3, 3, (3, 40, 3)), rng.standard_normal((40, 3, structure.parameters))
-    found = regressor_gradient(structure, motion, weights)[0]
-    expected = motion_gradient(lambda moved: regressor_of(structure, moved), motion, weights, 1e-5)[0]
-    np.testing.assert_allclose(found, expected, atol=0.01 * np.abs(expected).max())
-    np.testing.assert_allclose(found[:, 2], 0.0, atol=1e-12)
-
-
-def test_differences_of_what_is_quadratic_are_exact():
-    motion = np.random.default_rng(2).uniform(-1, 1, (3, 10, 3))
-    weights = np.random.default_rng(3).uniform(-1, 1, (10, 3))
-    found = motion_gradient(lambda moved: moved[1] * moved[2] ** 2, motion, weights, 0.5)
-    np.testing.assert_allclose(found[0], 0.0)
-    np.testing.assert_allclose(found[1], weights * motion[2] ** 2, atol=1e-14)
-    np.testing.assert_allclose(found[2], 2 * weights * motion[1] * motion[2], atol=1e-14)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.fuzzy.basis import antecedent, basis, feature_count, features
+from cpfls_cli.fuzzy.basis import antecedent, basis, features
 from cpfls_cli.fuzzy.inputs import input_range, map_input
 from cpfls_cli.fuzzy.membership import breakpoints
 
@@ -53,11 +53,3 @@ def test_gradient_is_the_derivative_of_the_value(kind, functions):
         )
         # The slope of a membership has corners, where a central difference is off by half a step times the jump.
         np.testing.assert_allclose(evaluated.gradient[place], (ahead - behind) / (2 * step), atol=1e-4)
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: "-".join(map(str, kind)))
-def test_feature_count_is_the_number_of_columns(kind):
-    angles = angles_away_from_kinks(2)
-    one_rule = [breakpoints(np.empty(0))] * 2
-    assert evaluate(angles, one_rule, *kind).value.shape[1] == feature_count(2, *kind[2:])
-    assert evaluate(angles[:1], one_rule[:1], *kind).value.shape[1] == feature_count(1, *kind[2:])

@@ -66,22 +66,6 @@ def test_curve_is_that_of_a_refit_per_block_and_weight(fuzzy, samples, folds, em
     np.testing.assert_allclose(curve.standard_error, errors.std(axis=1, ddof=1) / np.sqrt(folds), rtol=1e-5)
 
 
-def test_a_selection_is_judged_by_all_samples():
-    rows, right_side, time = problem()
-    learned = np.arange(0, 60, 3)
-    blocks = contiguous_blocks(time, time[learned], 4, 0.02)
-    curve = cross_validated((rows[learned], right_side[learned]), (rows, right_side), blocks)
-    errors = []
-    for validation, left_out in zip(blocks.validation, blocks.left_out, strict=True):
-        kept = learned[~left_out]
-        assert not set(kept) & set(np.flatnonzero(validation))
-        A, y = rows[kept].reshape(-1, rows.shape[2]), right_side[kept].ravel()
-        penalty = np.sqrt(WEIGHTS[2] * len(y)) * np.eye(A.shape[1])[RIGID:]
-        c = np.linalg.lstsq(np.vstack([A, penalty]), np.concatenate([y, np.zeros(len(penalty))]), rcond=None)[0]
-        errors.append(np.mean((right_side[validation] - rows[validation] @ c) ** 2))
-    assert curve.error[2] == pytest.approx(np.mean(errors), rel=1e-6)
-
-
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.05, 0.3])
 def test_chosen_weight_is_the_largest_within_one_standard_error(share):
     rows, right_side, time = problem(share=share)

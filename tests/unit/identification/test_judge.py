@@ -35,17 +35,6 @@ def test_variance_accounted_for_forgives_a_constant():
     np.testing.assert_allclose(judged.r2, [1 - 50 / 8, 1 - 147 / 38, np.nan])
 
 
-def test_variances_are_the_same_chunk_by_chunk(monkeypatch):
-    rng = np.random.default_rng(9)
-    torque, error = rng.standard_normal((2, 50, 3)) + 5.0
-    data = still_flight(torque)
-    monkeypatch.setattr("cpfls_cli.identification.data.CHUNK", 7)
-    predicted = [(torque - error)[start : start + 7] for start in range(0, 50, 7)]
-    judged = score_of(data, lambda motion: predicted.pop(0)[: len(motion)])
-    np.testing.assert_allclose(judged.vaf, 1 - error.var(axis=0) / torque.var(axis=0))
-    np.testing.assert_allclose(judged.r2, 1 - np.mean(error**2, axis=0) / torque.var(axis=0))
-
-
 def test_body_axes():
     """At 90 degrees of roll the Euler pitch torque is the body's negative yaw torque."""
     torque = [[1, 2, 5], [2, -3, 4], [4, 9, 1]]
@@ -134,3 +123,14 @@ def test_rows_are_weighted_by_axis():
     columns = constant_inertia_columns(motion())
     expected = np.linalg.lstsq((columns * scale[:, :, None]).reshape(-1, 6), (torque * scale).ravel(), rcond=None)[0]
     np.testing.assert_allclose(fitted(torque)["constant-inertia"].parameters, expected, atol=1e-12)
+
+
+def test_variances_are_the_same_chunk_by_chunk(monkeypatch):
+    rng = np.random.default_rng(9)
+    torque, error = rng.standard_normal((2, 50, 3)) + 5.0
+    data = still_flight(torque)
+    monkeypatch.setattr("cpfls_cli.identification.data.CHUNK", 7)
+    predicted = [(torque - error)[start : start + 7] for start in range(0, 50, 7)]
+    judged = score_of(data, lambda motion: predicted.pop(0)[: len(motion)])
+    np.testing.assert_allclose(judged.vaf, 1 - error.var(axis=0) / torque.var(axis=0))
+    np.testing.assert_allclose(judged.r2, 1 - np.mean(error**2, axis=0) / torque.var(axis=0))

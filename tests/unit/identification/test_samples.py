@@ -22,7 +22,6 @@ from cpfls_cli.regressor.motion import RIGID, Motion
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders.flights import no_torque, random_flight
-from tests.builders.torque_sensitivity import torque_sensitivity
 
 SETTINGS = IdentificationSettings(consequents="seesaw", products="additive", membership_functions=(1, 2, 3, 4, 3, 2))
 STRUCTURE = model_structure(SETTINGS)
@@ -75,14 +74,12 @@ def case(request, monkeypatch):
     partitions = decode(structure, weights)
     assert zero_width == any(np.any(np.diff(part) == 0) for part in partitions)
     samples = replace(Samples.of(Ready(source, rigid), structure, ranges), scale=SCALE, label=label, labels=LABELS)
-    regressor = Regressor(structure, motion, ranges)
     columns = [rigid_columns(motion)] if rigid else []
-    A = np.concatenate([*columns, regressor.matrix(partitions)], axis=2) * SCALE[:, None]
+    A = np.concatenate([*columns, Regressor(structure, motion, ranges).matrix(partitions)], axis=2) * SCALE[:, None]
     parameters = rng.standard_normal(A.shape[2])
     return SimpleNamespace(
         samples=samples,
         partitions=partitions,
-        regressor=regressor,
         label=label,
         rows=A,
         torque=source.torque * SCALE,
@@ -124,18 +121,6 @@ def test_projected(case, count):
     A, y = case.rows.reshape(-1, len(case.parameters)), case.torque.ravel()
     assert_close(square, (A @ directions).T @ (A @ directions))
     assert_close(back, A.T @ (y - A @ case.parameters))
-
-
-def test_moved(case):
-    found = case.samples.moved(case.partitions, case.coefficients, case.rigid_body)
-    moved = np.concatenate(torque_sensitivity(case.regressor, case.partitions, case.coefficients), axis=2)
-    M = (moved * SCALE[:, None]).reshape(case.torque.size, -1)
-    A = case.rows.reshape(-1, len(case.parameters))
-    residual = case.torque.ravel() - A @ case.parameters
-    assert_close(found.columns, A.T @ M)
-    assert_close(found.moved, M.T @ M)
-    assert_close(found.residual, M.T @ residual)
-    assert found.square == pytest.approx(residual @ residual)
 
 
 def test_neighbours_that_fire_other_rules_are_told_apart():

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.errors import SettingError
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.identification.identify import identify
-from cpfls_cli.identification.search import NothingFoundError, SearchRun, choose, search
+from cpfls_cli.identification.search import SearchRun, choose, search
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.regressor.structure import model_structure
 from tests.builders.flights import random_flight, rigid_torque
@@ -114,41 +114,6 @@ def test_stopped_between_generations_it_counts_no_further_one():
     assert found.stop_reason == "time-limit"
     assert [state.index for state in kept] == [0, 1, 2]
     np.testing.assert_array_equal(found.history.evaluations, kept[-1].history.evaluations)
-
-
-def test_asked_to_stop_at_the_end_it_is_complete():
-    whole, kept = states()
-    late = searched(should_stop=stop_after(Bowls(), 0), resumed=kept[-1])
-    assert late.stop_reason == "generations"
-    assert_same(late, whole)
-
-
-def test_search_that_stalls_ends_converged():
-    settings = IdentificationSettings(**{**vars(SETTINGS), "generations": 50, "stall_generations": 1})
-    found = searched(settings=settings)
-    assert found.stop_reason == "converged"
-    assert len(found.history) < 51
-
-
-@pytest.mark.parametrize(("stop", "reason"), [(lambda: None, "generations"), (lambda: "time-limit", "time-limit")])
-def test_search_without_a_finite_model_tells_why_it_ended(stop, reason):
-    with pytest.raises(NothingFoundError, match="no chromosome gave a finite model") as error:
-        searched(Bowls(finite=False), should_stop=stop)
-    assert error.value.stop_reason == reason
-
-
-def test_failing_worker_leaves_the_generations_before():
-    kept, evaluator = [], Bowls()
-
-    def fail_later(genes):
-        if len(evaluator.evaluated) > 30:
-            raise ComputationError("the worker is gone")
-        return evaluator(genes)
-
-    fail_later.structure = evaluator.structure
-    with pytest.raises(ComputationError, match="the worker is gone"):
-        searched(fail_later, on_generation=lambda state: kept.append(copy.deepcopy(state)))
-    assert_same(searched(resumed=kept[-1]), searched())
 
 
 def test_progress_goes_on_where_it_was():

@@ -108,34 +108,11 @@ def test_several_flights_give_the_model_of_their_concatenation(base):
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_many_chunks_give_the_model_of_one(monkeypatch, base):
-    whole = identified(streamed_flight(), base, streamed_flight(50, 44))
-    monkeypatch.setattr(data, "CHUNK", 37)
-    assert_same_model(whole, identified(streamed_flight(), base, streamed_flight(50, 44)))
-
-
-@pytest.mark.parametrize("base", BASES)
 def test_samples_too_many_to_keep_give_the_very_same(monkeypatch, base):
     monkeypatch.setattr(data, "CHUNK", 64)
     kept = evaluated(streamed_flight(), base)
     monkeypatch.setattr(samples, "_KEPT", 0)
     np.testing.assert_array_equal(evaluated(streamed_flight(), base), kept)
-
-
-@pytest.mark.parametrize("chunk", CHUNKS)
-def test_scores_do_not_depend_on_chunks(monkeypatch, chunk):
-    source = streamed_flight()
-
-    def predict(motion):
-        return rigid_columns(motion) @ np.array([0.6, 0.9, 1.1, 0.0, 0.05, 0.0])
-
-    whole = score_of(source, predict)
-    error = source.torque - predict(source.motion)
-    np.testing.assert_allclose(whole.mse, np.mean(error**2, axis=0), rtol=1e-12)
-    np.testing.assert_allclose(whole.r2, 1 - np.mean(error**2, axis=0) / np.var(source.torque, axis=0), rtol=1e-12)
-    monkeypatch.setattr(data, "CHUNK", chunk)
-    for key, values in vars(score_of(source, predict)).items():
-        np.testing.assert_allclose(values, getattr(whole, key), rtol=1e-11)
 
 
 def test_score_of_torque_far_from_zero_keeps_its_digits(monkeypatch):
@@ -147,14 +124,6 @@ def test_score_of_torque_far_from_zero_keeps_its_digits(monkeypatch):
     error = moved.torque - 1e7
     expected = 1 - np.sum(error**2, axis=0) / np.sum((moved.torque - np.mean(moved.torque, axis=0)) ** 2, axis=0)
     np.testing.assert_allclose(found.r2, expected, atol=1e-7)
-
-
-@pytest.mark.parametrize("chunk", CHUNKS)
-def test_evidence_on_axes_does_not_depend_on_chunks(monkeypatch, chunk):
-    whole = axis_evidence(streamed_flight(), 1e-10)
-    monkeypatch.setattr(data, "CHUNK", chunk)
-    for key, values in vars(axis_evidence(streamed_flight(), 1e-10)).items():
-        np.testing.assert_allclose(values, getattr(whole, key), rtol=1e-9, atol=1e-12)
 
 
 def written_out(evaluate, partitions, fit):
@@ -197,3 +166,27 @@ def test_final_model_is_that_of_all_rows_at_once(monkeypatch, case, block):
     divided = A / np.append(np.ones(rigid), fit.column_size[:held])
     singular_values = np.linalg.svd(divided, compute_uv=False)
     np.testing.assert_allclose(unpenalised.singular_values, singular_values, rtol=1e-9)
+
+
+@pytest.mark.parametrize("chunk", CHUNKS)
+def test_scores_do_not_depend_on_chunks(monkeypatch, chunk):
+    source = streamed_flight()
+
+    def predict(motion):
+        return rigid_columns(motion) @ np.array([0.6, 0.9, 1.1, 0.0, 0.05, 0.0])
+
+    whole = score_of(source, predict)
+    error = source.torque - predict(source.motion)
+    np.testing.assert_allclose(whole.mse, np.mean(error**2, axis=0), rtol=1e-12)
+    np.testing.assert_allclose(whole.r2, 1 - np.mean(error**2, axis=0) / np.var(source.torque, axis=0), rtol=1e-12)
+    monkeypatch.setattr(data, "CHUNK", chunk)
+    for key, values in vars(score_of(source, predict)).items():
+        np.testing.assert_allclose(values, getattr(whole, key), rtol=1e-11)
+
+
+@pytest.mark.parametrize("chunk", CHUNKS)
+def test_evidence_on_axes_does_not_depend_on_chunks(monkeypatch, chunk):
+    whole = axis_evidence(streamed_flight(), 1e-10)
+    monkeypatch.setattr(data, "CHUNK", chunk)
+    for key, values in vars(axis_evidence(streamed_flight(), 1e-10)).items():
+        np.testing.assert_allclose(values, getattr(whole, key), rtol=1e-9, atol=1e-12)

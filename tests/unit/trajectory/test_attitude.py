@@ -53,11 +53,6 @@ def test_derivatives_agree_with_finite_differences(of, derivative):
     np.testing.assert_allclose(analytic, difference, atol=1e-6 * np.abs(difference).max())
 
 
-def test_hover_is_level():
-    flat = flat_attitude(np.zeros(1), np.zeros((3, 1, 3)), np.array([[0.7], [0.0], [0.0]]), GRAVITY)
-    np.testing.assert_array_equal(flat.attitude, [[0.0, 0.0, 0.7]])
-
-
 def test_free_fall_is_refused_with_its_time():
     translation = np.zeros((3, 3, 3))
     translation[0, 1, 2] = -GRAVITY

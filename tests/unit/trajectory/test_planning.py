@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.rotations import euler_rate_matrix
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings
 
@@ -78,19 +77,6 @@ def test_straight_path_follows_its_direction():
     trajectory = plan(settings, GRAVITY)
     np.testing.assert_allclose(trajectory.position[-1], [0.0, -10.0, 0.0], atol=1e-12)
     np.testing.assert_array_equal(trajectory.position[:, [0, 2]], 0.0)
-
-
-def test_maxima_are_those_of_the_samples(diagonal):
-    sampled = {name: np.linalg.norm(getattr(diagonal, name), axis=1).max() for name in CHAIN[1:]}
-    for name, value in sampled.items():
-        # Sampling misses a peak by a cosine of at most half a step of the wave.
-        assert value == pytest.approx(diagonal.maxima[name], rel=5e-4)
-    assert diagonal.maxima["displacement"] == 64.0
-
-
-def test_body_rate_belongs_to_the_attitude_rate(diagonal):
-    expected = np.einsum("nij,nj->ni", euler_rate_matrix(diagonal.attitude), diagonal.attitude_rate)
-    np.testing.assert_allclose(diagonal.body_rate, expected, atol=1e-15)
 
 
 def test_a_path_that_falls_freely_is_refused():

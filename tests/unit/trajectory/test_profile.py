@@ -18,12 +18,6 @@ def test_peaks_are_the_printed_ones(unit_profile):
     assert unit_profile.duration == 16.0
 
 
-def test_rest_before_and_after(unit_profile):
-    motion = unit_profile.sample(np.array([-3.0, 0.0, 16.0, 40.0]))
-    np.testing.assert_array_equal(motion[:2], 0.0)
-    np.testing.assert_array_equal(motion[2:], [[64.0, 0, 0, 0, 0, 0, 0]] * 2)
-
-
 def test_covering_chooses_the_amplitude():
     assert covering(64.0, 1.0, Holds()).amplitude == pytest.approx(1.0, rel=1e-14)
     assert covering(10.0, 0.7, Holds(jerk=0.3, velocity=2.0)).peaks.displacement == pytest.approx(10.0, rel=1e-14)
@@ -34,21 +28,11 @@ def profile():
     return BaseProfile(amplitude=2.0, period=0.5, holds=Holds(snap=0.1, jerk=0.2, acceleration=0.3, velocity=0.4))
 
 
-def test_times_may_come_in_any_order(profile):
-    time = np.linspace(-1.0, profile.duration + 1, 5000)
-    order = np.random.default_rng(0).permutation(len(time))
-    np.testing.assert_array_equal(profile.sample(time[order]), profile.sample(time)[order])
-
-
 def test_a_sample_does_not_depend_on_its_neighbours(profile):
     time = np.linspace(0, profile.duration, 40_001)
     some = np.arange(0, len(time), 997)
     scale = np.abs(profile.sample(time)).max(axis=0)
     np.testing.assert_allclose(profile.sample(time)[some] / scale, profile.sample(time[some]) / scale, atol=1e-15)
-
-
-def test_no_times_give_no_samples(profile):
-    assert profile.sample(np.empty(0)).shape == (0, 7)
 
 
 def test_stretched_keeps_shape_and_displacement(profile):

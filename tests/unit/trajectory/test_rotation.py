@@ -63,14 +63,6 @@ def test_torque_limit_binds_where_it_is_the_stricter():
     assert 0.999 < peaks[2] <= 1
 
 
-def test_given_turns_are_kept():
-    np.testing.assert_array_equal(drawn(turns=(1, -2, 0)).turns, [1, -2, 0])
-
-
-def test_harmonics_reach_up_to_the_highest_frequency():
-    assert drawn(frequency_max_hz=0.3).harmonics == 6
-
-
 def test_a_path_within_its_limits_stays_as_it_is():
     path = drawn().scaled(0.5)
     assert RotationLimits(RotationSettings()).enforced(path) is path

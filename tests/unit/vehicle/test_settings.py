@@ -1,8 +1,6 @@
-import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.errors import SettingError
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
@@ -22,15 +20,6 @@ def test_inertia_that_no_body_has_is_refused(inertia, message):
     with pytest.raises(SettingError, match=message) as refusal:
         VehicleSettings(inertia_kg_m2=inertia)
     assert refusal.value.key == "inertia_kg_m2"
-
-
-def test_six_elements_fill_the_tensor():
-    vehicle = VehicleSettings(inertia_kg_m2=(1.0, 2.0, 3.0, 0.1, 0.2, 0.3))
-    np.testing.assert_array_equal(inertia_tensor(vehicle), [[1.0, 0.1, 0.2], [0.1, 2.0, 0.3], [0.2, 0.3, 3.0]])
-
-
-def test_three_elements_are_the_diagonal():
-    np.testing.assert_array_equal(inertia_tensor(VehicleSettings()), np.diag([0.6, 0.6, 1.2]))
 
 
 def test_the_radius_of_a_propeller_is_positive_or_not_known():

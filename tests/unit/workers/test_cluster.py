@@ -146,7 +146,7 @@ def test_an_address_where_nothing_answers_is_an_error_in_words(capfd):
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("name", ["distributed.core", "distributed.client", "tornado.application", "asyncio"])
+@pytest.mark.parametrize("name", ["distributed.core", "tornado.application"])
 def test_nothing_is_logged_within_and_all_is_as_before_after(name):
     logger = logging.getLogger(name)
     before = logger.getEffectiveLevel()

@@ -48,12 +48,6 @@ def test_one_worker_is_this_process():
         assert set(workers(GENES).objectives[:, 0]) == {os.getpid()}
 
 
-def test_one_worker_gives_the_same_bytes_as_the_evaluator_itself():
-    evaluate = Uneven(np.linspace(0, 1, 50), longest_s=0.0)
-    with employ(evaluate) as workers:
-        assert workers(GENES).objectives.tobytes() == evaluate(GENES).objectives.tobytes()
-
-
 def test_parts_say_which_rows_they_are(two):
     seen = []
     for rows, part in two.stream(GENES):

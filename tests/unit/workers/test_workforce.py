@@ -41,23 +41,11 @@ def test_there_are_far_fewer_chunks_than_rows(workers):
     assert len(chunks(1000, workers)) < 200
 
 
-def test_no_rows_are_one_empty_chunk():
-    assert [part.tolist() for part in chunks(0, 3)] == [[]]
-
-
-def test_as_many_workers_as_rows_take_single_rows():
-    assert [part.tolist() for part in chunks(3, 3)] == [[0], [1], [2]]
-
-
 def failing(error):
     def work():
         raise error
 
     return attempt(work)
-
-
-def test_a_result_passes():
-    assert result_of(attempt(lambda: 3)) == 3
 
 
 @pytest.mark.parametrize("kind", [ComputationError, InputError])
