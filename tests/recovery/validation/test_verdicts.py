@@ -51,7 +51,7 @@ def evidence(torque_of, noise=0.0, structure=(), *, held_out=True, seeds=(3, 53)
         steps=steps,
         replayed={part: steps},
         residuals=examine_residuals(part, data, found.model.torque, 20),
-        physics=physical_sense(found.model, np.random.default_rng(2)),
+        physics=physical_sense(found.model),
         r2_min=0.8,
     )
 
