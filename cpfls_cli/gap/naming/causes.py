@@ -59,7 +59,7 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
         rivals, compared = _rivals(own, ranking, step, settings)
         if flights[0].lasting.size and not candidate.effect.is_lag:
             # A gust lasts: what of it was there before says nothing about a set. What gusts are off by is no formula's.
-            flown, floor = [flight.innovations() for flight in flights], step.floor * np.sqrt(hypothesis.most_noise)
+            flown, floor = [flight.innovations for flight in flights], step.floor * np.sqrt(hypothesis.most_noise)
             step = rank_effects(flown, others, effects, settings, None, also=(candidate,), floor=floor)
             own, *ranking = in_place_of(candidate, step)
             known, also = _rivals(own, ranking, step, settings)
