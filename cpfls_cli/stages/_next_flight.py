@@ -152,6 +152,8 @@ def _left_open(study: Study, path: Path) -> Case:
         flights = tuple(gusts.around(flights, gusts.floor(flights, flights)))
         explained = system(flights, chosen)
         floor = best_floor(explained)
+    # Of gusts, whose size is an estimate, no more is taken for an error of formulas than a gap begins at.
+    above = floor * np.sqrt(explained.most_noise) if gusts is not None else floor
     rivals, unseen = _open_effects(study, found, flights, path)
     # What a diagnosis did not weigh is asked for at usual sizes.
     weighed = open_questions(named, rivals, unseen, flights, floor, study.gap)
@@ -161,7 +163,7 @@ def _left_open(study: Study, path: Path) -> Case:
     more = needed_signals(effects) - logged
     notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight can show it",)
     commanded = any("command" in each.needs for each in effects) or flights[0].signals.commanded
-    logging = Logging(logged | more, commanded, floor, study.gap, base, formulas_off(explained, floor), gusts)
+    logging = Logging(logged | more, commanded, floor, study.gap, base, formulas_off(explained, above), gusts)
     return Case(questions, flights, logging, notes if more else ())
 
 

@@ -155,7 +155,8 @@ def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed:
 def of_thrust(numbers: Sequence[Estimate]) -> list[str]:
     """List moments of inertia that are right where the thrust is wrong: rates show their ratio to the rotor torque.
 
-    That is where a moment of inertia times the thrust is that of the config within 99 %, by independent errors.
+    That is where a moment of inertia times the thrust is that of the config within 99 %, however their errors go
+    together.
     """
     known = {number.name: number for number in numbers}
     thrust = known.pop("thrust_scale", None)
@@ -167,7 +168,7 @@ def _undone(number: Estimate, other: Estimate) -> bool:
     """Check whether two relative errors cancel as factors."""
     off = (1 + number.value) * (1 + other.value) - 1
     own, its = ((1 + b.value) * 0.5 * (a.high - a.low) for a, b in ((number, other), (other, number)))
-    return _chance_of(off, float(np.hypot(own, its))) > RARE
+    return _chance_of(off, own + its) > RARE
 
 
 def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:
