@@ -15,7 +15,6 @@ from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators import ardupilot, betaflight, crazyflie, px4
 from cpfls_cli.export.simulators.crazyflow import crazyflow_held, crazyflow_text
-from cpfls_cli.export.simulators.functions import casadi_text, jax_text
 from cpfls_cli.export.simulators.mjcf import mjcf_held, mjcf_text
 from cpfls_cli.export.simulators.pegasus import pegasus_held, pegasus_text
 from cpfls_cli.export.simulators.pyflyt import NUMBERS, pyflyt_held, pyflyt_text
@@ -23,7 +22,7 @@ from cpfls_cli.export.simulators.rotorpy import rotorpy_held, rotorpy_text
 from cpfls_cli.export.simulators.sdf import sdf_held, sdf_text
 from cpfls_cli.export.simulators.urdf import OTHERWISE, fly_urdf, urdf_held, urdf_text
 from cpfls_cli.export.simulators.webots import webots_held, webots_text
-from cpfls_cli.export.source import c_source
+from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
@@ -112,8 +111,10 @@ FORMS: dict[str, Form] = {
         "Betaflight's mixer", ".txt", betaflight.betaflight_held, betaflight.betaflight_text, lacks=betaflight.LACKS
     ),
     "px4params": Form("PX4's geometry", ".params", px4.px4_held, px4.px4_parameters, lacks=px4.LACKS),
-    "casadi": Form("CasADi", ".py", _whole, casadi_text),
-    "jax": Form("JAX", ".py", _whole, jax_text),
+    "casadi": Form(
+        "CasADi", ".py", _whole, lambda sheet, _, remarks, file: python_source(sheet, file, "casadi", remarks)
+    ),
+    "jax": Form("JAX", ".py", _whole, lambda sheet, _, remarks, file: python_source(sheet, file, "jax", remarks)),
 }
 """All, by the word of ``--format``."""
 

@@ -49,7 +49,7 @@ from cpfls_cli.gap.naming.results import (
     verdict_of,
 )
 from cpfls_cli.gap.naming.search import forward_selection
-from cpfls_cli.gap.residual.air import Air, air, in_air, known_motion
+from cpfls_cli.gap.residual.air import Air, air, known_motion
 from cpfls_cli.gap.residual.rotor_loss import RotorLoss, rotor_losses
 from cpfls_cli.gap.settings import CLEAR, NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
@@ -176,8 +176,7 @@ class _Flights(NamedTuple):
 
     def in_air(self, gusts: Air, axes: BoolArray) -> _Flights:
         """Give all of them the floor of their air; inertia that instruments do not identify is the loop's."""
-        in_gusts = [in_air(flights, gusts.floor(self.training, flights)) for flights in self]
-        in_gusts[0] = [replace(each, lasting=gusts.lasting(each.windows, len(each))) for each in in_gusts[0]]
+        in_gusts = (gusts.around(flights, gusts.floor(self.training, flights)) for flights in self)
         return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in in_gusts))
 
 

@@ -82,6 +82,8 @@ def wrong_numbers(effects: Iterable[NamedEffect]) -> dict[str, str]:
 def _error_words(effect: str, number: Estimate) -> list[str]:
     """Name a number of the vehicle as people do, and write its error and the interval in per cent, with signs."""
     name = _SHORT.get(number.name, effect.removesuffix(_RELATIVE).replace("_", " "))
+    # Flights show no more of it than that.
+    name += " over yaw torque" if number.name == "inertia_z" else ""
     numbers = with_interval(*(100.0 * each for each in (number.value, number.low, number.high)))
     signed = (text if text.startswith("-") or text == UNKNOWN or not float(text) else f"+{text}" for text in numbers)
     return [name, *map(printed, signed)]

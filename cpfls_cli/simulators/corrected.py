@@ -528,16 +528,22 @@ def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found)
         made.unchanged.append(
             f"the inertia about z, and {name}: flights do not show them, and yaw torque follows thrust"
         )
+    moments = [_Found(each, each, each) for each in made.vehicle.inertia_kg_m2[:3]]
     for index, axis in enumerate("xyz"):
         if f"inertia_{axis}" in numbers:
             factor = _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
-            if axis == "z" and made.of.states_ratio and all(rotor.thrust is None for rotor in made.rotors):
+            moments[index] = factor.times(moments[index].value)
+            no_body = moments[2].value > moments[0].value + moments[1].value
+            of_newtons = made.of.states_ratio and all(rotor.thrust is None for rotor in made.rotors)
+            if axis == "z" and made.rotors and (of_newtons or no_body):
                 # Of the two whose ratio shows, this one is a guess in most files that know no speeds.
                 other = _Found(*(1.0 / each for each in (factor.value, factor.high, factor.low)))
-                words = "yaw torque over thrust of {whom} is {share}, by its ratio to the inertia about z"
-                _as_found(made, "ratio", [other] * len(made.rotors), words, other)
+                kind = "ratio" if follows else "torque"
+                words = f"yaw torque{' over thrust' if follows else ''} of {{whom}} is {{share}}, by its ratio to the"
+                words += " inertia about z" + (", which in its place would be that of no body" if no_body else "")
+                _as_found(made, kind, [other] * len(made.rotors), words, other)
                 continue
-            _inertia(made, {index: factor.times(made.vehicle.inertia_kg_m2[index])})
+            _inertia(made, {index: moments[index]})
 
 
 def _inertia(made: _Corrections, wanted: Mapping[int, _Found]) -> None:

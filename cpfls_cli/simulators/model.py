@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _STRAIGHT = 0.9998
 """Cosine of one degree: up to there an axis of thrust is that of the body."""
 _SHORTEST = 1e-9
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -270,7 +271,24 @@ def checked(model: SimulatorModel) -> SimulatorModel:
             f"most {lift:.3g} N: it cannot hover; check the mass ({model.bodies[0].mass.where}), and "
             f"thrust and limit of the rotors ({model.rotors[0].where})"
         )
-    return model
+    return replace(model, notes=(*model.notes, *_oddities(model)))
+
+
+def _oddities(model: SimulatorModel) -> Iterator[str]:
+    """Say of what a vehicle cannot have, but a simulator flies."""
+    *others, largest = np.linalg.eigvalsh(model.inertia)
+    if largest > (1 + _ROUNDING) * sum(others):
+        yield (
+            f"its largest moment of inertia, {largest:.4g} kg m^2, is more than the other two together, "
+            f"{sum(others):.4g}, which no body has ({model.heaviest.inertia_at})"
+        )
+    spins = [rotor.spin for rotor in model.rotors]
+    if len(spins) > 3 and all(spins):
+        arm = np.abs(model.hubs[:, :2]).max()
+        mixer = np.column_stack([np.ones(len(spins)), model.hubs[:, :2] / (arm or 1.0), spins])
+        if np.linalg.matrix_rank(mixer, _ROUNDING) < 4:
+            turns = ", ".join("counter-clockwise" if spin > 0 else "clockwise" for spin in spins)
+            yield f"its rotors turn {turns}, so that roll, pitch and yaw are not independent: no autopilot flies it"
 
 
 def part_of(

@@ -17,8 +17,9 @@ from cpfls_cli.errors import ComputationError, InputError, SettingError, about
 from cpfls_cli.flights.path import PathQuestion, PlannedPath
 from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
 from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
-from cpfls_cli.gap.naming.ranking import best_floor
+from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import Alternative, GapVerdict
 from cpfls_cli.gap.next_flight.logged import (
     Logging,
@@ -33,6 +34,7 @@ from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
 from cpfls_cli.gap.recorded import TRAINING, in_roles
+from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.pages.effects import unit_words
 from cpfls_cli.report.numbers import number
 from cpfls_cli.simulation.inverse import flyability
@@ -137,8 +139,21 @@ def _left_open(study: Study, path: Path) -> Case:
     prepared = Preparation(common_windows(recordings, study.gap), base, study.gap, found.audit)
     flights = tuple(prepared.repaired(recordings))
     named = [each for each in found.effects or found.closest if each.candidate is not None]
-    explained = system(flights, [each.candidate for each in named if each.candidate is not None])
+    chosen = [each.candidate for each in named if each.candidate is not None]
+    explained = system(flights, chosen)
     floor = best_floor(explained)
+    gusts = None
+    if found.air is not None:
+        # What a file holds of them lacks the noise with them.
+        linear, block = fit(explained, floor), block_index(explained, study.gap)
+        known = air(explained, linear, block, known_motion(recordings), study.gap)
+        gusts = known if known is not None and known.split.any() else None
+    if gusts is not None:
+        flights = tuple(gusts.around(flights, gusts.floor(flights, flights)))
+        explained = system(flights, chosen)
+        floor = best_floor(explained)
+    # Of gusts, whose size is an estimate, no more is taken for an error of formulas than a gap begins at.
+    above = floor * np.sqrt(explained.most_noise) if gusts is not None else floor
     rivals, unseen = _open_effects(study, found, flights, path)
     # What a diagnosis did not weigh is asked for at usual sizes.
     weighed = open_questions(named, rivals, unseen, flights, floor, study.gap)
@@ -148,7 +163,7 @@ def _left_open(study: Study, path: Path) -> Case:
     more = needed_signals(effects) - logged
     notes = (f"log {', '.join(sorted(more))} too: the flights so far lack it, and without it no flight can show it",)
     commanded = any("command" in each.needs for each in effects) or flights[0].signals.commanded
-    logging = Logging(logged | more, commanded, floor, study.gap, base, formulas_off(explained, floor))
+    logging = Logging(logged | more, commanded, floor, study.gap, base, formulas_off(explained, above), gusts)
     return Case(questions, flights, logging, notes if more else ())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -99,8 +100,10 @@ def extended(
     lifting = thrust_put_in(extension, vehicle) if by_speed else vehicle
     if lifting != vehicle:
         moved = replace(base, vehicle=lifting)
-        again = refitted(with_known_wrench(training, moved), with_known_wrench(held, moved), *others, extension)
-        extension, vehicle = above_thrust(again, extension, lifting)
+        # A refit that is refused says nothing against the first one, which has the thrust as an effect.
+        with suppress(ComputationError):
+            again = refitted(with_known_wrench(training, moved), with_known_wrench(held, moved), *others, extension)
+            extension, vehicle = above_thrust(again, extension, lifting)
     whole = on_top_of(base, whole_vehicle(extension.model, vehicle))
     given = on_top_of(base, whole_vehicle(plain(base.fuzzy), base.vehicle))
     if diagnosis.air is not None and diagnosis.gusts:

@@ -26,7 +26,7 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.simulators import in_rotorpy
+from cpfls_cli.simulators import inside
 from cpfls_cli.simulators.in_mujoco import Controls, fly_mujoco
 
 _ARRAYS = "SCIPY_ARRAY_API"
@@ -145,7 +145,7 @@ def _turned(matrix: Array) -> Array:
 def fly_rotorpy(text: str, course: Course) -> State:
     """Fly an exported vehicle in RotorPy."""
     module = executed(text)
-    return in_rotorpy.fly_rotorpy(module["quad_params"], course, lags=module["ROTORS_LAG"], **_INTEGRATOR)
+    return inside.fly_rotorpy(module["quad_params"], course, lags=module["ROTORS_LAG"], **_INTEGRATOR)
 
 
 def fly_pegasus(text: str, course: Course) -> State:

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.config.load import load_study
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.stages import extend
 from tests.builders.gusty_flights import CALM, SMALL, Flight, gusty_flights
 from tests.builders.simulator_files import sdf_of, write_log
 
@@ -93,6 +95,25 @@ def test_gap_writes_the_corrected_file_and_leaves_mine(cpfls, folder, tmp_path):
     again = cpfls("gap", output / "study.yaml", folder / "log0.csv", folder / "log1.csv", "-o", tmp_path / "again")
     assert again.exit_code == 0, again.stderr
     assert "corrected" in json.loads((tmp_path / "again" / "gap.json").read_text())
+
+
+def test_a_second_fit_that_is_refused_leaves_the_first(cpfls, folder, tmp_path, monkeypatch):
+    """With the thrust put in the effects are fitted once more, which may be refused: the first fit has it as one."""
+    fitted, asked = extend.refitted, []
+
+    def refused(*given):
+        asked.append(len(given))
+        if len(asked) > 1:
+            raise ComputationError("not extended: no channel changes")
+        return fitted(*given)
+
+    monkeypatch.setattr(extend, "refitted", refused)
+    words = ("gap", folder / "mine.sdf", folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", tmp_path / "gap")
+    result = cpfls(*words)
+    assert result.exit_code == 0, result.stderr
+    assert len(asked) == 2
+    model = cpfls.told("info", tmp_path / "gap" / "extended.h5")
+    assert "parameter_error" in json.dumps(model)
 
 
 def test_the_file_itself_is_no_output(cpfls, folder, tmp_path):

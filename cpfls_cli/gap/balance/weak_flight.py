@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -123,6 +124,7 @@ class WeakFlight:
             rows = rows + self.windows.derivative(columns.momentum)
         return self.of_channels(rows)
 
+    @cached_property
     def innovations(self) -> WeakFlight:
         """Take of each row what the rows before do not predict: of gusts and noise these are alike and independent.
 

@@ -58,7 +58,7 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
         rivals, compared = _rivals(own, ranking, step, settings)
         if flights[0].lasting.size and not candidate.effect.is_lag:
             # A gust lasts: what of it was there before says nothing about a set. What gusts are off by is no formula's.
-            flown, floor = [flight.innovations() for flight in flights], step.floor * np.sqrt(hypothesis.most_noise)
+            flown, floor = [flight.innovations for flight in flights], step.floor * np.sqrt(hypothesis.most_noise)
             step = rank_effects(flown, others, effects, settings, None, also=(candidate,), floor=floor)
             own, *ranking = in_place_of(candidate, step)
             known, also = _rivals(own, ranking, step, settings)
@@ -145,7 +145,8 @@ def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed:
 def of_thrust(numbers: Sequence[Estimate]) -> list[str]:
     """List moments of inertia that are right where the thrust is wrong: rates show their ratio to the rotor torque.
 
-    That is where a moment of inertia times the thrust is that of the config within 99 %, by independent errors.
+    That is where a moment of inertia times the thrust is that of the config within 99 %, however their errors go
+    together.
     """
     known = {number.name: number for number in numbers}
     thrust = known.pop("thrust_scale", None)
@@ -157,7 +158,7 @@ def _undone(number: Estimate, other: Estimate) -> bool:
     """Check whether two relative errors cancel as factors."""
     off = (1 + number.value) * (1 + other.value) - 1
     own, its = ((1 + b.value) * 0.5 * (a.high - a.low) for a, b in ((number, other), (other, number)))
-    return _chance_of(off, float(np.hypot(own, its))) > RARE
+    return _chance_of(off, own + its) > RARE
 
 
 def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:

@@ -15,6 +15,7 @@ from cpfls_cli.gap.balance.weak_flight import WeakFlight, weak_flight
 from cpfls_cli.gap.next_flight.rivals import physical_values
 from cpfls_cli.gap.next_flight.room import Room
 from cpfls_cli.gap.next_flight.separation import Evidence, Question, SizedEffect, gathered
+from cpfls_cli.gap.residual.air import Air
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.measured import measure, noisy
@@ -56,6 +57,7 @@ class Logging:
     settings: GapSettings
     base: InertiaModel | None = None  # Of the model that misses something; None for the rigid body of the vehicle.
     off: float = 0.0  # What formulas are off by, see `formulas_off`.
+    air: Air | None = None  # Gusts that are to be expected, in the floor too; None for still air.
 
     def gathered(self, question: Question, flights: Sequence[WeakFlight]) -> Evidence:
         """Gather what flights would say on a question."""
@@ -65,7 +67,8 @@ class Logging:
         """Arrange a flight for the balance."""
         settings = self.settings
         shared = windows(signals.period, settings.window_s, settings.overlap)
-        return weak_flight("next flight", signals, shared, self.base, settings.force, settings.axes, self.floor)
+        flight = weak_flight("next flight", signals, shared, self.base, settings.force, settings.axes, self.floor)
+        return flight if self.air is None else self.air.around([flight], self.floor)[0]
 
 
 def planned_signals(planned: Trajectory, room: Room, logging: Logging) -> Signals:

@@ -15,7 +15,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.open_questions import usual_size
 from cpfls_cli.gap.naming.ranking import candidates_of, known_before
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect
-from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, answered, gathered, shared_noise
+from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, answered, gathered
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import smallest
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -113,8 +113,7 @@ def _is_answered(question: Question, flights: Sequence[WeakFlight], floor: Array
     """Check whether the flights that are there answer a question."""
     if all(question.true.candidate.effect.missing(flight.signals) for flight in flights):
         return False
-    (answer,) = answered([gathered(question, flights, floor, settings)], shared_noise(flights[0].windows))
-    return answer.settled
+    return answered([gathered(question, flights, floor, settings)])[0].settled
 
 
 def fitted_effects(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: Array) -> tuple[SizedEffect, ...]:

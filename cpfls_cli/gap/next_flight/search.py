@@ -12,9 +12,8 @@ from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.next_flight.logged import Logging, planned_signals
 from cpfls_cli.gap.next_flight.room import HarmonicPath, Room
-from cpfls_cli.gap.next_flight.separation import DRAWS, FEW_DRAWS, Answer, Evidence, Question, answered, shared_noise
+from cpfls_cli.gap.next_flight.separation import DRAWS, FEW_DRAWS, Answer, Evidence, Question, answered
 from cpfls_cli.rounding import ascending, less
-from cpfls_cli.weak_form.windows import windows
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,6 @@ class Goal:
     known: tuple[Evidence, ...]  # What the flights already flown say on each question; no blocks without such flights.
     room: Room
     logging: Logging
-    noise: float  # See `shared_noise`.
 
     def answers(self, signals: Signals | None, draws: int = DRAWS) -> tuple[Answer, ...]:
         """Judge what the known flights say together with one along given signals; None: with themselves once more."""
@@ -41,9 +39,7 @@ class Goal:
         answers = {
             index: answer
             for asked in of_effect.values()
-            for index, answer in zip(
-                asked, answered([evidence[each] for each in asked], self.noise, draws), strict=True
-            )
+            for index, answer in zip(asked, answered([evidence[each] for each in asked], draws), strict=True)
         }
         return tuple(answers[index] for index in range(len(self.questions)))
 
@@ -68,8 +64,7 @@ def goal(questions: Sequence[Question], flights: Sequence[WeakFlight], room: Roo
             return logging.gathered(question, flights)
         return Evidence.none(1 + int(block_index(system(flights), logging.settings).max()) if flights else 0)
 
-    shared = windows(room.period, logging.settings.window_s, logging.settings.overlap)
-    return Goal(tuple(questions), tuple(known(each) for each in questions), room, logging, shared_noise(shared))
+    return Goal(tuple(questions), tuple(known(each) for each in questions), room, logging)
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,7 @@ class Evidence:
     rivals: tuple[IntArray, ...]
     unit: bool  # Whether the rival has the coefficient 1.
     off: float  # What formulas are off by, see `formulas_off`.
+    noise: float = 1.0  # Variance of a sum of noise over windows, over that of windows that share none.
     known: int = 0  # Blocks, the first ones, that are flown already: their noise is what it is, and not drawn.
 
     @classmethod
@@ -93,16 +94,14 @@ class Evidence:
         weight[free] -= vectors[:, kept] @ along / scale
         return np.asarray(np.maximum(np.einsum("i,bij,j->b", weight, self.gram, weight), 0.0))
 
-    def odds(self, noise: float, draw: Array, size: float = 1.0) -> Array:
+    def odds(self, draw: Array, size: float = 1.0) -> Array:
         """Compute the logarithm of the rival's predictive density less that of the true effect, shape (block,).
 
-        `noise`: see `shared_noise`.
         `draw`, shape (block,): of the noise in what the two differ by, in standard deviations.
         `size`: of the true effect, as a share of its own.
         """
-        error = np.where(np.arange(len(self.left)) < self.known, 0.0, 2 * size * np.sqrt(noise * self.left))
-        more = size**2 * self.left + error * draw
-        return log_odds(more, size**2 * self.off_by)
+        error = np.where(np.arange(len(self.left)) < self.known, 0.0, 2 * size * np.sqrt(self.noise * self.left))
+        return log_odds(size**2 * self.left + error * draw, size**2 * self.off_by)
 
 
 def formulas_off(hypothesis: System, floor: Array) -> float:
@@ -120,9 +119,15 @@ def gathered(
 ) -> Evidence:
     """Gather what flights along known motions would say on a question.
 
+    In gusts by innovations, as a diagnosis rejects rivals: what of a gust was there before says nothing.
+
     `flights`: their residuals are not used; `floor`: shape (6,), N m and N; `off`: see `formulas_off`.
     """
-    balance = system(flights)
+    balance, noise = system(flights), shared_noise(flights[0].windows)
+    if flights[0].lasting.size:
+        # Innovations share no noise, which is less than what is allowed for.
+        floor, noise = floor * np.sqrt(balance.most_noise), 1 / float(balance.most_noise.min())
+        balance = system([each.innovations for each in flights])
     free = [nuisance(), *(each.candidate for each in question.besides if is_free(each.candidate))]
     tried = [] if question.rival is None or question.rival.kind == "parameter" else candidates_of([question.rival])
     true = (balance.columns(question.true.candidate) @ question.true.linear)[..., None]
@@ -138,6 +143,7 @@ def gathered(
         tuple(places[1 + len(free) :]) or (np.zeros(0, dtype=int),),
         bool(tried) and tried[0].effect.unit_coefficient,
         off,
+        noise,
     )
 
 
@@ -151,7 +157,6 @@ class Answer:
     own: float
     likely: float
     sure: float  # Probability that the rival is then so unlikely against the true effect that it is no rival.
-    noise: float
 
     @property
     def settled(self) -> bool:
@@ -163,33 +168,30 @@ class Answer:
         """Share of the effect's size from which on it is settled, if linear in it; nan where no size is."""
 
         def beaten(size: float) -> float:
-            own, other = _tables([self.evidence], self.noise, FEW_DRAWS, size).mean(axis=0)
+            own, other = _tables([self.evidence], FEW_DRAWS, size).mean(axis=0)
             return float(np.log(RARE) - np.log(other / own))
 
         largest = 1 / np.sqrt(ROUNDING)
         return float(brentq(beaten, 0.0, largest)) if beaten(largest) > 0 else np.nan
 
 
-def answered(evidence: Sequence[Evidence], noise: float, draws: int = DRAWS) -> list[Answer]:
+def answered(evidence: Sequence[Evidence], draws: int = DRAWS) -> list[Answer]:
     """Predict the table of how likely each set of effects is where one effect is true, over draws of the noise.
 
-    `evidence`: on each of its rivals, of the same flights; `noise`: see `shared_noise`.
+    `evidence`: on each of its rivals, of the same flights.
     """
-    tables = _tables(evidence, noise, draws)
+    tables = _tables(evidence, draws)
     own, *others = tables.mean(axis=0).tolist()
     # What all draws say is not certain.
     sure = (0.5 + (tables[:, 1:] < RARE * tables[:, :1]).sum(axis=0)) / (1 + draws)
-    return [
-        Answer(*each)
-        for each in zip(evidence, [own] * len(others), others, sure.tolist(), [noise] * len(others), strict=True)
-    ]
+    return [Answer(*each) for each in zip(evidence, [own] * len(others), others, sure.tolist(), strict=True)]
 
 
-def _tables(evidence: Sequence[Evidence], noise: float, draws: int, size: float = 1.0) -> Array:
+def _tables(evidence: Sequence[Evidence], draws: int, size: float = 1.0) -> Array:
     """Draw how likely the true effect and each rival will be, shape (draw, 1 + rival); the same draws for all paths."""
     rng, blocks = np.random.default_rng(0), len(evidence[0].gram)
     drawn = rng.standard_normal((draws, len(evidence), blocks))
-    return np.array([likely([e.odds(noise, d, size) for e, d in zip(evidence, one, strict=True)]) for one in drawn])
+    return np.array([likely([e.odds(d, size) for e, d in zip(evidence, one, strict=True)]) for one in drawn])
 
 
 def shared_noise(windows: Windows) -> float:

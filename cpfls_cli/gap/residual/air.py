@@ -91,6 +91,11 @@ class Air:
         both = self._gusts(windows, apart) + self.found.noise @ common
         return np.asarray(np.where(self.split[:, None], both / both[:, :1], apart == 0))
 
+    def around(self, flights: Sequence[WeakFlight], floor: Array) -> list[WeakFlight]:
+        """Give flights a floor of gusts and noise, shape (6,), where these are split off, and how long they last."""
+        floor = np.where(self.split, floor, 0.0)
+        return [replace(f, air=floor * f.known, lasting=self.lasting(f.windows, len(f))) for f in flights]
+
     def _gusts(self, windows: Windows, apart: IntArray) -> Array:
         """Compute the mean product of gusts averaged over windows so many samples apart, shape (6, apart)."""
         within = np.arange(1 - len(windows.weight), len(windows.weight))

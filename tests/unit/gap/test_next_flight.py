@@ -1,6 +1,7 @@
 """The next flight: what rivals cannot imitate against formulas, how sure against draws, paths within their room."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ import pytest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.naming.odds import likely
+from cpfls_cli.gap.balance.weak_flight import columns_of
+from cpfls_cli.gap.naming.odds import likely, odds
+from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
 from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, questions_between, require_visible, usual
@@ -23,7 +26,9 @@ from cpfls_cli.gap.next_flight.separation import (
     gathered,
     shared_noise,
 )
+from cpfls_cli.gap.residual.air import Air
 from cpfls_cli.gap.settings import NOISE, RARE, GapSettings
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.simulation.room_left import squared_speeds
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.limits import LimitSettings
@@ -128,23 +133,23 @@ def evidence(*left, off=0.0):
 
 
 def test_where_nothing_tells_all_sets_stay_as_likely_as_before():
-    answers = answered([evidence(0.0, 0.0, 0.0)] * 2, 1.1)
+    answers = answered([evidence(0.0, 0.0, 0.0)] * 2)
     assert [answer.likely for answer in answers] == pytest.approx([1 / 3] * 2)
     assert [answer.sure for answer in answers] == pytest.approx([0.0] * 2, abs=0.01)
     assert not any(answer.settled for answer in answers)
 
 
 def test_what_is_settled_is_so_from_a_smaller_size_on():
-    (answer,) = answered([evidence(*[30.0] * 6)], 1.1)
+    (answer,) = answered([evidence(*[30.0] * 6)])
     assert answer.settled
     assert answer.sure > 0.95
-    (smaller,) = answered([evidence(*[30.0 * answer.least_size**2] * 6)], 1.1)
+    (smaller,) = answered([evidence(*[30.0 * answer.least_size**2] * 6)])
     assert answer.likely < smaller.likely == pytest.approx(0.01, abs=0.01)
-    assert np.isnan(answered([evidence(*[0.0] * 6)], 1.1)[0].least_size)
+    assert np.isnan(answered([evidence(*[0.0] * 6)])[0].least_size)
 
 
 def test_formulas_that_are_off_leave_more_doubt():
-    exact, off = (answered([evidence(*[20.0] * 6, off=share)], 1.1)[0] for share in (0.0, 0.1))
+    exact, off = (answered([evidence(*[20.0] * 6, off=share)])[0] for share in (0.0, 0.1))
     assert off.evidence.off_by == pytest.approx(exact.evidence.off_by + 0.1 * 120.0)
     assert off.likely > exact.likely
     assert off.sure < exact.sure
@@ -167,13 +172,40 @@ def test_the_share_of_right_answers_is_that_of_draws(strength):
     """Blocks with white noise in what the rival leaves, decided as a diagnosis decides."""
     rng = np.random.default_rng(3)
     true = strength * rng.standard_normal((8, 10))
-    expected = answered([evidence(*(true**2).sum(axis=1))], 1.0)[0]
+    expected = answered([evidence(*(true**2).sum(axis=1))])[0]
     rows = true + rng.standard_normal((1000, 8, 10))
     more = (rows**2 - (rows - true) ** 2).sum(axis=2)
     weights = [likely([np.clip(-0.5 * each / NOISE, np.log(RARE), -np.log(RARE))]) for each in more]
     settled = [rival < RARE * own for own, rival in weights]
     assert np.mean(settled) == pytest.approx(expected.sure, abs=0.1)
     assert np.mean([rival for _, rival in weights]) == pytest.approx(expected.likely, abs=0.02)
+
+
+@pytest.mark.parametrize("gust", [0.035, 0.04])
+def test_in_gusts_the_share_of_right_answers_is_that_of_draws(gust):
+    """Gusts that last 1.2 s, drawn as torques of a planned flight with an offset, compared as a diagnosis does."""
+    size, lasting = np.full(6, gust), np.full(6, 1.2)
+    found = SimpleNamespace(size=size, memory=lasting, noise=np.zeros((6, 2)))
+    air = Air(found, np.ones(6, dtype=bool), np.ones(6, dtype=bool))
+    still = LOGGING.weak(along(path_of(2, 0.15)))
+    logging = replace(LOGGING, floor=air.floor([still], [still]) + 1e-9, air=air)
+    true = SizedEffect(candidate("com_offset"), np.array([2.5 * LEVER, 0.0]))
+    rival = CATALOGUE["torque_bias"]
+    flight = logging.weak(along(path_of(2, 0.15)))
+    (expected,) = answered([logging.gathered(Question(true, rival), [flight])])
+    (in_still_air,) = answered([LOGGING.gathered(Question(true, rival), [still])])
+    torque = columns_of(true.candidate, flight.signals).direct @ true.linear
+    settled, above, rng = [], logging.floor * np.sqrt(system([flight]).most_noise), np.random.default_rng(6)
+    for _ in range(60):
+        blown = torque + Gusts(size, lasting).drawn(rng, flight.signals.period, len(torque))
+        inertial = replace(flight.inertial, direct=flight.inertial.direct + blown)
+        flown = replace(flight, inertial=inertial, seen={}).innovations
+        step = rank_effects([flown], [], [rival], GapSettings(), None, also=(true.candidate,), floor=above)
+        own, other = (next(s for s in step.ranking if s.candidate.effect.name == n) for n in ("com_offset", rival.name))
+        first, second = likely([odds(own, other, step.above_floor)])
+        settled.append(second < RARE * first)
+    assert 0.1 < np.mean(settled) == pytest.approx(expected.sure, abs=0.15)
+    assert in_still_air.sure > 0.95
 
 
 def test_neighbouring_windows_share_noise_as_draws_do():
@@ -360,6 +392,6 @@ def test_in_closed_loop_the_flight_tells_about_as_much(asked):
 
 def test_judged_on_hover_is_not_sure():
     offset = question("com_offset", [LEVER, LEVER], "torque_bias")
-    (answer,) = answered([gathered(offset, [LOGGING.weak(along(path_of(2, 0.0)))], FLOOR, GapSettings())], 1.0)
+    (answer,) = answered([gathered(offset, [LOGGING.weak(along(path_of(2, 0.0)))], FLOOR, GapSettings())])
     assert answer.sure < 0.01
     assert usual(CATALOGUE["motor_lag"], VEHICLE).linear.tolist() == [1.0]

@@ -93,7 +93,7 @@ def test_errors_of_the_vehicles_numbers_are_per_cent_with_a_sign():
         numbers = (Estimate(name, "1", *number, (-0.9, 3.0)),)
         return effect_sentence(replace(OFFSET, name=effect, numbers=numbers))
 
-    assert "(parameter_error): Izz +24.0 % [+19.9, +28.1] (p" in said("inertia_z", 0.24, 0.199, 0.281)
+    assert "(parameter_error): Izz over yaw torque +24.0 % [+19.9, +28.1] (p" in said("inertia_z", 0.24, 0.199, 0.281)
     assert "Ixx −8 % [−20, +4] (p" in said("inertia_x", -0.08, -0.2, 0.04)
     assert ": drag factor +20.1 % [+18.0, +22.2] (p" in said("error", 0.201, 0.18, 0.222, effect="drag_factor_error")
     assert "thrust −9.00 % [−9.11, −8.89] (p" in said("thrust_scale", -0.09, -0.0911, -0.0889)

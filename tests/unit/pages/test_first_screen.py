@@ -85,7 +85,7 @@ def next_steps(found):
         ),
         (
             {"named": ({"name": "parameter_error", "kind": "parameter"},)},
-            "A parameter of the vehicle is wrong: Izz +24.0 % against the config.",
+            "A parameter of the vehicle is wrong: Izz over yaw torque +24.0 % against the config.",
         ),
         (
             {"verdict": "CONTRADICTED", "named": (), "impossible": made.texts(WRONG)},
@@ -113,7 +113,8 @@ def test_a_name_comes_with_its_size_its_interval_and_how_sure_it_is():
 def test_a_wrong_number_of_the_vehicle_is_named_as_people_do():
     box, *_ = screen(diagnosis(named=({"name": "parameter_error", "kind": "parameter"},)))
     assert list(box.sentences) == [
-        "Wrong inertia or thrust scale (parameter_error): Izz +24.0 % [+20.0, +28.1] (p < 10⁻⁶, 93 % of the gap)."
+        "Wrong inertia or thrust scale (parameter_error): Izz over yaw torque +24.0 % [+20.0, +28.1] (p < 10⁻⁶, 93 % of"
+        " the gap)."
     ]
 
 
@@ -133,7 +134,7 @@ def test_a_number_is_wrong_against_what_was_taken_for_it(moments, cautions, agai
     box, *_ = screen(
         diagnosis(named=({"name": "parameter_error", "kind": "parameter"},)), config=config, cautions=cautions
     )
-    assert box.title == f"A parameter of the vehicle is wrong: Izz +24.0 % against {against}."
+    assert box.title == f"A parameter of the vehicle is wrong: Izz over yaw torque +24.0 % against {against}."
 
 
 def test_what_speaks_against_the_model_stands_in_the_box():

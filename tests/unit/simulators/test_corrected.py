@@ -111,6 +111,24 @@ def test_thrust_alone_leaves_the_inertia(mine):
     assert "+      <motorConstant>1.66e-08</motorConstant><!-- from a data sheet -->" in said.diff
 
 
+def test_an_inertia_about_z_of_no_body_is_a_yaw_torque(mine):
+    """Flights show the ratio of the two: the other one is wrong where this one cannot be."""
+    said, new = correct(mine, effect("parameter_error", inertia_z=0.25, thrust_scale=-0.17))
+    assert [each.element for each in said.changes] == ["motorConstant", "izz"]
+    look = 1 / 0.83 - 1
+    said, new = correct(
+        mine, effect("parameter_error", inertia_x=look, inertia_y=look, inertia_z=0.8, thrust_scale=-0.17)
+    )
+    assert [each.element for each in said.changes] == ["motorConstant", "momentConstant"]
+    assert said.changes[1].sentence.endswith(
+        "by its ratio to the inertia about z, which in its place would be that of no body"
+    )
+    np.testing.assert_allclose(new.inertia, read_model(mine).inertia)
+    np.testing.assert_allclose(
+        SMALL.inertia[2] / new.rotors[0].drag_factor, 1.8 * SMALL.inertia[2] / SMALL.drag_factor, rtol=1e-3
+    )
+
+
 def test_inertia_alone_is_that_of_the_whole_vehicle(mine):
     said, new = correct(mine, effect("parameter_error", inertia_x=0.2, inertia_y=(0.002, 0.004), thrust_scale=0.001))
     assert [each.element for each in said.changes] == ["ixx"]

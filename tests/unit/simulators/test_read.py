@@ -387,3 +387,17 @@ def test_units_and_frames_of_the_page_are_those_of_the_table():
     page = (Path(__file__).parents[3] / "docs" / "simulators-files.md").read_text()
     for each in FORMATS:
         assert f"| {each.units} | {each.frames} | {each.source} |" in page
+
+
+def test_what_no_vehicle_has_is_said(tmp_path):
+    """A moment larger than the others together; rotors of one turn on either side, as those of Menagerie's X2."""
+    path = tmp_path / "odd.sdf"
+    path.write_text(sdf_of(SMALL))
+    assert read_model(path).notes == ()
+    path.write_text(sdf_of(SMALL, inertia=(1.0, 1.0, 1.5), spins=(-1, -1, 1, 1)))
+    moment, turns = read_model(path).notes
+    assert moment.startswith(
+        "its largest moment of inertia, 9.9e-05 kg m^2, is more than the other two together, 7.9e-05"
+    )
+    assert "odd.sdf line" in moment
+    assert turns.startswith("its rotors turn clockwise, clockwise, counter-clockwise, counter-clockwise, so that roll")
