@@ -22,7 +22,7 @@ from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel, turning_by_attitude
 from cpfls_cli.playback.motion import Body, MeasuredMotion
-from cpfls_cli.playback.player import in_the_air, rotor_terms_along
+from cpfls_cli.playback.player import in_the_air
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.windows import Flown, Rotors, Runs, Steps, errors_of_runs
 from cpfls_cli.rotations import rotation_matrix
@@ -155,10 +155,10 @@ class Held:
 
     def rotor(self, flight: PlaybackFlight) -> Array:
         """Evaluate the terms of the rotors over each step of a flight, shape (time, 1 + 4 rotors)."""
-        terms = rotor_terms_along(flight, self.response)
+        terms = flight.rotor_terms(*self.response.times)
         if self.squares:
             rotors = flight.speed.shape[1]
-            squared = rotor_terms_along(replace(flight, speed=flight.speed**2), self.response)
+            squared = replace(flight, speed=flight.speed**2).rotor_terms(*self.response.times)
             terms[:, 1 + rotors : 1 + 2 * rotors] = squared[:, 1 : 1 + rotors]
         return terms
 

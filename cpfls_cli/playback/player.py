@@ -15,7 +15,6 @@ from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_fli
 from cpfls_cli.playback.history import Observer, missed_wrench, past_of
 from cpfls_cli.playback.model import VehicleModel, wrench_along
 from cpfls_cli.playback.motion import Body, MeasuredMotion, State
-from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.windows import MOST_RUNS, Flown, Steps, errors_of_runs, rotation_errors
 from cpfls_cli.playback.windows import Runs as FlownRuns
 
@@ -70,11 +69,13 @@ def player_of(model: VehicleModel, flight: PlaybackFlight, parts: Sequence[Signa
         Stretches of the flight as the model meets them (`VehicleModel.acting`), along which effects that are no
         polynomials are evaluated; none for a model without such effects and a flight with rotor speeds.
     """
-    response = model.response_to(parts[0]) if parts else model.response
+    response, stated = model.response_to(parts[0]) if parts else model.response, flight.wrench
+    if stated is not None:
+        stated = replace(flight, speed=stated).rotor_terms(*response.times)[:, 1:7]
     return Player(
         flown=model.flown,
-        rotor=rotor_terms_along(flight, response),
-        along=_along(model, stated_along(flight, response), parts),
+        rotor=flight.rotor_terms(*response.times),
+        along=_along(model, stated, parts),
         wind=model.wind,
     )
 
@@ -110,21 +111,6 @@ def made_ready(model: VehicleModel, flight: LoggedFlight) -> tuple[PlaybackFligh
     # What a filter leaves of a speed that stays until the next sample is nearer to a straight line.
     made = playback_flight(flight.name, parts, "linear" if filtered else model.hold_of(parts[0], flight.hold))
     return replace(made, group=flight.group), player_of(model, made, parts)
-
-
-def rotor_terms_along(flight: PlaybackFlight, response: RotorResponse) -> Array:
-    """Evaluate the terms of the rotors over each step, stretch by stretch, shape (time, 1 + 4 rotors)."""
-    parts = (flight.speed[part] for part in flight.stretches)
-    return np.concatenate([response.terms_by_step(part, flight.motion.period, flight.hold) for part in parts])
-
-
-def stated_along(flight: PlaybackFlight, response: RotorResponse) -> Array | None:
-    """Evaluate the stated torque and force over each step, shape (time, 6); None of a flight with rotor speeds."""
-    wrench = flight.wrench
-    if wrench is None:
-        return None
-    parts = (wrench[part] for part in flight.stretches)
-    return np.concatenate([response.terms_by_step(part, flight.motion.period, flight.hold)[:, 1:7] for part in parts])
 
 
 def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> State:

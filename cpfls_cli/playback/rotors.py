@@ -34,9 +34,14 @@ class RotorResponse:
     slow_yaw: float = about("the same of the yaw torque", default=0.0)
     slow_s: float = about("time constant with which they do", unit="s", default=0.5)
 
+    @property
+    def times(self) -> tuple[float, float, float]:
+        """Delay, lag and slow time, s."""
+        return self.delay_s, self.lag_s, self.slow_s
+
     def terms_by_step(self, speed: Array, period: float, hold: Hold) -> Array:
         """Evaluate the terms of the rotors over each step; parameters and shape as `rotor_terms_by_step`."""
-        return np.asarray(rotor_terms_by_step(speed, period, hold, self.delay_s, self.lag_s, self.slow_s), dtype=float)
+        return np.asarray(rotor_terms_by_step(speed, period, hold, *self.times), dtype=float)
 
     def terms_at_samples(self, speed: Array, period: float, hold: Hold) -> Array:
         """Evaluate the terms of the rotors at the samples themselves, where torque and force are asked for.
@@ -44,7 +49,7 @@ class RotorResponse:
         A speed that stays until the next sample jumps there: taken is the middle of the jump. Parameters and shape as
         `rotor_terms_by_step`.
         """
-        return np.asarray(_terms_at_samples(speed, period, hold, self.delay_s, self.lag_s, self.slow_s), dtype=float)
+        return np.asarray(_terms_at_samples(speed, period, hold, *self.times), dtype=float)
 
     def slope_by_step(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse, *, slow: bool = True) -> Array:
         """Differentiate `terms_by_step` by one of the times, maybe without slowness."""

@@ -53,9 +53,7 @@ STATES = 9
 _ADDED = (0, 1, 2, 6, 7, 8)
 """Those of velocity and rate, which a step adds to."""
 
-_POSITION, _VELOCITY, _ROTATION, _MOMENTUM = slice(3), slice(3, 6), slice(6, 15), slice(15, 18)
-_RATE = _MOMENTUM
-"""Where samples of a path have the rate, and states the momentum."""
+_VELOCITY, _ROTATION, _MOMENTUM = slice(3, 6), slice(6, 15), slice(15, 18)
 
 
 class Turned(NamedTuple):

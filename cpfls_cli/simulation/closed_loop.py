@@ -15,8 +15,16 @@ from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.actuators import Actuators, actuators, mixer
-from cpfls_cli.simulation.autopilot import Autopilot, PlanPilot, plan_of
-from cpfls_cli.simulation.law_pilot import Asked, GyroscopeNoise, along_path, integration_rate, law_pilot
+from cpfls_cli.simulation.autopilot import (
+    Asked,
+    Autopilot,
+    GyroscopeNoise,
+    PlanPilot,
+    along_path,
+    integration_rate,
+    law_pilot,
+    plan_of,
+)
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.plant import (
     TURNING_NUMBERS,

@@ -11,9 +11,8 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import TrueMotion
-from cpfls_cli.simulation.autopilot import asked
+from cpfls_cli.simulation.autopilot import GyroscopeNoise, asked
 from cpfls_cli.simulation.closed_loop import SimulatedMotion, clock_of, fly
-from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects, in_table, played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, POSITION, VELOCITY

@@ -202,10 +202,6 @@ def parameter_of(autopilot: Autopilot, axis: int, role: str) -> Parameter | None
     return next((found for group in groups if (found := autopilot.by_role(f"{group}.{role}")) is not None), None)
 
 
-def _kept(parameter: Parameter | None, value: float) -> float:
-    return value if parameter is None else parameter.scale * floored(parameter, value / parameter.scale).value
-
-
 def floored(parameter: Parameter, wanted: float) -> Proposal:
     """Propose the next value below one that is wanted, inside the documented range."""
     steps = floor(wanted / parameter.step + 1e-9)

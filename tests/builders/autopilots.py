@@ -10,8 +10,8 @@ from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.vehicle import FoundNumber
+from cpfls_cli.simulation.autopilot import GyroscopeNoise
 from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
-from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.tuning.margins import StepAnswer

@@ -10,8 +10,8 @@ from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.rotations import rotation_matrix
+from cpfls_cli.simulation.autopilot import GyroscopeNoise
 from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
-from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from tests.builders.autopilots import CROSS

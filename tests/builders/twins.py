@@ -9,8 +9,8 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import VEHICLE
+from cpfls_cli.simulation.autopilot import GyroscopeNoise
 from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
-from cpfls_cli.simulation.law_pilot import GyroscopeNoise
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.simulation.twin import ChannelInGusts, InGusts, TwinGains, twin_of

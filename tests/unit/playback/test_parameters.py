@@ -13,7 +13,6 @@ from cpfls_cli.playback.fit import (
     loss_of,
     rate_stays,
     uncertainty,
-    window_errors,
     windows_of,
 )
 from cpfls_cli.playback.groups import JointNumbers
@@ -63,7 +62,7 @@ def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
     (windows,) = windows_of([flight], 0.2, 0.3)
     ((by_group, _),) = WindowSet((windows,)).derivatives(free, free.starts, [np.arange(len(windows.starts))])
     fitted = fit(free, [windows], {}, 0, 1e-3)
-    assert window_errors(fitted, [windows])[0].mean() == pytest.approx(fitted.loss, rel=1e-12)
+    assert WindowSet((windows,)).errors(free, fitted.values)[0].mean() == pytest.approx(fitted.loss, rel=1e-12)
     assert len(by_group) == len(windows.starts)
 
 
