@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -39,11 +38,8 @@ from cpfls_cli.playback.windows import Leg, Runs, Steps, errors_of_runs, legs, l
 _AXES = np.array([0, 0, 1, 2, 2, 3])
 """Which numbers an axis of torque and force has: roll and pitch share theirs, so do ahead and left."""
 
-_RATES, _MEMORIES = (10.0, 30.0, 90.0), (0.05, 0.15, 0.5)
-"""Rates in 1/s and memories in s of all axes that are looked at first: of far ones the fit may end in flat ground."""
-
-_FIRST = np.log([[_RATES[1], _MEMORIES[1]]] * 4)
-"""What is believed of both, as logarithms, shape (4, 2)."""
+_FIRST = np.log([[30.0, 0.15]] * 4)
+"""What is believed of rates in 1/s and memories in s, as logarithms, shape (4, 2): the fit begins there."""
 
 _BOUNDS = np.log([[0.1, 0.005], [300.0, 5.0]])
 _SPREAD = 2.0
@@ -87,10 +83,8 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
     begun = [_Begun.of(at, each, past_s) for each in side_by_side([_between(each) for each in windows])]
     ends = tuple(np.broadcast_to(end, _FIRST.shape).ravel() for end in _BOUNDS)
     point = partial(_point, at, begun, past_s)
-    looked_at = (np.tile(np.log(pair), len(_FIRST)) for pair in product(_RATES, _MEMORIES))
-    first = min((point(values) for values in looked_at), key=lambda each: each.objective)
-    scales = np.ones(len(first.values))
-    found = minimised(point, first, scales, (ends[0], ends[1]), _STEPS, _TOLERANCE, _DAMPING)
+    first = point(_FIRST.ravel())
+    found = minimised(point, first, first.scales, (ends[0], ends[1]), _STEPS, _TOLERANCE, _DAMPING)
     return _observer(found.values, past_s)
 
 
