@@ -181,7 +181,8 @@ def _study_of(run: Run, file: Path, flights: Sequence[Path], model: Path | None)
     assert stated.model is not None, "it was just read"
     names = stated.model.output_names.values()
     run.outputs += [run.output / name for name in (_STUDY, *names)]
-    logs = [path for path in flights if path.is_file() and not format_name(path)]
+    # One that is not there is said to be so before what the file does not state.
+    logs = [path for path in flights if not (path.is_file() and format_name(path))]
     made, _, text = proposed(run, logs, stated)
     if made.asked or made.vehicle is None:
         raise InputError(

@@ -140,6 +140,8 @@ def test_a_file_that_states_too_little_says_what_to_write(refuse, folder, tmp_pa
         'diaginertia="3.7e-5 4.2e-5 6.6e-5"/></body></worldbody></mujoco>'
     )
     flight = tmp_path / "flight.csv"
+    (message,) = refuse("gap", mine, flight, "-o", tmp_path / "gap")
+    assert message.endswith("flight.csv: no such file")
     flight.write_bytes((folder / "log0.csv").read_bytes())
     (message,) = refuse("gap", mine, flight, "-o", tmp_path / "gap")
     assert "does not state all that a gap needs" in message
