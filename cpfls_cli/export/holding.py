@@ -157,7 +157,8 @@ class Held:
         """Evaluate the terms of the rotors over each step of a flight, shape (time, 1 + 4 rotors)."""
         terms = flight.rotor_terms(*self.response.times)
         if self.squares:
-            rotors = flight.speed.shape[1]
+            # The flight keeps its own.
+            terms, rotors = terms.copy(), flight.speed.shape[1]
             squared = replace(flight, speed=flight.speed**2).rotor_terms(*self.response.times)
             terms[:, 1 + rotors : 1 + 2 * rotors] = squared[:, 1 : 1 + rotors]
         return terms

@@ -114,7 +114,7 @@ def diagnose(
             gusts = _gusts(named, given, settings)
     losses = _losses(flights, named, settings, rng)
     if losses:
-        named = named._replace(losses=losses, differ=tuple(each.sentence for each in losses))
+        named = named._replace(losses=losses, differ=(*(each.sentence for each in losses), *named.differ))
     weak, (found, held_out) = flights.training, named.judgement
     hypothesis, estimates = found.hypothesis, found.estimates
     progress(0.75, "rivals")
@@ -223,8 +223,8 @@ def _losses(flights: _Flights, named: _Named, settings: GapSettings, rng: np.ran
     """
     every, found = [*flights.training, *flights.repaired], named.judgement.found
     explained = system(every, found.hypothesis.chosen)
-    beside_names = rotor_losses(explained, found.estimates.linear, found.floor, settings, rng)
-    left = {(each.flight, each.rotor) for each in beside_names}
+    with_names = rotor_losses(explained, found.estimates.linear, found.floor, settings, rng)
+    left = {(each.flight, each.rotor) for each in with_names}
     if not left:
         return ()
     numbers, _ = fit_within_bounds(system(flights.training), found.floor)
@@ -384,7 +384,7 @@ def _concluded(
         closest=tuple(named) if refused and not found.losses else (),
         alternatives=() if found.losses else rivals,
         # In gusts fits of lags see the loop, and do not compare.
-        sets=() if lags and not still else likely_sets(judged),
+        sets=() if found.losses or (lags and not still) else likely_sets(judged),
         unexplained=() if verdict is GapVerdict.NAMED else remainder,
         not_excited=not_excited(hypothesis, [e for n, e in CATALOGUE.items() if n not in settings.ignore], floor),
         vehicle_numbers=all_numbers(estimates),

@@ -167,7 +167,7 @@ class Drawn:
     holds : callable
         Whether there is anything to draw.
     width : float, inch
-        Narrower for cards, which stand side by side.
+        Narrower for cards, of which two are in a row.
     """
 
     description: str
@@ -337,10 +337,13 @@ def plain_ticks(axis: Axis) -> None:
 def logarithmic(axes: Axes, low: float, high: float, steps: Sequence[int] = (1, 2, 5)) -> None:
     """Make the x axis logarithmic, with ticks that are written in full: at 1, 2 and 5 if there is room."""
     steps = steps if high < _WIDE_RANGE * low else (1,)
-    ticks = [step * 10.0**power for power in range(-4, 9) for step in steps]
     axes.set_xscale("log")
     axes.set_xticks([], minor=True)
-    shown = [tick for tick in ticks if 0.99 * low <= tick <= 1.01 * high]
+    for own in (steps, (1, 2, 5)):
+        ticks = [step * 10.0**power for power in range(-4, 9) for step in own]
+        shown = [tick for tick in ticks if 0.99 * low <= tick <= 1.01 * high]
+        if len(shown) > 1:
+            break
     axes.set_xticks(shown, [plain(tick) for tick in shown])
 
 

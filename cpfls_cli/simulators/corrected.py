@@ -471,17 +471,18 @@ def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
         words = "thrust of {whom} is {share}" + ("; flights show the difference of opposite rotors" if differ else "")
         _as_found(made, "thrust", [scale.with_factor(each) for each in lifting], words, scale)
         _largest_thrust(made, scale)
-    if "error" in numbers or differ:
-        error = _factor(numbers.get("error"))
+    by_inertia, why = _in_place_of_inertia(made, numbers, scale)
+    if "error" in numbers or differ or why:
+        error = _factor(numbers.get("error")).with_factor(by_inertia)
         kind = "torque" if any(rotor.torque is not None for rotor in made.rotors) else "ratio"
         # What a rotor lifts less it drags less, so that the ratio of the two stays.
         own = [
             [_part(drags, -spin), *(pattern if kind == "torque" else [_part(lifts, -spin)])]
             for pattern, spin in zip(patterns, spins, strict=True)
         ]
-        words = f"yaw torque{'' if kind == 'torque' else ' over thrust'} of {{whom}} is {{share}}"
+        words = f"yaw torque{'' if kind == 'torque' else ' over thrust'} of {{whom}} is {{share}}{why}"
         _as_found(made, kind, [error.with_factor(_sum(*each)) for each in own], words, error)
-    _moments(made, numbers, scale)
+    _moments(made, numbers, scale, "xy" if why else "xyz")
 
 
 def _as_found(made: _Corrections, kind: str, factors: Sequence[_Found], words: str, common: _Found) -> None:
@@ -520,7 +521,7 @@ def _largest_thrust(made: _Corrections, scale: _Found) -> None:
         made.replace("thrust2weight", share, scale.times(share.value), words, "all", None)
 
 
-def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found) -> None:
+def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found, axes: str) -> None:
     # About z the torque follows the thrust where the file states the ratio of the two.
     follows = all(rotor.torque is None for rotor in made.rotors)
     if scale.value != 1.0 and follows and made.rotors and "inertia_z" not in numbers:
@@ -528,22 +529,36 @@ def _moments(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found)
         made.unchanged.append(
             f"the inertia about z, and {name}: flights do not show them, and yaw torque follows thrust"
         )
-    moments = [_Found(each, each, each) for each in made.vehicle.inertia_kg_m2[:3]]
-    for index, axis in enumerate("xyz"):
+    for axis in axes:
         if f"inertia_{axis}" in numbers:
-            factor = _factor(numbers[f"inertia_{axis}"]).with_factor(scale if axis != "z" or follows else _ONE)
-            moments[index] = factor.times(moments[index].value)
-            no_body = moments[2].value > moments[0].value + moments[1].value
-            of_newtons = made.of.states_ratio and all(rotor.thrust is None for rotor in made.rotors)
-            if axis == "z" and made.rotors and (of_newtons or no_body):
-                # Of the two whose ratio shows, this one is a guess in most files that know no speeds.
-                other = _Found(*(1.0 / each for each in (factor.value, factor.high, factor.low)))
-                kind = "ratio" if follows else "torque"
-                words = f"yaw torque{' over thrust' if follows else ''} of {{whom}} is {{share}}, by its ratio to the"
-                words += " inertia about z" + (", which in its place would be that of no body" if no_body else "")
-                _as_found(made, kind, [other] * len(made.rotors), words, other)
-                continue
-            _inertia(made, {index: moments[index]})
+            _inertia(made, {"xyz".index(axis): _moment(made, numbers, scale, axis)})
+
+
+def _moment(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found, axis: str) -> _Found:
+    """Give a moment of inertia as flights have it; that about z goes with the thrust where the ratio of both shows."""
+    follows = axis != "z" or all(rotor.torque is None for rotor in made.rotors)
+    factor = _factor(numbers.get(f"inertia_{axis}")).with_factor(scale if follows else _ONE)
+    return factor.times(made.vehicle.inertia_kg_m2["xyz".index(axis)])
+
+
+def _in_place_of_inertia(made: _Corrections, numbers: Mapping[str, Estimate], scale: _Found) -> tuple[_Found, str]:
+    """Give what yaw torque is off where it is corrected in place of the inertia about z, and why."""
+    if "inertia_z" not in numbers or not made.rotors:
+        return _ONE, ""
+    found = [_moment(made, numbers, scale, axis) for axis in "xyz"]
+    pairs = zip(found, made.vehicle.inertia_kg_m2, strict=False)
+    # With what is written for the other two.
+    x, y, z = (own.value if own.contradicts(stated, made.wider) else stated for own, stated in pairs)
+    of_newtons = made.of.states_ratio and all(rotor.thrust is None for rotor in made.rotors)
+    if not of_newtons and z <= x + y:
+        return _ONE, ""
+    # Of the two whose ratio shows, the torque is a guess in most files that know no speeds.
+    factor = found[2].times(1.0 / made.vehicle.inertia_kg_m2[2])
+    why = ", by its ratio to the inertia about z"
+    return (
+        _Found(*(1.0 / each for each in (factor.value, factor.high, factor.low))),
+        why if of_newtons else f"{why}, which in its place would be that of no body",
+    )
 
 
 def _inertia(made: _Corrections, wanted: Mapping[int, _Found]) -> None:

@@ -68,14 +68,14 @@ def _identified(r: Look) -> list[AxisPlant]:
 def _effectiveness(r: Look, figure: Figure) -> None:
     """Draw angular acceleration per full command over frequency, by instruments and by least squares."""
     axes, shown = figure.subplots(), _identified(r)
-    for plant in shown:
+    for number, plant in enumerate(shown):
         seen = np.minimum(plant.input_coherence, plant.output_coherence) > _SEEN
         spread = np.exp(np.minimum(1.96 * plant.gain_error, np.log(_MOST_FACTOR)))
         gain = np.where(seen & (spread < _MOST_FACTOR), plant.gain, np.nan)
         style, ends = style_of(AXES.index(plant.axis)), [gain - gain / spread, gain * spread - gain]
         axes.errorbar(plant.frequency, gain, ends, fmt="o", markersize=3, linewidth=1, color=style["color"])
         axes.plot(plant.frequency, plant.model_gain, label=plant.axis, **style)
-        axes.plot(plant.frequency, plant.direct_gain, label=f"{plant.axis}, least squares", **BASELINE)
+        axes.plot(plant.frequency, plant.direct_gain, label=None if number else "least squares", **BASELINE)
     axes.set_ylim(0.0, 1.6 * max(float(np.nanmax(plant.model_gain)) for plant in shown))
     axes.set_ylabel("rad/s² per full command")
     _over_frequency(axes)

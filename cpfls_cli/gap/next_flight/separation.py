@@ -126,7 +126,8 @@ def gathered(
     balance, noise = system(flights), shared_noise(flights[0].windows)
     if flights[0].lasting.size:
         # Innovations share no noise, which is less than what is allowed for.
-        floor, noise = floor * np.sqrt(balance.most_noise), 1 / float(balance.most_noise.min())
+        known = balance.known.any(axis=0)
+        floor, noise = floor * np.sqrt(balance.most_noise), 1 / float(balance.most_noise[known].min())
         balance = system([each.innovations for each in flights])
     free = [nuisance(), *(each.candidate for each in question.besides if is_free(each.candidate))]
     tried = [] if question.rival is None or question.rival.kind == "parameter" else candidates_of([question.rival])

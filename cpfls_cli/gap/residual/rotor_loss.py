@@ -11,6 +11,7 @@ from cpfls_cli.effects.effect import Columns
 from cpfls_cli.gap.balance.balance_system import System
 from cpfls_cli.gap.settings import ERRORS, GapSettings
 from cpfls_cli.result import Estimate, about, part, result
+from cpfls_cli.rounding import ROUNDING
 
 
 @result
@@ -79,7 +80,7 @@ def _step(
     """
     always = np.linalg.qr(own.reshape(-1, own.shape[2]))[0].reshape(own.shape)
 
-    def beside(values: Array) -> Array:
+    def without_constant(values: Array) -> Array:
         """Take off what a share that is wrong all the time explains, of values, shape (window, channel, ...)."""
         return np.asarray(values - np.tensordot(always, np.tensordot(always, values, ((0, 1), (0, 1))), (2, 0)))
 
@@ -91,26 +92,30 @@ def _step(
     taken = from_each(always[..., None] * own[:, :, None])
     products = from_each(own[..., None] * own[:, :, None]) - np.einsum("wqa,wqb->wab", taken, taken)
     squares = np.einsum("waa->wa", products)
-    left = beside(rows)
-    shares = from_each(own * left[..., None]) / squares
-    gains = np.where(shares < 0, shares**2 * squares, 0.0)
+    # A rotor that stands still from then on, or always, identifies nothing.
+    squares = np.where(squares > ROUNDING * (own**2).sum(axis=(0, 1)), squares, np.inf)
+    left = without_constant(rows)
+    seen = from_each(own * left[..., None])
+    gains = np.where(seen < 0, seen**2 / squares, 0.0)
     moment, rotor = np.unravel_index(int(np.argmax(gains)), gains.shape)
     first = int(np.flatnonzero(within)[moment])
     lost = own[..., rotor] * (np.arange(len(rows)) >= first)[:, None]
-    without = left - beside(lost) * shares[moment, rotor]
+    shares = seen[:, rotor] / squares[:, rotor]
+    without = left - without_constant(lost) * shares[moment]
     shifts = rng.integers(1, len(rows), settings.shifts)
-    shifted = beside(np.stack([np.roll(without, by, axis=0) for by in shifts], axis=2))
-    chance = from_each(own[..., None] * shifted[:, :, None]) / squares[..., None]
-    most = (chance**2 * squares[..., None]).max()
-    if gains[moment, rotor] < ERRORS**2 * most:
+    shifted = without_constant(np.stack([np.roll(without, by, axis=0) for by in shifts], axis=2))
+    chance = from_each(own[..., None] * shifted[:, :, None])
+    most = (chance**2 / squares[..., None]).max()
+    if gains[moment, rotor] <= ERRORS**2 * most:
         return None
-    every = shares[moment] * squares[moment]
-    if gains[moment, rotor] < settings.named_share * every @ np.linalg.lstsq(products[moment], every, rcond=None)[0]:
+    any_rotor = seen[moment] @ np.linalg.lstsq(products[moment], seen[moment], rcond=None)[0]
+    if gains[moment, rotor] < settings.named_share * any_rotor:
         return None
     # Windows about the moment see both; and it may have been whenever a loss explains as much but for chance.
     apart = np.abs(np.arange(len(rows)) - first) > 1
     matrix = np.concatenate([own, lost[..., None]], axis=2)[apart].reshape(-1, own.shape[2] + 1)
     loss = -np.linalg.lstsq(matrix, rows[apart].ravel(), rcond=None)[0][-1]
-    as_good = shares[gains[:, rotor] >= gains[moment, rotor] - most, rotor]
-    half = ERRORS * np.sqrt((chance[moment, rotor] ** 2).mean()) + 0.5 * np.ptp(as_good)
+    as_good = shares[gains[:, rotor] >= gains[moment, rotor] - most]
+    by_chance = np.sqrt((chance[moment, rotor] ** 2).mean()) / squares[moment, rotor]
+    half = ERRORS * by_chance + 0.5 * np.ptp(as_good)
     return int(rotor), first, Estimate.around(loss, half)
