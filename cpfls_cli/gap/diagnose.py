@@ -114,7 +114,8 @@ def diagnose(
             gusts = _gusts(named, given, settings)
     losses = _losses(flights, named, settings, rng)
     if losses:
-        named = named._replace(losses=losses, differ=(*(each.sentence for each in losses), *named.differ))
+        # What else flights differ by may be these.
+        named = named._replace(losses=losses, differ=tuple(each.sentence for each in losses))
     weak, (found, held_out) = flights.training, named.judgement
     hypothesis, estimates = found.hypothesis, found.estimates
     progress(0.75, "rivals")

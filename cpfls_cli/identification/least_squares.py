@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import linalg
+from scipy.linalg import lapack
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, Numbers
 
 Project = Callable[[Array, Array], tuple[Array, Array]]
 SMALLEST_SINGULAR_SHARE = 3e-7
@@ -16,18 +18,26 @@ SMALLEST_SINGULAR_SHARE = 3e-7
 # Up to here the squares have digits enough; above, the lowest directions are multiplied out once more.
 _WELL_CONDITIONED = 3e3
 _LOWEST_DIRECTIONS = 3
+# Columns from which a tridiagonal form is worth its calls, and what it may work in, numbers a column.
+_FEW, _WORK = 64, 64
+# Columns from which Lanczos is worth its calls; its steps at most, and the residual at which an eigenvalue is exact.
+_MANY = 700
+_STEPS = 80
+_SETTLED = 1e-9
 
 
 @dataclass(frozen=True)
 class LeastSquares:
     """Solution of a linear least-squares problem, of minimum norm where the data do not determine all.
 
-    `singular_values` descend; `rank` of them are above `rank_tolerance`, a share of the largest.
+    `singular_values` descend; `rank` of them are above `rank_tolerance`, a share of the largest; `row_space`:
+    orthonormal basis of the directions that the data determine, shape (rank, parameters).
     """
 
     coefficients: Array
     singular_values: Array
     rank: int
+    row_space: Array
     rank_tolerance: float
 
     @property
@@ -94,7 +104,7 @@ def solve(matrix: Array, right_side: Array, rank_tolerance: float) -> LeastSquar
     rank = int(np.count_nonzero(singular_values > rank_tolerance * largest)) if largest > 0 else 0
     projected = U[:, :rank].T @ right_side
     coefficients = Vt[:rank].T @ (projected / singular_values[:rank])
-    return LeastSquares(coefficients, singular_values, rank, rank_tolerance)
+    return LeastSquares(coefficients, singular_values, rank, Vt[:rank], rank_tolerance)
 
 
 @dataclass(frozen=True)
@@ -170,7 +180,15 @@ class _Inverse:
 
 
 def _inverted(matrix: Array, tolerance: float) -> _Inverse | None:
-    """Invert a matrix whose eigenvalues below a share of the largest count as zero; None where all are zero."""
+    """Invert a matrix whose eigenvalues below a share of the largest count as zero; None where all are zero.
+
+    A Cholesky decomposition does that, beside the few eigenvectors that are asked for: of a large matrix by few steps
+    of Lanczos, if it has full rank, of others by a tridiagonal form. Where it fails all eigenvectors are computed.
+    """
+    with suppress(np.linalg.LinAlgError):
+        found = _factored(matrix, tolerance) if len(matrix) >= _MANY else _reduced(matrix, tolerance)
+        if found is not None:
+            return found
     eigenvalues, vectors = np.linalg.eigh(matrix)
     kept = eigenvalues > tolerance * eigenvalues[-1]
     if not kept.any():
@@ -183,6 +201,75 @@ def _inverted(matrix: Array, tolerance: float) -> _Inverse | None:
     if missing := len(eigenvalues) - len(inverse):
         return _Inverse(apply, missing)
     return _Inverse(apply, 0, eigenvalues[-1], eigenvalues[0], basis[:, :_LOWEST_DIRECTIONS])
+
+
+def _reduced(matrix: Array, tolerance: float) -> _Inverse | None:
+    """Invert by Cholesky and the lowest eigenvectors, from a tridiagonal form; None where all are had as soon.
+
+    Directions that count as zero get the largest eigenvalue, and nothing of a vector that is multiplied.
+    """
+    size = len(matrix)
+    if size < _FEW:
+        return None
+    form, diagonal, beside, reflectors, _ = lapack.dsytrd(matrix, lower=1, lwork=_WORK * size)
+
+    def turned_back(vectors: Numbers) -> Numbers:
+        below = lapack.dormqr("L", "N", form[1:, :-1], reflectors, vectors[1:], _WORK * size)[0]
+        return np.concatenate([vectors[:1], below])
+
+    last = (size - 1, size - 1)
+    (largest,) = linalg.eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=last, check_finite=False)
+    if not largest > 0:
+        return None
+    near_zero = (-largest, tolerance * largest)
+    none = turned_back(
+        linalg.eigh_tridiagonal(diagonal, beside, select="v", select_range=near_zero, check_finite=False)[1]
+    )
+    factor = linalg.cho_factor(matrix + largest * none @ none.T, check_finite=False)
+
+    def apply(right_side: Array) -> Array:
+        inside = right_side - none @ (none.T @ right_side)
+        return np.asarray(linalg.cho_solve(factor, inside, check_finite=False))
+
+    if missing := none.shape[1]:
+        return _Inverse(apply, missing)
+    lowest = (0, _LOWEST_DIRECTIONS - 1)
+    values, vectors = linalg.eigh_tridiagonal(diagonal, beside, select="i", select_range=lowest, check_finite=False)
+    return _Inverse(apply, 0, largest, values[0], turned_back(vectors))
+
+
+def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
+    """Invert by Cholesky; None where the rank may not be full."""
+    factor = linalg.cho_factor(matrix, check_finite=False)
+
+    def apply(right_side: Array) -> Array:
+        return np.asarray(linalg.cho_solve(factor, right_side, check_finite=False))
+
+    upper, lower = _extreme(lambda vector: matrix @ vector, len(matrix)), _extreme(apply, len(matrix))
+    # Far enough from zero that no rounding decides the rank.
+    if upper is None or lower is None or not 1.0 / lower[0] > 4.0 * tolerance * upper[0]:
+        return None
+    return _Inverse(apply, 0, upper[0], 1.0 / lower[0], lower[1])
+
+
+def _extreme(apply: Callable[[Array], Array], size: int) -> tuple[float, Array] | None:
+    """Find the largest eigenvalue of a symmetric operator, and directions, by Lanczos; None if it does not settle."""
+    basis = np.zeros((_STEPS + 1, size))
+    basis[0] = np.random.default_rng(0).standard_normal(size)
+    basis[0] /= np.linalg.norm(basis[0])
+    diagonal, beside = np.zeros(_STEPS), np.zeros(_STEPS)
+    for step in range(min(_STEPS, size)):
+        known, ahead = basis[: step + 1], apply(basis[step])
+        diagonal[step] = ahead @ basis[step]
+        for _ in range(2):
+            ahead = ahead - (known @ ahead) @ known
+        beside[step] = np.linalg.norm(ahead)
+        if step % 5 == 4 or step + 1 == size:
+            values, vectors = linalg.eigh_tridiagonal(diagonal[: step + 1], beside[:step], check_finite=False)
+            if beside[step] * np.abs(vectors[-1, -1]) <= _SETTLED * values[-1]:
+                return float(values[-1]), known.T @ vectors[:, : -1 - _LOWEST_DIRECTIONS : -1]
+        basis[step + 1] = ahead / beside[step]
+    return None
 
 
 def quick_solution(equations: NormalEquations) -> tuple[Array, tuple[Array, bool], Array]:

@@ -545,15 +545,18 @@ def _in_place_of_inertia(made: _Corrections, numbers: Mapping[str, Estimate], sc
     """Give what yaw torque is off where it is corrected in place of the inertia about z, and why."""
     if "inertia_z" not in numbers or not made.rotors:
         return _ONE, ""
-    found = [_moment(made, numbers, scale, axis) for axis in "xyz"]
-    pairs = zip(found, made.vehicle.inertia_kg_m2, strict=False)
+    stated = dict(zip("xyz", made.vehicle.inertia_kg_m2, strict=False))
+    found = {axis: _moment(made, numbers, scale, axis) for axis in "xyz" if f"inertia_{axis}" in numbers}
     # With what is written for the other two.
-    x, y, z = (own.value if own.contradicts(stated, made.wider) else stated for own, stated in pairs)
+    x, y, z = (
+        found[axis].value if axis in found and found[axis].contradicts(own, made.wider) else own
+        for axis, own in stated.items()
+    )
     of_newtons = made.of.states_ratio and all(rotor.thrust is None for rotor in made.rotors)
     if not of_newtons and z <= x + y:
         return _ONE, ""
     # Of the two whose ratio shows, the torque is a guess in most files that know no speeds.
-    factor = found[2].times(1.0 / made.vehicle.inertia_kg_m2[2])
+    factor = found["z"].times(1.0 / stated["z"])
     why = ", by its ratio to the inertia about z"
     return (
         _Found(*(1.0 / each for each in (factor.value, factor.high, factor.low))),

@@ -30,14 +30,16 @@ def flown():
     return {"calm": flights[:3], "gusts": flights[3:]}
 
 
-def told_faster(signals, loss):
+def logged_faster(signals, loss):
     """Speeds as they are logged where rotors pull less than by their speed, by shares of shape (time, rotor)."""
     return replace(signals, rotor_speed=signals.rotor_speed / np.sqrt(1 - loss))
 
 
 def recorded(flights, loss):
     """Recordings in which rotors lose thrust, by what gives shares of the flight's number and its times."""
-    return [Recording(name, told_faster(signals, loss(at, signals.time))) for at, (name, signals) in enumerate(flights)]
+    return [
+        Recording(name, logged_faster(signals, loss(at, signals.time))) for at, (name, signals) in enumerate(flights)
+    ]
 
 
 def one_rotor(share, flight, rotor):
@@ -78,3 +80,20 @@ def test_what_no_single_rotor_does_at_once_is_none(flown, air, loss):
     every = system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
     floor = best_floor(every)
     assert list(rotor_losses(every, fit(every, floor), floor, FEW, np.random.default_rng(1))) == []
+
+
+@pytest.mark.parametrize("stopped", [lambda time: time > 24.0, lambda time: time >= 0.0], ids=["lands", "never turns"])
+@pytest.mark.parametrize("rotors", [slice(None), slice(1, 2)], ids=["all", "one"])
+def test_rotors_that_stand_still_identify_nothing(flown, stopped, rotors):
+    recordings = recorded(flown["calm"], one_rotor(0.04, 0, 0))
+    still = []
+    for each in recordings:
+        speed = each.signals.rotor_speed.copy()
+        speed[stopped(each.signals.time), rotors] = 0.0
+        still.append(replace(each, signals=replace(each.signals, rotor_speed=speed)))
+    windows = common_windows(still, FEW)
+    every = system([weak_flight(each.name, each.signals, windows, None, force=True) for each in still])
+    floor = best_floor(every)
+    rng = np.random.default_rng(1)
+    found = list(rotor_losses(every, fit(every, floor), floor, FEW, rng))
+    assert np.isfinite([(each.loss.value, each.loss.low, each.loss.high) for each in found]).all()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.identification import least_squares
 from cpfls_cli.identification.least_squares import (
     SMALLEST_SINGULAR_SHARE,
     NormalEquations,
@@ -36,6 +37,13 @@ def test_condition_number_counts_kept_singular_values_only():
     graded = (U * [8.0, 4.0, 2.0, 1e-3, 1e-9, 0.0]) @ Vt
     assert solve(graded, right_side, 1e-6).condition_number == pytest.approx(8000.0)
     assert solve(graded, right_side, 1e-2).condition_number == pytest.approx(4.0)
+
+
+def test_basis_spans_rows():
+    matrix, right_side = low_rank(30, 8, 5)
+    system = solve(matrix, right_side, 1e-10)
+    np.testing.assert_allclose(system.row_space @ system.row_space.T, np.eye(5), atol=1e-13)
+    np.testing.assert_allclose(matrix @ system.row_space.T @ system.row_space, matrix, atol=1e-12)
 
 
 def test_no_excitation_at_all():
@@ -75,6 +83,13 @@ def test_no_rows_at_all_are_an_error():
 PARAMETERS = 40
 
 
+@pytest.fixture(params=["all eigenvectors", "tridiagonal form", "Lanczos"])
+def each_way(request, monkeypatch):
+    """As few columns are solved, as some are, and as many."""
+    monkeypatch.setattr(least_squares, "_FEW", PARAMETERS + (request.param == "all eigenvectors"))
+    monkeypatch.setattr(least_squares, "_MANY", PARAMETERS + (request.param != "Lanczos"))
+
+
 def columns(singular_values, rows=200, seed=32):
     """A matrix of given singular values, a right-hand side, and the parameters behind it."""
     rng = np.random.default_rng(seed)
@@ -102,6 +117,7 @@ def decay(condition, kind, scale=1.0):
     return scale * values
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("scale", [1.0, 1e6, 1e-6])
 @pytest.mark.parametrize("kind", ["even", "one", "cluster"])
 @pytest.mark.parametrize("condition", [3.0, 5e3, 2e4, 1e5, 1e6])
@@ -112,6 +128,7 @@ def test_condition_number_has_six_digits(condition, kind, scale):
     assert found == pytest.approx(condition, rel=1e-6)
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("kind", ["even", "one", "cluster"])
 @pytest.mark.parametrize("condition", [3.0, 5e3, 2e4, 1e5, 1e6])
 def test_residual_is_that_of_the_decomposition(condition, kind):
@@ -122,6 +139,7 @@ def test_residual_is_that_of_the_decomposition(condition, kind):
     np.testing.assert_allclose(residual, best, atol=1e-7 * np.abs(best).max())
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("condition", [3.0, 2e4, 1e6])
 def test_penalised_system_is_solved_with_its_penalty(condition):
     A, y, _ = columns(decay(condition, "even"))
@@ -143,6 +161,7 @@ def test_losing_rank_never_improves_the_conditioning():
     assert found == pytest.approx([8, 2e6, 3e6])
 
 
+@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("rank_tolerance", [1e-10, 1e-6, 1e-4])
 @pytest.mark.parametrize("seed", range(3))
 def test_conditioning_is_ordered_to_the_end(rank_tolerance, seed):
@@ -160,6 +179,7 @@ def test_conditioning_is_ordered_to_the_end(rank_tolerance, seed):
     assert solved(*columns(fewer, seed=seed)[:2], rank_tolerance=rank_tolerance).conditioning > worse[-1]
 
 
+@pytest.mark.usefixtures("each_way")
 def test_dependent_columns_get_the_parameters_of_smallest_norm():
     values = np.geomspace(1.0, 0.1, PARAMETERS)
     values[-5:] = 0.0
@@ -167,6 +187,23 @@ def test_dependent_columns_get_the_parameters_of_smallest_norm():
     found = solved(A, y)
     np.testing.assert_allclose(found.parameters, np.linalg.pinv(A, rcond=1e-10) @ y, atol=1e-9)
     assert found.conditioning == pytest.approx(6 / SMALLEST_SINGULAR_SHARE)
+
+
+@pytest.mark.parametrize("kind", ["even", "one", "cluster"])
+@pytest.mark.parametrize(("condition", "full"), [(3.0, True), (1e5, True), (3e7, False)])
+def test_cholesky_and_lanczos_find_what_the_eigendecomposition_does(kind, condition, full):
+    A = columns(decay(condition, kind))[0]
+    matrix, tolerance = A.T @ A, SMALLEST_SINGULAR_SHARE**2
+    found, expected = least_squares._factored(matrix, tolerance), np.linalg.eigvalsh(matrix)
+    assert (found is not None) == full
+    if found is not None:
+        # Rounding of the matrix moves its smallest eigenvalue by 1e-16 of the largest.
+        assert found.smallest == pytest.approx(expected[0], rel=1e-9 + 1e-14 * condition**2)
+        assert found.largest == pytest.approx(expected[-1], rel=1e-12)
+        assert found.missing == 0
+        right_side = matrix @ np.ones(PARAMETERS)
+        np.testing.assert_allclose(matrix @ found.apply(right_side), right_side, rtol=1e-9)
+        np.testing.assert_allclose(found.lowest.T @ found.lowest, np.eye(3), atol=1e-9)
 
 
 def test_normal_equations_without_any_excitation():

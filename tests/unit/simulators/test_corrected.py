@@ -129,6 +129,18 @@ def test_an_inertia_about_z_of_no_body_is_a_yaw_torque(mine):
     )
 
 
+def test_what_the_file_keeps_decides_whether_an_inertia_is_of_no_body(mine):
+    said, _ = correct(mine, effect("parameter_error", inertia_x=(-0.4, 0.6), inertia_z=0.15))
+    assert [each.element for each in said.changes] == ["izz"]
+
+
+def test_a_yaw_torque_is_corrected_once(mine):
+    wrong = effect("drag_factor_error", error=0.2), effect("parameter_error", inertia_z=0.8)
+    said, new = correct(mine, *wrong)
+    assert [each.element for each in said.changes] == ["momentConstant"]
+    assert new.rotors[0].drag_factor == pytest.approx(1.2 / 1.8 * SMALL.drag_factor, rel=1e-3)
+
+
 def test_inertia_alone_is_that_of_the_whole_vehicle(mine):
     said, new = correct(mine, effect("parameter_error", inertia_x=0.2, inertia_y=(0.002, 0.004), thrust_scale=0.001))
     assert [each.element for each in said.changes] == ["ixx"]

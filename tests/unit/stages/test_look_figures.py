@@ -65,7 +65,7 @@ NOTHING = SimpleNamespace(balance=None, plants={}, loops=None, vibration=None, h
     [
         ("balance", {("share", "M1", "10.00"), ("95 %", "M2", "25.00"), ("equal rotors", "M2", "4.000")}),
         # Points that no coherence or interval supports are left out.
-        ("effectiveness", {("pitch", "10", "30.00"), ("", "5", "60.00"), ("pitch, least squares", "10", "40.00")}),
+        ("effectiveness", {("pitch", "10", "30.00"), ("", "5", "60.00"), ("least squares", "10", "40.00")}),
         # Ten times as long as half of it takes.
         ("step", {("roll", "0.4000", "0.4000"), ("", "0.4000", "0.3600")}),
         ("response", {("roll", "5", "0.8000")}),
