@@ -87,7 +87,7 @@ def _over_frequency(axes: Axes) -> None:
     axes.set_xlim(low, high)
     axes.set_xlabel("frequency, Hz")
     if len(axes.get_legend_handles_labels()[1]) > 1:
-        legend_above(axes)
+        legend_above(axes, 3)
 
 
 def _measured(r: Look) -> list[AxisLoop]:
