@@ -51,7 +51,7 @@ from cpfls_cli.gap.naming.results import (
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.residual.air import Air, air, known_motion
 from cpfls_cli.gap.residual.rotor_loss import RotorLoss, rotor_losses
-from cpfls_cli.gap.settings import CLEAR, NOISE, GapSettings
+from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
 from cpfls_cli.weak_form.windows import Recording, common_windows
@@ -219,12 +219,12 @@ def _named(
 def _losses(flights: _Flights, named: _Named, settings: GapSettings, rng: np.random.Generator) -> tuple[RotorLoss, ...]:
     """Find rotors that lose thrust in flight, which is no effect of the catalogue, though several together look alike.
 
-    What is named may take a part of it, so its size is that of the model as given; and what only that shows is what is
-    named.
+    What is named may take a part of it, so it has to be sure, and its size is that, of the model as given; what that
+    alone shows is what is named.
     """
     every, found = [*flights.training, *flights.repaired], named.judgement.found
     explained = system(every, found.hypothesis.chosen)
-    with_names = rotor_losses(explained, found.estimates.linear, found.floor, settings, rng)
+    with_names = rotor_losses(explained, found.estimates.linear, found.floor, settings, rng, ERRORS**2)
     left = {(each.flight, each.rotor) for each in with_names}
     if not left:
         return ()
