@@ -56,8 +56,7 @@ def rotor_losses(
         Of its `base`.
     floor : array, shape (6,), N m and N
     above_chance : float
-        Times that a loss has to explain more than any of those does: as usual it is four times as large. Of 349 sets of
-        the blind study five are twice as large, all in gusts.
+        Times that a loss has to explain more than any of those does; as usual it is four times as large.
     """
     residual = system.residual_at(linear) / floor
     for number, (flight, signals) in enumerate(zip(system.flights, system.signals, strict=True)):
@@ -105,7 +104,7 @@ def _step(
     taken = from_each(always[..., None] * own[:, :, None])
     products = from_each(own[..., None] * own[:, :, None]) - np.einsum("wqa,wqb->wab", taken, taken)
     squares = np.einsum("waa->wa", products)
-    # A rotor that stands still from then on, or always, identifies nothing.
+    # A rotor that does not turn from then on, or never does, identifies nothing.
     squares = np.where(squares > ROUNDING * (own**2).sum(axis=(0, 1)), squares, np.inf)
     left = without_constant(rows)
     seen = from_each(own * left[..., None])

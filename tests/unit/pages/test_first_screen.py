@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from cpfls_cli import page
+from cpfls_cli.gap.residual.rotor_loss import RotorLoss
 from cpfls_cli.report.content import Box, Facts, Folded, Table, Text
-from cpfls_cli.result import plain
+from cpfls_cli.result import Estimate, plain
 from cpfls_cli.simulators.results import Corrected
 from tests.builders import gap_artifacts as made
 from tests.builders.vehicle_search import CONFIG
@@ -349,6 +350,15 @@ def test_what_differs_between_flights_stands_above_and_not_below():
     record = diagnosis("FLIGHTS_DIFFER", named=({"named": 0},), difference=differ, note=differ)
     assert screen(record)[1]["Differs"] == "The gap about y is in training alone."
     assert not remarks(record)
+
+
+def test_a_rotor_that_loses_thrust_is_the_answer():
+    loss = RotorLoss(flight="two.csv", rotor=3, time_s=12.0, loss=Estimate.around(0.08, 0.01))
+    record = diagnosis("FLIGHTS_DIFFER", named=(), difference=made.texts(loss.sentence))
+    box, facts, *_ = screen(replace(record, rotor_losses=(loss,)))
+    assert (box.label, box.title) == ("FLIGHTS DIFFER", "M3 lost thrust in flight.")
+    assert facts["Differs"].startswith("In two.csv M3 pulls 8 % [7, 9] less from 12.0 s on")
+    assert facts["Next"].startswith("Look at propeller and motor")
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor.motion import RIGID
 from cpfls_cli.regressor.regressor import Regressor
-from cpfls_cli.validation.bootstrap import BlockScores, bootstrap
+from cpfls_cli.validation.bootstrap import bootstrap
 from tests.builders.flights import bent_torque, random_flight
 
 DRAWS = 30
@@ -133,26 +133,3 @@ def test_noise_free_data_and_short_flights_give_finite_draws(base, samples):
     assert draws.blocks >= 2
     assert all(np.isfinite(getattr(draws, name)).all() for name in ("coefficients", "rigid_body", "best_rigid_body"))
     np.testing.assert_allclose(draws.best_rigid_body, np.tile([0.6, 0.7, 1.2, 0, 0, 0], (DRAWS, 1)), atol=1e-9)
-
-
-def test_directions_that_nothing_determines_stay_where_they_are():
-    rng = np.random.default_rng(2)
-    A = rng.standard_normal((6, 9, 4)) @ rng.standard_normal((4, 5))
-    scores = BlockScores(
-        A.swapaxes(1, 2) @ A,
-        np.einsum("bnp,bn->bp", A, rng.standard_normal((6, 9))),
-        np.zeros(5),
-        np.zeros(5),
-    )
-    moved = scores.draws(rng.standard_normal((50, 6)), 1e-6)
-    null = linalg.null_space(A.reshape(-1, 5))
-    assert null.shape[1] == 1
-    assert np.abs(moved).max() > 0.01
-    np.testing.assert_allclose(moved @ null, 0.0, atol=1e-9)
-
-
-def test_a_block_that_alone_determines_a_direction_gives_finite_draws():
-    gram = np.zeros((2, 2, 2))
-    gram[0, 0, 0] = gram[1, 1, 1] = 1.0
-    scores = BlockScores(gram, np.zeros((2, 2)), np.zeros(2), np.ones(2), power=1.0)
-    np.testing.assert_array_equal(scores.draws(np.ones((3, 2)), 1e-10), np.zeros((3, 2)))
