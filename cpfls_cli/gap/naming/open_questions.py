@@ -63,8 +63,9 @@ def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
             replace(flight, windows=windows).averaged(residual_along(hypothesis, number, found.estimates.linear))
         )
         rates.append(windows.average(flight.signals.body_rate))
-    band = narrow_band(rows, rates, windows.hop * windows.period, settings.shifts, rng, settings.significance)
-    return band if band and band.p_value <= settings.significance and band.share > COUNTS else None
+    hop_s = windows.hop * windows.period
+    band = narrow_band(rows, rates, hop_s, settings.shifts, rng, settings.significance, least=COUNTS)
+    return band if band and band.p_value <= settings.significance else None
 
 
 def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[str]:

@@ -47,6 +47,7 @@ def narrow_band(
     draws: int,
     rng: np.random.Generator,
     significance: float = 1.0,
+    least: float = 0.0,
 ) -> NarrowBand | None:
     """Search for one narrow band above the smooth spectrum of the residual.
 
@@ -60,7 +61,8 @@ def narrow_band(
     `hop_s`: from one window to the next, s.
     `draws`: of noise, at most.
     `significance`: largest p that anybody asks for: no noise is drawn once p has to be larger.
-    None where no flight is long enough to have a background, or all rows are 0.
+    `least`: share of the variance that a band has to exceed: no noise is drawn for less.
+    None where no flight is long enough to have a background, all rows are 0, or the band is less.
     Reference: Besag and Clifford 1991, sequential Monte Carlo p-values.
     """
     kept = [number for number, rows in enumerate(residual) if len(rows) > 2 * _MEDIAN_CYCLES and rows.any()]
@@ -75,6 +77,10 @@ def narrow_band(
     smooth = background(power, on)
     prominence = _prominence(power, on)
     strongest, peak = (int(i) for i in np.unravel_index(prominence.argmax(), prominence.shape))
+    lobe = slice(max(0, peak - LOWEST), peak + LOWEST + 1)
+    share = float(np.maximum(power[strongest] - smooth[strongest], 0)[lobe].sum() / power[strongest].sum())
+    if not share > least:
+        return None
     drawn = reached = 0
     while drawn < draws and 1 + reached <= significance * (1 + draws):
         noise = noise_like(smooth, lengths, present[:, channels], on, rng)
@@ -82,11 +88,10 @@ def narrow_band(
         drawn += 1
     channel, frequency = int(channels[strongest]), _between_bins(power[strongest], peak, on)
     mean, error = _mean_power(channel, frequency, hop_s, flights, rates)
-    lobe = slice(max(0, peak - LOWEST), peak + LOWEST + 1)
     return NarrowBand(
         channel=CHANNELS[channel],
         frequency_hz=frequency,
-        share=float(np.maximum(power[strongest] - smooth[strongest], 0)[lobe].sum() / power[strongest].sum()),
+        share=share,
         p_value=(1 + reached) / (1 + drawn),
         energy="neither" if not abs(mean) > ERRORS * error else "feeds" if mean > 0 else "drains",
         power=mean,
