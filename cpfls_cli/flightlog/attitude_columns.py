@@ -110,6 +110,12 @@ class Reading(NamedTuple):
         """Share of the gyroscope that the attitude's derivative explains; 0 where there is nothing to explain."""
         return 0.0 if self.rates is None else self.rates.explained
 
+    def beats_all(self, witnesses: Witnesses) -> bool:
+        """Tell whether it is as named, and no other reading can be so much better that it would be taken."""
+        follows = self.explained > 1 - _AS_GOOD_RATES
+        leans = witnesses.ground is None or self.place_share > 1 - _AS_GOOD_LEAN
+        return self.price == 0 and follows and leans and abs(self.attitude.level) > 1 - _AS_LEVEL
+
     @property
     def world(self) -> str:
         """Axes of the world."""
@@ -292,7 +298,11 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
     if named.unit not in (None, unit):
         seen.disagree(named, unit)
     for _ in range(2):
-        verdict = read_axes(euler_readings(named.scale * known_unit(unit).factor * values, witnesses), witnesses)
+        ways = euler_readings(named.scale * known_unit(unit).factor * values, witnesses)
+        as_named = next(ways)
+        verdict = read_axes([as_named], witnesses)
+        if not verdict.best.beats_all(witnesses):
+            verdict = read_axes([as_named, *ways], witnesses)
         best = verdict.best
         if best.lean is None:
             break

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.attitude_columns import Reading
 from cpfls_cli.flightlog.conversion import to_program_frames
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import ImportSettings
@@ -66,6 +67,14 @@ def test_plain_names_in_si_are_taken_as_they_are(own):
 def test_a_gyroscope_in_its_unit_is_as_large_as_the_turning(own):
     recognition = assert_the_flight_comes_back(flat_log(own), own)
     assert recognition.signal("body_rate").reason.endswith("and is as large, so it is in rad/s")
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2)])
+def test_an_attitude_that_is_as_named_is_read_as_if_all_ways_had_been_tried(own, order, monkeypatch):
+    log = flat_log(own, rate=named(own.rate[:, list(order)], *GYRO))
+    soon = seen(log)
+    monkeypatch.setattr(Reading, "beats_all", lambda *_: False)
+    assert repr(seen(log)) == repr(soon)
 
 
 @pytest.mark.parametrize("order", list(permutations(range(3))))
