@@ -236,7 +236,13 @@ class Stage:
 
     def verdict(self, about: Source) -> list[Box]:
         """Give the verdict on a result, where its template begins with one, for the summary of a report."""
-        return [block for block in page.blocks(self.text(about.record, about=about)) if isinstance(block, Box)]
+        return [block for block in page.blocks(self._wording(about)) if isinstance(block, Box)]
+
+    def _wording(self, about: Source) -> str:
+        """Word a result once for the summary of a report and for its section."""
+        if self.name not in about.wordings:
+            about.wordings[self.name] = self.text(about.record, about=about)
+        return about.wordings[self.name]
 
     def section(self, about: Source, number: int, *, named: bool = False, drawn: bool = True) -> Section:
         """Make the section of a report that shows a result, the first, second, ... of this stage; without its verdict.
@@ -246,7 +252,7 @@ class Stage:
         """
         prefix, anchor = f"{self.name}-{number}-", self.name if number == 1 else f"{self.name}-{number}"
         drawings = pictures(self.figures, prefix, about.record) if drawn else {}
-        blocks = page.blocks(self.text(about.record, about=about), drawings, prefix)
+        blocks = page.blocks(self._wording(about), drawings, prefix)
         shown = (block for block in blocks if not isinstance(block, Box))
         return Section(anchor, self.title, [*([Heading(about.label)] if named else []), *shown])
 

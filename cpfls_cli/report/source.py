@@ -39,6 +39,8 @@ class Source(Generic[R]):
         Linear parameters of the fuzzy part that the study asks for.
     header : store.Origin
         Where it comes from.
+    wordings : dict
+        What its stage says of it, by name of the stage, once that was asked for.
     """
 
     label: str
@@ -48,6 +50,7 @@ class Source(Generic[R]):
     vehicle: VehicleSettings
     parameters: int
     header: store.Origin = field(kw_only=True)
+    wordings: dict[str, str] = field(default_factory=dict, kw_only=True, repr=False, compare=False)
 
     @property
     def format(self) -> str:
