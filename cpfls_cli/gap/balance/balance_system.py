@@ -200,9 +200,16 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
         count += len(flight) * flight.known
     noise = np.sqrt(square / np.maximum(count, 1))
     inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
-    torque, weight = np.sqrt(np.mean(inertial[:, :3] ** 2, axis=0)), np.sqrt(np.mean(inertial[:, 3:] ** 2))
-    moves = np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[weight] * 3])
-    return np.where(count > 0, np.maximum(noise, NEGLIGIBLE * moves), 1.0)
+    return np.where(count > 0, np.maximum(noise, negligible(np.mean(inertial**2, axis=0))), 1.0)
+
+
+def negligible(power: Array) -> Array:
+    """Compute the size of a gap, shape (6,), below which nobody could use a correction.
+
+    `power`: mean squares of torque and force of the motion, shape (6,).
+    """
+    torque, force = np.sqrt(power[:3]), np.sqrt(np.mean(power[3:]))
+    return NEGLIGIBLE * np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[force] * 3])
 
 
 def residual_along(hypothesis: System, number: int, coefficients: Array) -> Columns:

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS, block_length, half_width, jackknife_error
 from cpfls_cli.dynamics.rigid_body import inertia_tensor
 from cpfls_cli.effects.effect import Columns
-from cpfls_cli.gap.balance.balance_system import System, residual_along
+from cpfls_cli.gap.balance.balance_system import System, negligible, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.settings import COUNTS
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, fitting_bands
@@ -96,7 +96,9 @@ class Repeatability:
     @property
     def sure(self) -> BoolArray:
         """Where a gap is repeatable, beyond chance and what hardly counts, shape (channel, band)."""
-        return np.asarray(self.share > np.maximum(half_width(self.share_error, self.blocks, _SURE), COUNTS))
+        shows = self.share > np.maximum(half_width(self.share_error, self.blocks, _SURE), COUNTS)
+        least = negligible(np.clip(np.nan_to_num(self.motion[:, 0]), 0.0, None)) ** 2
+        return np.asarray(shows & (self.repeatable > least[:, None]))
 
     @property
     def known(self) -> list[int]:
@@ -116,8 +118,9 @@ class Repeatability:
         return found or ([Part(slice(0, 1), float(self.low[0]), float(self.high[0]))] if sure[0] else [])
 
     def share_in(self, channel: int, part: Part) -> float:
-        """Compute the repeatable share of a gap in some bands together."""
-        return float(np.nansum(self.repeatable[channel, part.bands]) / np.nansum(self.total[channel, part.bands]))
+        """Compute the repeatable share of a gap in some bands together, all of it at most."""
+        share = np.nansum(self.repeatable[channel, part.bands]) / np.nansum(self.total[channel, part.bands])
+        return min(float(share), 1.0)
 
     def at_most(self, channel: int) -> float:
         """Bound the repeatable share of all of a gap, by 95 %; products that cancel are taken for none."""

@@ -70,6 +70,14 @@ def test_what_the_path_brings_is_repeatable_and_the_rest_is_not(of_two_paths):
     assert np.isnan(found.total[3:]).all()
 
 
+def test_a_gap_that_is_too_small_to_be_of_use_is_not_repeatable(of_two_paths):
+    """As it is, and as shares of a thousandth of its size would be: simulated flights without noise have such."""
+    assert of_two_paths.sure[0, 0]
+    small = replace(of_two_paths, total=1e-6 * of_two_paths.total, repeatable=1e-6 * of_two_paths.repeatable)
+    assert not small.sure.any()
+    assert small.largest is None
+
+
 @pytest.mark.parametrize("band", [0, 3, 4, 5])
 def test_each_band_holds_what_its_windows_see(of_two_paths, band):
     """The same windows laid over what is missing itself."""
