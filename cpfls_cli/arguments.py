@@ -50,16 +50,16 @@ FlownArgument = Annotated[
     ),
 ]
 TrainingArgument = Annotated[
-    list[Path], typer.Argument(metavar="FLIGHT...", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
+    list[Path], typer.Argument(metavar="FLIGHT", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
 ]
 LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help=f"Flight log: {suffixes_in_words()}.")]
 LogsArgument = Annotated[
-    list[Path], typer.Argument(metavar="LOG...", help=f"Flight logs of one vehicle: {suffixes_in_words()}.")
+    list[Path], typer.Argument(metavar="LOG", help=f"Flight logs of one vehicle: {suffixes_in_words()}.")
 ]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 FlightsArgument = Annotated[
     list[Path],
-    typer.Argument(metavar="FLIGHT...", help=f"Flights, or logs ({formats_in_words()}) that the config describes."),
+    typer.Argument(metavar="FLIGHT", help=f"Flights, or logs ({formats_in_words()}) that the config describes."),
 ]
 DisagreementArgument = Annotated[Path, typer.Argument(metavar="DISAGREEMENT", help="Made by `cpfls compare`.")]
 DiagnosisArgument = Annotated[Path, typer.Argument(metavar="DIAGNOSIS", help="Made by `cpfls diagnose`.")]

@@ -116,14 +116,14 @@ def changed(
     run: Run,
     today: Annotated[
         list[Path],
-        typer.Argument(metavar="TODAY...", help=f"Flights, or logs ({formats_in_words()}), to look for a change in."),
+        typer.Argument(metavar="TODAY", help=f"Flights, or logs ({formats_in_words()}), to look for a change in."),
     ],
     since: Annotated[
         list[Path],
         typer.Option(
             "--reference",
             "--since",
-            metavar="FLIGHT...",
+            metavar="FLIGHT",
             help="Flights or logs of the same vehicle from before, three or more, one after another.",
             show_default=False,
         ),

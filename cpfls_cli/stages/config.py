@@ -13,7 +13,7 @@ from cpfls_cli.errors import ConfigError
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, stage
 
-ConfigArgument = Annotated[Path | None, typer.Argument(metavar="[CONFIG]", help="Study config (YAML).")]
+ConfigArgument = Annotated[Path | None, typer.Argument(metavar="CONFIG", help="Study config (YAML).")]
 SectionOption = Annotated[
     list[str] | None, typer.Option("--section", help="Only this section, or section.key; may be repeated.")
 ]

@@ -64,7 +64,7 @@ class Catalogue:
 
 
 NameArgument = Annotated[
-    str | None, typer.Argument(metavar="[NAME]", help="An effect, such as rotor_drag; without it, all are listed.")
+    str | None, typer.Argument(metavar="NAME", help="An effect, such as rotor_drag; without it, all are listed.")
 ]
 
 

@@ -20,7 +20,7 @@ from cpfls_cli.words import did_you_mean
 
 _LONG = "too long to be shown: its values are in the file"
 
-FileArgument = Annotated[Path | None, typer.Argument(metavar="[FILE]", help="Any artifact.")]
+FileArgument = Annotated[Path | None, typer.Argument(metavar="FILE", help="Any artifact.")]
 NameOption = Annotated[
     str | None, typer.Option("--format", metavar="NAME", help="Describe the datasets of a format, such as flight.")
 ]

@@ -52,7 +52,7 @@ _SURFACE = re.compile(r"aileron|elevator|rudder|elevon")
 
 MayLogsArgument = Annotated[
     list[Path] | None,
-    typer.Argument(metavar="LOG...", help=f"Flight logs of one vehicle: {suffixes_in_words()}.", show_default=False),
+    typer.Argument(metavar="LOG", help=f"Flight logs of one vehicle: {suffixes_in_words()}.", show_default=False),
 ]
 FromOption = Annotated[
     Path | None,

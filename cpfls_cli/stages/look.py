@@ -240,7 +240,7 @@ FIGURES = {
 @stage(Look, figures=FIGURES, folder=True)
 def look(
     run: Run,
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help=f"Flight logs: {suffixes_in_words()}.")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG", help=f"Flight logs: {suffixes_in_words()}.")],
 ) -> dict[str, Look] | None:
     """Look into logs, each by itself."""
     named = unique_names(logs)

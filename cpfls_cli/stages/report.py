@@ -22,7 +22,7 @@ from cpfls_cli.stage import Run, kind_of, stage, stage_that_made
 from cpfls_cli.store import read
 from cpfls_cli.version import __version__
 
-ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT...", help="Artifacts to report on.")]
+ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT", help="Artifacts to report on.")]
 FormOption = Annotated[
     Form | None,
     typer.Option("--format", help="Form of the report; default: by the suffix of FILE (.md, .json), else html."),

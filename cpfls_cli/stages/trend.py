@@ -132,7 +132,7 @@ def trend(
     flights: Annotated[
         list[Path],
         typer.Argument(
-            metavar="FLIGHT...", help=f"Flights, logs ({formats_in_words()}), or folders that hold them, in any order."
+            metavar="FLIGHT", help=f"Flights, logs ({formats_in_words()}), or folders that hold them, in any order."
         ),
     ],
     reference: Annotated[

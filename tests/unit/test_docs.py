@@ -7,6 +7,7 @@ import pytest
 import typer
 
 from cpfls_cli.cli.app import app
+from cpfls_cli.cli.stages import ORDER
 from cpfls_cli.config.keys import commented_default
 from cpfls_cli.config.load import parse_config, validate
 
@@ -32,6 +33,11 @@ def test_every_relative_link_leads_somewhere(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_nothing_is_left_to_be_filled_in(page):
     assert not re.findall(r"@@\w*|TODO|FIXME", page.read_text(encoding="utf-8"))
+
+
+def test_the_page_of_commands_has_all_of_them():
+    page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert [name for name in ORDER if not re.search(rf"\bcpfls {name}\b", page)] == []
 
 
 def prose(page):
