@@ -343,11 +343,13 @@ class Stage:
             refuse_inputs(path, run.inputs)
         with filled_folder(output, [*self._names(fills), *(path.name for path in run.texts)]) as folder:
             write_files({folder / path.name: text for path, text in run.texts.items()})
+            made: dict[Path, tuple[Any, store.Origin]] = {}
             for name, each in held.items():
                 stage, before = parts[name]
-                origin = run.origin(stage, name)
+                path, origin = folder / f"{name}.h5", run.origin(stage, name)
                 made_from = {before: input_file(folder / f"{before}.h5")} if before else {}
-                store.write(folder / f"{name}.h5", each, replace(origin, inputs={**made_from, **origin.inputs}))
+                made[path] = each, replace(origin, inputs=dict(sorted({**made_from, **origin.inputs}.items())))
+                store.write(path, *made[path])
             cautions = run.cautions_of(*parts)
             summary = {**plain(given), **({"cautions": list(cautions)} if cautions else {})}
             write_text(folder / f"{self.name}.json", json.dumps(summary, indent=1, allow_nan=False) + "\n")
@@ -355,7 +357,7 @@ class Stage:
                 write_text(folder / name, text(given))
             # Above this module: a report shows results of all stages.
             report = import_module("cpfls_cli.stages.report")
-            write_text(folder / PAGE, report.page_about(run.study, [folder / f"{name}.h5" for name in held]))
+            write_text(folder / PAGE, report.page_about(run.study, made))
 
     def _write(self, run: Run, output: Path, results: Mapping[str, Any]) -> None:
         if self.fills:

@@ -19,7 +19,7 @@ from cpfls_cli.report.content import Form
 from cpfls_cli.report.source import Source, Sources, source_of_result, unique_labels
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage, stage_that_made
-from cpfls_cli.store import read
+from cpfls_cli.store import Origin, read
 from cpfls_cli.version import __version__
 
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT", help="Artifacts to report on.")]
@@ -58,7 +58,9 @@ def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> R
     first = {sha256: path for path, sha256 in reversed(files.items())}
     kept = [path for path, sha256 in files.items() if first[sha256] == path]
     given = Sources(
-        read_sources(kept, [files[path] for path in kept]), vehicle=run.study.vehicle, settings=run.study.report
+        _sources({path: read(path, kind_of(path)) for path in kept}, [files[path] for path in kept]),
+        vehicle=run.study.vehicle,
+        settings=run.study.report,
     )
     again = [f"{path}: given {times} times; shown once" for path, times in Counter(artifacts).items() if times > 1]
     equal = [f"{path}: holds the same as {first[files[path]]}; shown once" for path in files if path not in kept]
@@ -83,18 +85,18 @@ def _written(run: Run, text: str, **more: Any) -> Report | None:
     return None if run.dry_run else Report(output=str(run.output), bytes=len(text.encode()), **more)
 
 
-def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
-    """Read artifacts of any format for a report, each under a name of its own."""
-    labels = map(_printable, unique_labels(paths))
+def _sources(made: Mapping[Path, tuple[Any, Origin]], hashes: Sequence[str]) -> list[Source]:
+    """Name results of any format for a report, each by a name of its own."""
+    labels = map(_printable, unique_labels(list(made)))
     return [
-        source_of_result(*read(path, kind_of(path)), path, label, sha256)
-        for path, label, sha256 in zip(paths, labels, hashes, strict=True)
+        source_of_result(*each, path, label, sha256)
+        for (path, each), label, sha256 in zip(made.items(), labels, hashes, strict=True)
     ]
 
 
-def page_about(study: Study, paths: Sequence[Path]) -> str:
-    """Write the page of files that a stage filled a folder with."""
-    sources = read_sources(paths, [read_content(path).sha256 for path in paths])
+def page_about(study: Study, made: Mapping[Path, tuple[Any, Origin]]) -> str:
+    """Write the page of the results, by file, that a stage filled a folder with."""
+    sources = _sources(made, [read_content(path).sha256 for path in made])
     return report_page(Sources(sources, study.vehicle, study.report), __version__).text
 
 
