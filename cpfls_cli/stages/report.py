@@ -58,9 +58,7 @@ def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> R
     first = {sha256: path for path, sha256 in reversed(files.items())}
     kept = [path for path, sha256 in files.items() if first[sha256] == path]
     given = Sources(
-        _sources({path: read(path, kind_of(path)) for path in kept}, [files[path] for path in kept]),
-        vehicle=run.study.vehicle,
-        settings=run.study.report,
+        read_sources(kept, [files[path] for path in kept]), vehicle=run.study.vehicle, settings=run.study.report
     )
     again = [f"{path}: given {times} times; shown once" for path, times in Counter(artifacts).items() if times > 1]
     equal = [f"{path}: holds the same as {first[files[path]]}; shown once" for path in files if path not in kept]
@@ -83,6 +81,11 @@ def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> R
 def _written(run: Run, text: str, **more: Any) -> Report | None:
     run.texts[run.output] = text
     return None if run.dry_run else Report(output=str(run.output), bytes=len(text.encode()), **more)
+
+
+def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:
+    """Read artifacts of any format for a report."""
+    return _sources({path: read(path, kind_of(path)) for path in paths}, hashes)
 
 
 def _sources(made: Mapping[Path, tuple[Any, Origin]], hashes: Sequence[str]) -> list[Source]:
