@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, jackknife_error
-from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
+from cpfls_cli.effects.catalogue.parameter_error import NUMBERS, shown
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step
@@ -45,21 +45,33 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
     Reference: Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak
     instruments).
     """
-    at, moved = found, np.zeros(len(found.values), dtype=bool)
-    # Shapes are followed where they go; a few steps are enough, and one where there are none.
+    found = at = _of_config(found)
+    moved = np.zeros(len(found.values), dtype=bool)
+    # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
         sources = _sources(at, given)
         if not sources:
             break
         values, left_out = _stepped(at, sources)
-        shapes = slice(len(at.estimates.linear), None)
-        step, error = np.abs(values - at.values)[shapes], jackknife_error(left_out)[shapes]
-        hypothesis = at.hypothesis.with_shapes(values[shapes]) if len(step) else at.hypothesis
+        step, error, shapes = np.abs(values - at.values), jackknife_error(left_out), values[len(at.estimates.linear) :]
+        hypothesis = at.hypothesis.with_shapes(shapes) if len(shapes) else at.hypothesis
         moved = np.any([numbers for _, numbers in sources], axis=0)
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error):
             break
     return at._replace(estimates=_with_unidentified(found, at.estimates, moved))
+
+
+def _of_config(found: NamedFit) -> NamedFit:
+    """Set inertia and couplings of rates to what the config states: a fit gives them those of the loop.
+
+    What instruments do not identify stays there; a coupling of the loop would bias the inertia that they do identify.
+    """
+    kept, linear = shown(np.zeros(3, dtype=bool)), found.estimates.linear.copy()
+    linear[found.hypothesis.places[0][1]] *= kept
+    numbers = zip(found.estimates.parameters, kept, strict=True)
+    stated = tuple(each if keeps else replace(each, value=0.0, low=0.0, high=0.0) for each, keeps in numbers)
+    return found._replace(estimates=replace(found.estimates, linear=linear, parameters=stated))
 
 
 def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]:
@@ -85,7 +97,7 @@ def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]
 def unidentified_axes(found: NamedFit, given: Instruments) -> BoolArray:
     """Mark the body axes, shape (3,), whose inertia instruments do not identify: a fit shows that of the loop."""
     vehicle = found.hypothesis.places[0][1]
-    found_by = [each[vehicle][:3] for _, each in _sources(found, given)]
+    found_by = [each[vehicle][:3] for _, each in _sources(_of_config(found), given)]
     return np.asarray(~np.any([np.zeros(3, dtype=bool), *found_by], axis=0))
 
 

@@ -6,12 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.extended import extend, plain
-from cpfls_cli.gap.naming.by_instruments import _windows_of_runs
+from cpfls_cli.gap.naming.by_instruments import _windows_of_runs, by_instruments
 from cpfls_cli.gap.naming.estimate import fitted
-from cpfls_cli.gap.naming.ranking import block_index
+from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.gap.settings import GapSettings
@@ -101,8 +102,8 @@ def test_a_centre_of_mass_is_told_from_a_constant_torque_in_gusts(flown):
 
 
 def test_an_inertia_that_nothing_was_asked_of_is_told_by_what_was_before(flown):
-    x, y, z = TRUE.vehicle.inertia_kg_m2[:3]
-    stated = replace(TRUE.vehicle, inertia_kg_m2=(x, HEAVY * y, z, *TRUE.vehicle.inertia_kg_m2[3:]))
+    (x, y, z), heavy = TRUE.vehicle.inertia_kg_m2[:3], 1.25
+    stated = replace(TRUE.vehicle, inertia_kg_m2=(x, heavy * y, z, *TRUE.vehicle.inertia_kg_m2[3:]))
     # Nobody knows what was asked along y, so that nothing but the loop rolls.
     along_x = [
         replace(each, setpoints={name: asked * [1, 0, 1] for name, asked in each.setpoints.items()})
@@ -115,7 +116,7 @@ def test_an_inertia_that_nothing_was_asked_of_is_told_by_what_was_before(flown):
     for estimates in (run.estimates, refit.estimates):
         numbers = {each.name: each for each in estimates.parameters}
         assert -0.1 < numbers["inertia_x"].low < 0 < numbers["inertia_x"].high < 0.1
-        assert numbers["inertia_y"].low < 1 / HEAVY - 1 < numbers["inertia_y"].high
+        assert numbers["inertia_y"].low < 1 / heavy - 1 < numbers["inertia_y"].high
 
 
 def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
@@ -128,6 +129,24 @@ def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
     assert effect.name == "motor_lag"
     # The gyroscope's noise is inside of the loop.
     assert number.low < TRUE.lag_s < number.high < 1.25 * TRUE.lag_s
+
+
+def test_what_instruments_identify_hangs_on_no_inertia_that_a_loop_gave_a_fit(flown):
+    recordings = recorded(flown["asked"], TRUE.vehicle, setpoints=True)
+    windows = common_windows(recordings, FEW)
+    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    found = fitted(flights, [], best_floor(system(flights)), FEW)
+    # Inertia, and couplings of rates that no instrument moves.
+    of_loop = found.estimates.linear + np.repeat([-0.3, 0.7, 0.0], [3, 3, 4])
+    given = known_motion(recordings)
+    own, other = (
+        by_instruments(found._replace(estimates=replace(found.estimates, linear=linear)), given).estimates
+        for linear in (found.estimates.linear, of_loop)
+    )
+    assert own.parameters[:6] == other.parameters[:6]
+    x, y, z, *couplings = own.parameters[:6]
+    assert all(each.low < 0 < each.high for each in (x, y))
+    assert all(each.value == 0 for each in (z, *couplings))
 
 
 @pytest.mark.parametrize("kind", ["asked", "again"])
