@@ -162,10 +162,10 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
     calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
     lies = calm & _off_its_feet(signs, flies)
-    rests = held | (active & calm & (lies | _stuck(signs, flies)))
+    rests = active & calm & (lies | _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
     # A mean over a time says as much of all of it.
-    carried = binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
+    carried = held | binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
     return Resting(np.asarray(carried, dtype=bool), np.asarray(lies, dtype=bool))
 
 
@@ -210,10 +210,12 @@ def _held_four(signs: Signs) -> BoolArray:
     """Mark where four rotors ask for a turn that none can fly without, and a vehicle that feels its weight rocks."""
     if signs.rotors is None or signs.rotors.shape[1] != 4 or signs.felt is None or signs.slow is None:
         return np.zeros(len(signs.time), dtype=bool)
-    asked = np.linalg.norm(averaged(_unlike(signs.rotors), signs.period, _REST_S), axis=1)
+    asked = np.linalg.norm(averaged(_unlike(signs.rotors), signs.period, SLOW_S), axis=1) > _HELD_FOUR
     weight = np.linalg.norm(averaged(signs.felt, signs.period, _REST_S), axis=1)
-    turns = averaged(signs.slow, signs.period, _REST_S)
-    return (asked > _HELD_FOUR) & (turns < _HELD_RAD_S) & (weight > _WEIGHT[0]) & (weight < _WEIGHT[1])
+    held = (weight > _WEIGHT[0]) & (weight < _WEIGHT[1]) & (averaged(signs.slow, signs.period, _REST_S) < _HELD_RAD_S)
+    # What has lost two of its rotors falls over within that time.
+    long = np.ones(max(1, round(_LIES_S / signs.period)), dtype=bool)
+    return np.asarray(binary_opening(smoothed(asked & held, signs.period, SLOW_S), long), dtype=bool)
 
 
 def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
@@ -240,6 +242,9 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     rests_then = bool(rests.carried[after : after + 1].any())
     lies_then = rests_then or bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
     marked = _beyond_flight(signs, part, lies_then=lies_then)
+    if rests_then and marked[0][: after - first].any():
+        # What shakes it when it has come to rest ends no flight.
+        marked = tuple(own[: after - first] for own in marked)
     troubled, hits, strained = (first + np.flatnonzero(own) for own in marked)
     stops = _stops_in_the_air(signs, after)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S

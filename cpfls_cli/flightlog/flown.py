@@ -329,11 +329,12 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> Flown
         return FlownPart(None, (f"flies for {too_short(end - begin)}",), flies=False)
     reasons = []
     early = [index for index, own in enumerate(ends) if own]
-    if first > 0 and not any(index < chosen for index in early):
-        reasons.append(f"the first {begin - time[0]:.1f} s are cut: {_how(signs, slice(0, first), how)}")
-    if after < len(time) and not ends[chosen]:
-        last = float(time[-1]) - end
-        reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), how)}")
+    ground, landed = stretches[0][0], stretches[-1][1]
+    if ground > 0 and not any(index < chosen for index in early):
+        reasons.append(f"the first {cut[0][0] - time[0]:.1f} s are cut: {_how(signs, slice(0, ground), how)}")
+    if landed < len(time) and not ends[-1]:
+        last = float(time[-1]) - cut[-1][1]
+        reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(landed, None), how)}")
     others = [f"{time[a]:.1f} to {time[b - 1]:.1f} s" for (a, _), b in zip(stretches, stops, strict=True) if a != first]
     if others:
         reasons.append(f"it also flies at {', '.join(others)}; import.crop_s takes one stretch, the longest")
