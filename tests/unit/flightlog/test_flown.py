@@ -152,7 +152,7 @@ def test_a_sensor_off_the_centre_of_what_vibrates_shows_no_test_stand(held):
     """A vibration of 9.5 Hz turns with the force that its lever makes; on a stand the weight turns slowly too."""
     clock = np.arange(0.0, 30.0, 0.04)
     rng = np.random.default_rng(3)
-    shaking, large = 2 * np.pi * 9.5, 0.2 if held else 0.02
+    shaking, large = 2 * np.pi * 9.5, 0.2 if held else 0.03
     leans = large * np.sin(1.3 * clock)
     turns = 1.5 * np.sin(shaking * clock) + 1.3 * large * np.cos(1.3 * clock)
     rate = np.column_stack([turns, 0 * clock, 0 * clock])
