@@ -244,7 +244,7 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     marked = _beyond_flight(signs, part, lies_then=lies_then)
     if rests_then and marked[0][: after - first].any():
         # What shakes it when it has come to rest ends no flight.
-        marked = tuple(own[: after - first] for own in marked)
+        marked = marked[0][: after - first], marked[1][: after - first], marked[2][: after - first]
     troubled, hits, strained = (first + np.flatnonzero(own) for own in marked)
     stops = _stops_in_the_air(signs, after)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
