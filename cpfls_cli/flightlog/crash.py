@@ -25,6 +25,9 @@ _OVER_S, _OVER = 3.0, 0.2
 # Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
 # below which it does not turn, as a share of what is usual and by itself.
 _STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
+# Difference between four rotors, which have none to spare, that turns every vehicle by 10 rad/s in that time; and the
+# rate below which something else than they must hold it.
+_HELD_FOUR, _HELD_RAD_S = 0.4, 2.0
 # Before the end of a stretch, where a crash is looked for; flight before that, which shows what it does in flight; and
 # the time from its last wild motion to the end, in which no pilot has recovered.
 _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
@@ -151,8 +154,10 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     nowhere = np.zeros(len(active), dtype=bool)
     if signs.slow is None or signs.rate is None or not active.any():
         return Resting(nowhere, nowhere)
-    lively = active & (signs.slow > LIVELY_RAD_S)
-    flies = lively if lively.sum() * signs.period > _FEWEST_S else active
+    held = active & _held_four(signs)
+    free = active & ~held if (active & ~held).any() else active
+    lively = free & (signs.slow > LIVELY_RAD_S)
+    flies = lively if lively.sum() * signs.period > _FEWEST_S else free
     turned = averaged(signs.rate, signs.period, _REST_S)
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
     calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
@@ -160,7 +165,7 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     rests = active & calm & (lies | _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
     # A mean over a time says as much of all of it.
-    carried = binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
+    carried = held | binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
     return Resting(np.asarray(carried, dtype=bool), np.asarray(lies, dtype=bool))
 
 
@@ -195,10 +200,28 @@ def _turned_up(upright: Array, flies: BoolArray) -> Array:
     return np.asarray(upright * (np.sign(np.median(upright[flies])) or 1.0))
 
 
+def _unlike(rotors: Array) -> Array:
+    """Give rotors against their mean, as shares also where a config calls speeds so."""
+    mean = rotors.mean(axis=1, keepdims=True)
+    return np.asarray(np.nan_to_num(rotors - mean) / max(1.0, float(np.nanquantile(mean, 0.98))))
+
+
+def _held_four(signs: Signs) -> BoolArray:
+    """Mark where four rotors ask for a turn that none can fly without, and a vehicle that feels its weight rocks."""
+    if signs.rotors is None or signs.rotors.shape[1] != 4 or signs.felt is None or signs.slow is None:
+        return np.zeros(len(signs.time), dtype=bool)
+    asked = np.linalg.norm(averaged(_unlike(signs.rotors), signs.period, SLOW_S), axis=1) > _HELD_FOUR
+    weight = np.linalg.norm(averaged(signs.felt, signs.period, _REST_S), axis=1)
+    held = (weight > _WEIGHT[0]) & (weight < _WEIGHT[1]) & (averaged(signs.slow, signs.period, _REST_S) < _HELD_RAD_S)
+    # What has lost two of its rotors falls over within that time.
+    long = np.ones(max(1, round(_LIES_S / signs.period)), dtype=bool)
+    return np.asarray(binary_opening(smoothed(asked & held, signs.period, SLOW_S), long), dtype=bool)
+
+
 def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
     if signs.rotors is None or signs.slow is None:
         return np.zeros(len(flies), dtype=bool)
-    unlike = np.nan_to_num(signs.rotors - signs.rotors.mean(axis=1, keepdims=True))
+    unlike = _unlike(signs.rotors)
     asked = np.linalg.norm(averaged(unlike - np.median(unlike[flies], axis=0), signs.period, _REST_S), axis=1)
     turns = averaged(signs.slow, signs.period, _REST_S)
     hardly = turns < min(_HARDLY_RAD_S, _OF_RATE * float(np.median(turns[flies])))
@@ -219,6 +242,9 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     rests_then = bool(rests.carried[after : after + 1].any())
     lies_then = rests_then or bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
     marked = _beyond_flight(signs, part, lies_then=lies_then)
+    if rests_then and marked[0][: after - first].any():
+        # What shakes it when it has come to rest ends no flight.
+        marked = marked[0][: after - first], marked[1][: after - first], marked[2][: after - first]
     troubled, hits, strained = (first + np.flatnonzero(own) for own in marked)
     stops = _stops_in_the_air(signs, after)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S

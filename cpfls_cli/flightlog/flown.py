@@ -188,13 +188,16 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
     """Mark where the rotors carry the vehicle, or idle in free fall and in flips: then it turns, and not for long."""
     level, rate = signs.level, signs.turning
     assert level is not None, "asked for"
-    hover = float(np.median(level[level > _OF_LARGEST * largest]))
+    # Thrust goes as the square of the level, or with it: who mostly climbs hovers at less than his usual level.
+    felt = None if signs.felt is None else averaged(np.linalg.norm(signs.felt, axis=1), signs.period, _TURN_S)
+    of_hover = level if felt is None else level / np.sqrt(np.maximum(felt, 1.0))
+    hover = float(np.median(of_hover[level > _OF_LARGEST * largest]))
     carrying = np.asarray(level > _OF_HOVER * hover, dtype=bool)
     if rate is not None and carrying.any():
         turns = np.sqrt(averaged(rate**2, signs.period, _SHORT_S))
         lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
-        if signs.felt is not None:
-            lively |= averaged(np.linalg.norm(signs.felt, axis=1), signs.period, _TURN_S) < _FALLS
+        if felt is not None:
+            lively |= felt < _FALLS
         stands = level <= ALIVE
         for first, after in runs(stands):
             # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
@@ -268,15 +271,17 @@ def _held(signs: Signs, active: BoolArray) -> str:
             return f"rotor {idle[0] + 1} hardly works, and it does not spin"
     if signs.body_rate is None or signs.felt is None:
         return ""
-    # At rest the weight turns through the body as the body turns; in the air it stays along the rotors' axis.
-    turns, felt = (averaged(each, signs.period, _TURN_S) for each in (signs.body_rate, signs.felt))
-    turned = -np.cross(turns - np.median(turns, axis=0), felt)[active, :2]
-    moved = np.gradient(felt, signs.period, axis=0)[active, :2]
-    power, both = float((turned**2).mean()), float((turned * moved).mean())
-    if power < _SWINGS_RAD_S**2:
-        return ""
-    alike = both / np.sqrt(power * float((moved**2).mean()) + 1e-12)
-    return "the weight turns through it as it turns" if min(both / power, alike) > _AS_HELD else ""
+    # At rest the weight turns through the body as the body turns; in the air it stays along the rotors' axis. Where an
+    # accelerometer sits off the centre of a vehicle that vibrates, forces and turning are alike too, but not slowly.
+    for over_s in (_TURN_S, SLOW_S):
+        turns, felt = (averaged(each, signs.period, over_s) for each in (signs.body_rate, signs.felt))
+        turned = -np.cross(turns - np.median(turns, axis=0), felt)[active, :2]
+        moved = np.gradient(felt, signs.period, axis=0)[active, :2]
+        power, both = float((turned**2).mean()), float((turned * moved).mean())
+        alike = both / np.sqrt(power * float((moved**2).mean()) + 1e-12)
+        if power < _SWINGS_RAD_S**2 or min(both / power, alike) < _AS_HELD:
+            return ""
+    return "the weight turns through it as it turns"
 
 
 def _leans(signs: Signs, active: BoolArray) -> float | None:
@@ -324,11 +329,12 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> Flown
         return FlownPart(None, (f"flies for {too_short(end - begin)}",), flies=False)
     reasons = []
     early = [index for index, own in enumerate(ends) if own]
-    if first > 0 and not any(index < chosen for index in early):
-        reasons.append(f"the first {begin - time[0]:.1f} s are cut: {_how(signs, slice(0, first), how)}")
-    if after < len(time) and not ends[chosen]:
-        last = float(time[-1]) - end
-        reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(after, None), how)}")
+    ground, landed = stretches[0][0], stretches[-1][1]
+    if ground > 0 and not any(index < chosen for index in early):
+        reasons.append(f"the first {cut[0][0] - time[0]:.1f} s are cut: {_how(signs, slice(0, ground), how)}")
+    if landed < len(time) and not ends[-1]:
+        last = float(time[-1]) - cut[-1][1]
+        reasons.append(f"the last {last:.1f} s are cut: {_how(signs, slice(landed, None), how)}")
     others = [f"{time[a]:.1f} to {time[b - 1]:.1f} s" for (a, _), b in zip(stretches, stops, strict=True) if a != first]
     if others:
         reasons.append(f"it also flies at {', '.join(others)}; import.crop_s takes one stretch, the longest")

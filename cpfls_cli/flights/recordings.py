@@ -24,6 +24,7 @@ from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster
 from cpfls_cli.flights.flight import Imported, read_whole
 from cpfls_cli.flights.imported import commanded_speed, imported
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
@@ -173,7 +174,15 @@ def _recording(flight: ReadFlight, study: Study) -> tuple[Recording, tuple[str, 
     signals, notes = signals_of(flight, known, study)
     if signals.rotor_speed is not None:
         require_rotors(study)
-    return Recording(flight.name, signals, flight.begins), (*warnings, *notes, *doubts_on_voltage(known, flight.units))
+    hz, slow = flight.updated_hz.get("rotor_speed" if "rotor_speed" in known else "rotor_command"), ""
+    if hz is not None and hz < SLOW_HZ:
+        slow = (
+            f"the rotors are logged {hz:.2g} times a second, which shows no motion above {hz / 2:.2g} Hz: inertia, drag"
+            f" factor, lag and effects on the torque cannot be found; first"
+            f" {log_faster('rotors and body rates', FAST_HZ, flight.system)}"
+        )
+    notes = (*warnings, *notes, *doubts_on_voltage(known, flight.units))
+    return Recording(flight.name, signals, flight.begins, slow), notes
 
 
 def require_rotors(study: Study) -> None:
@@ -428,8 +437,11 @@ def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
     # A flight whose windows are refused as a whole is refused for another reason than its length.
     common_windows([flight], settings)
     cut = 2 * len(flight.signals) // 3
-    training = Recording(f"{flight.name} (first two thirds)", stretch_of(flight.signals, slice(0, cut)), flight.begins)
-    last = Recording(f"{flight.name} (last third)", stretch_of(flight.signals, slice(cut, None)), flight.begins)
+    parts = {" (first two thirds)": slice(0, cut), " (last third)": slice(cut, None)}
+    training, last = (
+        replace(flight, name=flight.name + which, signals=stretch_of(flight.signals, part))
+        for which, part in parts.items()
+    )
     try:
         common_windows([training, last], settings)
     except InputError as error:

@@ -363,8 +363,12 @@ def _concluded(
     if effects:
         remains = gap_remains(before, after, remainder, settings.named_share, len(named))
     verdict = verdict_of(effects, rivals, remains, tuple(removed.values()) or (1.0,), excited, settings)
-    # A fit that asks for numbers that no vehicle has says that the log is wrong, not the vehicle.
-    wrong = (*audited.contradictions, *contradictions(impossible(impossible_ratios(estimates.parameters))))
+    # A fit that asks for numbers that no vehicle has says that the log is wrong, not the vehicle; or that its rotors,
+    # held between rare samples, do not turn it.
+    ratios = impossible_ratios(estimates.parameters)
+    if any(each.slow_rotors for role in flown for each in role):
+        ratios = {name: ratio for name, ratio in ratios.items() if name == "thrust_scale"}
+    wrong = (*audited.contradictions, *contradictions(impossible(ratios)))
     if not (wrong or differ) and verdict in (GapVerdict.UNEXPLAINED, GapVerdict.PARTIAL):
         # A gap that is left may be that of another vehicle.
         differ = _changed_between(*flown)

@@ -24,6 +24,7 @@ class RecordedFlight:
     begins: float = about(
         "stamp of the log's own clock at time 0 of the flight; not finite where there is none", unit="s", gaps=True
     )
+    slow_rotors: str = about("what rotors that are logged rarely do not show, and the remedy", default="")
     time: Array = about("time on the clock of the flight", "sample", unit="s")
     body_rate: Array = about("body rates p, q, r, as logged", "sample", "axis", unit="rad/s", frame=_BODY)
     attitude: Array | None = about(
@@ -65,6 +66,7 @@ class RecordedFlight:
             role=role,
             commanded=signals.commanded,
             begins=recording.begins,
+            slow_rotors=recording.slow_rotors,
             setpoint_position=asked,
             **held,
         )
@@ -87,7 +89,7 @@ class RecordedFlight:
             setpoints=asked,
             **held,
         )
-        return Recording(self.name, signals, self.begins)
+        return Recording(self.name, signals, self.begins, self.slow_rotors)
 
 
 SIGNALS = tuple(each.name for each in described_fields(RecordedFlight) if each.about and each.about.axes)

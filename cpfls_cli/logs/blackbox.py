@@ -21,6 +21,7 @@ _LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
 # Cells of a battery, and the largest voltage of one, as the header has it, from which on it is in hundredths.
 _MOST_CELLS, _HUNDREDTHS = 15, 100
+_WRITERS = ("Betaflight", "INAV", "Cleanflight", "EmuFlight", "Rotorflight")
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -73,6 +74,9 @@ def _contents(content: bytes) -> LogContents:
     stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
     parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
     system, first = header.get("Firmware revision", ""), {"": 1e-6 * float(rows[0, 1])} if len(rows) else {}
+    if header.get("Firmware type") == "Cleanflight" and "setpoint[0]" in columns and not system.startswith(_WRITERS):
+        # A fork under a name of its own: Betaflight calls itself so, and its kin alone log setpoints.
+        system = f"Betaflight, as {system}"
     return LogContents({"": columns}, units, parameters, system, (lost,) if broken else (), _flown_at(header), first)
 
 
@@ -178,7 +182,7 @@ def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
         scales += [("gyro", gyro / finer if gyro > 1e-5 else 1e6 * gyro * _DEGREES, "deg/s")]
     if int(header.get("acc_1G", "0")) > 0:
         scales += [("accSmooth[", 1 / int(header["acc_1G"]), "g")]
-    if version[0] == "Betaflight" and version[1] >= (3, 1):
+    if version[0] not in ("INAV", "Cleanflight") and version[1] >= (3, 1):
         scales += [(f"setpoint[{axis}]", 1 / finer, "deg/s") for axis in range(3)]
         scales += [("imuQuaternion[", 1 / _LARGEST_SHORT, "1")]
     cells = max(map(int, header.get("vbatcellvoltage", "0").split(",")))

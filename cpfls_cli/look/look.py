@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.errors import about as about_
+from cpfls_cli.flightlog.crash import MOMENTS
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.look.answers import Answer, Found, NextStep, answers_of, next_steps
 from cpfls_cli.look.balance import Balance, balance_of
@@ -63,8 +64,9 @@ class Look:
 
     @property
     def warned(self) -> list[Event]:
-        """Events that want a look, but for what the autopilot said."""
-        return [event for event in self.events if event.severity == "warning" and event.kind != "message"]
+        """Events that want a look, but for what the autopilot said; what ended a flight first."""
+        found = [event for event in self.events if event.severity == "warning" and event.kind != "message"]
+        return sorted(found, key=lambda event: event.kind not in MOMENTS)
 
     @property
     def uneven(self) -> tuple[int, ...]:

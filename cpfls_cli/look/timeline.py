@@ -32,9 +32,9 @@ _ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S = 1e-4, 0.985, 3, 0.05
 """Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus at a smaller one
 that make it one; and how long a rotor is there, s."""
 
-_LIES, _LIES_S, _HARD, _HARD_S = -0.7, 1.0, 3.0, 1.5
-"""Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity, and how
-long before the end of a flight it may come, s."""
+_LIES, _LIES_S, _HARD, _BEYOND, _HARD_S = -0.7, 1.0, 3.0, 1.5, 1.5
+"""Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity and
+times the largest of its flight, and how long before the end of a flight it may come, s."""
 
 _READS: Final = 0.12
 """By which an accelerometer at rest may differ from gravity, share of it: the largest offset by its data sheets."""
@@ -198,7 +198,7 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
             yield Event(time_s=begin if lifted is None else lifted, kind="take-off", text="takes off")
         if any(end - _NEAR_S <= at < end + _NEAR_S for _, at in ends):
             continue
-        touch = _landing(flight, end, end if landed is None else landed)
+        touch = _landing(flight, begin, end, end if landed is None else landed)
         stopped = touch.severity == "warning"
         if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows), stopped)):
             yield touch
@@ -210,12 +210,14 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
         yield Event(time_s=at, kind=what, text=words, severity=severity)
 
 
-def _landing(flight: LogFlight, end: float, at: float) -> Event:
+def _landing(flight: LogFlight, begin: float, end: float, at: float) -> Event:
     sensor = flight.accelerometer
     if sensor is not None:
+        felt = np.nan_to_num(np.linalg.norm(sensor.values, axis=1)) / STANDARD_GRAVITY
         rows = np.flatnonzero((sensor.time >= end - _HARD_S) & (sensor.time <= max(at, end) + _NEAR_S))
-        sizes = np.nan_to_num(np.linalg.norm(sensor.values[rows], axis=1)) / STANDARD_GRAVITY
-        if sizes.max(initial=0.0) > _HARD:
+        sizes, before = felt[rows], felt[(sensor.time >= begin) & (sensor.time < end - _HARD_S)]
+        # What its rotors make in flight is no ground.
+        if sizes.max(initial=0.0) > max(_HARD, _BEYOND * before.max(initial=0.0)):
             # It is then that it touches the ground; the autopilot takes a while to be sure.
             touches, text = float(sensor.time[rows[sizes.argmax()]]), f"lands hard, with {sizes.max():.2g} g"
             return Event(time_s=touches, kind="landing", text=text, severity="warning")

@@ -87,11 +87,15 @@ def windows(period: float, window_s: float, overlap: float) -> Windows:
 
 @dataclass(frozen=True)
 class Recording:
-    """A flight and its name, and the stamp of its log's own clock at time 0, s; NaN where there is none."""
+    """A flight and its name, and the stamp of its log's own clock at time 0, s; NaN where there is none.
+
+    `slow_rotors`: what cannot be found where its log holds the rotors rarely, and the remedy; empty elsewhere.
+    """
 
     name: str
     signals: Signals
     begins: float = np.nan
+    slow_rotors: str = ""
 
 
 class WindowSettings(Protocol):

@@ -104,6 +104,24 @@ def held(own):
     return then(own, 8.0, rotors=ONE_AT_FULL)
 
 
+def rocks_on_the_ground(own):
+    """Hover calmly, hit the ground, and rock on the feet with one motor at full."""
+    calm = type(own)(**vars(own))
+    calm.rate, calm.speed = 0.02 * own.rate, own.speed.mean() + 0.1 * (own.speed - own.speed.mean())
+    struck = then(then(calm, 0.04, rate=-14.0, felt=(30.0, -20.0, 40.0), rotors=1.0), 1.0, rotors=1.0)
+    rocks = then(struck, 25.0, rotors=ONE_AT_FULL)
+    late = rocks.time > struck.time[-1]
+    rocks.rate[late] += 0.6 * np.sin(4 * rocks.time[late, None])
+    return rocks
+
+
+def leans_on_a_wall(own):
+    """Lean against something three metres higher, with two rotors near full."""
+    leans = then(own, 20.0, felt=(0.0, 4.7, 8.6), rotors=(1.5, 0.4, 0.9, 1.4), roll=0.5)
+    leans.position[len(own.time) :, 2] = own.position[:, 2].max() + 3.0
+    return leans
+
+
 def carried(own):
     """Land, and be carried home."""
     rng = np.random.default_rng(7)

@@ -9,11 +9,13 @@ from cpfls_cli.effects.effect import Columns, hub_wrench, stack
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import equations, fit
+from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.naming.estimate import estimates, fitted
 from cpfls_cli.gap.naming.open_questions import with_unnamed
 from cpfls_cli.gap.naming.ranking import best_floor, block_index, rank_effects
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.weak_form.windows import Recording
 from tests.builders.closed_loop_flights import flown, signals_of
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
@@ -151,6 +153,20 @@ def test_a_log_with_reversed_yaw_is_told_and_not_built_into_the_model():
     assert numbers["inertia_z"].impossible
     assert not numbers["inertia_x"].impossible
     assert found.linear[2] == pytest.approx(-0.9)
+
+
+@pytest.mark.parametrize(("slow", "accused"), [("", True), ("the rotors are logged 10 times a second", False)])
+def test_rotors_that_are_logged_rarely_accuse_no_log_of_reversed_yaw(slow, accused):
+    """Commands that are held between rare samples turn nothing, whatever their signs."""
+    reversed_yaw = replace(VEHICLE, rotors=tuple(replace(rotor, spin=-rotor.spin) for rotor in VEHICLE.rotors))
+    flights = [noisy(fly(seed), np.random.default_rng(seed)) for seed in (1, 2, 3)]
+    recordings = [
+        Recording(f"flight {number}", replace(each, vehicle=reversed_yaw), slow_rotors=slow)
+        for number, each in enumerate(flights)
+    ]
+    few = GapSettings(shifts=39)
+    found = diagnose(recordings[:2], recordings[2:], few, np.random.default_rng(1)).diagnosis
+    assert any("inertia about z" in each for each in found.contradictions) is accused
 
 
 def test_a_lag_moves_when_a_damping_comes_beside_it():

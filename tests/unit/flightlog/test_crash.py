@@ -54,6 +54,18 @@ def test_a_crash_begins_where_rotors_at_their_limit_no_longer_hold_it(own):
     assert found.ended == f"loss of control at {found.span_s[1] + 0.02:.1f} s, impact at 43.0 s"
 
 
+def test_what_rocks_on_the_ground_after_a_crash_is_not_taken_for_the_flight(own):
+    found = flown(ended.rocks_on_the_ground(own), ("force",))
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.1))
+    assert found.ended == "impact at 40.0 s"
+
+
+def test_what_leans_on_something_high_above_the_ground_does_not_fly(own):
+    found = flown(ended.leans_on_a_wall(own))
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.5))
+    assert "it rests on something, with its rotors on" in found.ended
+
+
 def test_a_fall_that_ends_with_a_jolt_is_an_impact(own):
     found = flown(ended.falls_and_hits(own))
     assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.1))

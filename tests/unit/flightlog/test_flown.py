@@ -134,3 +134,41 @@ def test_a_cut_throttle_in_free_fall_is_part_of_the_flight():
 def test_rotors_that_rise_on_the_ground_do_not_fly_before_it_moves():
     flown = flown_by(between(5, 35, 0.5), None, turning(20, 35))
     assert flown.stretches_s[0][0] == pytest.approx(20.5, abs=0.4)
+
+
+def test_who_mostly_climbs_hovers_below_the_usual_level():
+    """Rotors at three times the level of hover in punch-outs; at the end the vehicle hovers and hardly turns."""
+    climbs = (TIME > 3) & (TIME < 30) & (TIME % 4 < 1.5)
+    level = np.where(climbs, 0.8, between(2, 38, 0.26))
+    rate = np.column_stack([turning(2, 30, 4.0) + turning(30, 38, 0.15), 0 * TIME, 0 * TIME])
+    force = np.column_stack([0 * TIME, 0 * TIME, np.where(climbs, 9.4, 1.0)])
+    rotors = np.repeat(level[:, None], 4, axis=1)
+    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=force))
+    assert flown.span_s == (pytest.approx(2.5, abs=0.1), pytest.approx(37.5, abs=0.1))
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_sensor_off_the_centre_of_what_vibrates_shows_no_test_stand(held):
+    """A vibration of 8 Hz turns with the force that its lever makes; on a stand the weight turns slowly too."""
+    clock = np.arange(0.0, 30.0, 0.04)
+    rng = np.random.default_rng(3)
+    shaking, large = 2 * np.pi * 8.0, 0.2 if held else 0.06
+    leans = large * np.sin(1.3 * clock)
+    turns = np.sin(shaking * clock) + 1.3 * large * np.cos(1.3 * clock)
+    rate = np.column_stack([turns, 0 * clock, 0 * clock])
+    lever = -1.2e-3 * shaking * np.cos(shaking * clock)
+    force = np.column_stack([0 * clock, lever + (np.sin(leans) if held else 0.0), 1.0 + 0 * clock])
+    force += 1e-4 * rng.standard_normal(force.shape)
+    rotors = 0.5 + 0.02 * rng.standard_normal((len(clock), 4))
+    flown = find_flown(Signs(time=clock, rotors=rotors, body_rate=rate, force=force))
+    assert flown.flies != held
+    assert ("as on a test stand" in "".join(flown.reasons)) == held
+
+
+def test_what_is_cut_is_said_of_what_does_not_fly():
+    flown = flown_by(between(5, 14, 0.5) + between(20, 35, 0.5), None, turning(5, 14) + turning(20, 35))
+    assert [reason.split(":")[0] for reason in flown.reasons] == [
+        "the first 5.5 s are cut",
+        "the last 5.5 s are cut",
+        "it also flies at 5.0 to 14.0 s; import.crop_s takes one stretch, the longest",
+    ]

@@ -102,6 +102,15 @@ def test_older_and_other_programs_have_other_units(read):
     assert factors("Cleanflight 2.0", 1e-6 * radians) == pytest.approx([1 / 16.4, 1.0])
 
 
+def test_a_fork_of_betaflight_under_a_name_of_its_own_is_its_kin(read):
+    names = {f"axisI{axis}": f"setpoint[{axis}]" for axis in range(3)}
+    content = header(**{"Firmware revision": "Otherflight 4.3.4 (norevision)"}) + b"".join(frames(flight()))
+    contents = read(renamed(content, **names))
+    assert contents.system == "Betaflight, as Otherflight 4.3.4 (norevision)"
+    assert contents.units["setpoint[0]"] == "deg/s"
+    assert read(content).system == "Otherflight 4.3.4 (norevision)"
+
+
 def test_what_is_broken_costs_the_frames_up_to_the_next_whole_one(read):
     rows = flight()
     parts = frames(rows)

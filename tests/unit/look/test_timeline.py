@@ -241,6 +241,13 @@ def test_a_hard_landing():
     assert of(events(drifting), "landing") == [(25.1, "lands hard, with 6.1 g")]
 
 
+def test_a_force_that_its_rotors_made_before_is_no_hard_landing():
+    own = with_ground(flight(seconds=20.0))
+    for at in (10.0, 14.0, 25.1):
+        own.specific_force[np.abs(own.time - at) < 0.02] = [0.0, 0.0, 60.0]
+    assert [text for _, text in of(events(logs.ardupilot(own)), "landing")] == ["lands"]
+
+
 def test_what_tips_over_long_after_it_landed():
     tipped = ended.then(HOP, 5.0, felt=ended.UPSIDE_DOWN, roll=np.pi)
     (begin, text), *more = of(events(logs.ardupilot(tipped)), "lies")

@@ -361,6 +361,16 @@ def test_a_rotor_that_loses_thrust_is_the_answer():
     assert facts["Next"].startswith("Look at propeller and motor")
 
 
+def test_rotors_that_are_logged_rarely_are_said_first():
+    record = diagnosis("UNEXPLAINED", named=())
+    slow = "the rotors are logged 10 times a second; first log them faster"
+    flights = {name: replace(each, slow_rotors=slow) for name, each in record.recorded.items()}
+    first = next(iter(flights.values())).name
+    box, *_ = screen(replace(record, recorded=flights))
+    assert box.sentences[0] == f"{first}: {slow}."
+    assert not any(slow in sentence for sentence in screen(record)[0].sentences)
+
+
 @pytest.mark.parametrize(
     ("named", "words"),
     [
