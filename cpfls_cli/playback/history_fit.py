@@ -89,7 +89,7 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
 
 
 def errors_with_past(fitted: FittedNumbers, observer: Observer, windows: FitWindows) -> Array:
-    """Weigh the errors of windows as the fit does; see `window_errors`."""
+    """Weigh the errors of windows as the fit does, shape (window,)."""
     at = _vehicle(fitted)
     (begun,) = (_Begun.of(at, each, observer.past_s) for each in side_by_side([windows]))
     return losses_of(begun.flown(at, begun.pushed(observer)), begun.windows.loss)

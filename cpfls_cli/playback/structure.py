@@ -10,18 +10,18 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.evolution.ranking import comparable
 from cpfls_cli.playback.fit import (
+    Fits,
     Fitted,
     FittedNumbers,
     FitWindows,
-    HeldOut,
+    WindowSet,
     fit,
     fit_parts,
     stays_error,
-    window_errors,
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -100,7 +100,7 @@ class Judged:
     Attributes
     ----------
     error : float
-        Mean over windows of all parts; see `window_errors`.
+        Mean over windows of all parts; about 1.1 for rates that stay.
     by_block : array, shape (block,)
         The same by flight, or by pieces of few flights; equal for all structures.
     condition_number : float
@@ -232,37 +232,55 @@ class _Bench:
     _outlooks: dict[Structure, Outlook] = field(default_factory=dict)
 
     @cached_property
+    def windows(self) -> WindowSet:
+        """Windows of all parts."""
+        return WindowSet(tuple(each for part in self.parts for each in part))
+
+    @cached_property
+    def part(self) -> IntArray:
+        """Which part they are of."""
+        return np.repeat(np.arange(len(self.parts)), [len(part) for part in self.parts])
+
+    @cached_property
     def stays(self) -> float:
         """Error of rates that stay, over the windows of all parts."""
-        windows = [each for part in self.parts for each in part]
-        counts = [len(each.starts) for each in windows]
-        return float(np.average([stays_error(each) for each in windows], weights=counts))
+        errors = [stays_error(each) for each in self.windows.windows]
+        return float(np.average(errors, weights=self.windows.counts))
 
     def judge(self, structure: Structure, *starts: Start, first: VehicleSettings | None = None) -> Judged:
         """Fit and judge a structure, from the best of some starts; fitted to another vehicle first, if one is given."""
         if structure not in self.known:
             kept = self.kept.get(structure)
-            fits = self._fits(structure, starts, first) if kept is None else self._rebuilt(structure, kept)
-            self.known[structure] = _judged(structure, *fits)
+            whole, held = self._fits(structure, starts, first) if kept is None else self._rebuilt(structure, kept)
+            errors = [each for _, aside in held for each in aside]
+            self.known[structure] = Judged(
+                structure,
+                float(np.concatenate(errors).mean()),
+                block_errors(errors),
+                len(whole.values),
+                whole.condition_number,
+                whole,
+                tuple(fitted for fitted, _ in held),
+            )
             if kept is None:
                 self.progress(tuple(self.known.values()), max(self.expected, len(self.known)))
         return self.known[structure]
 
-    def _fits(
-        self, structure: Structure, starts: tuple[Start, ...], first: VehicleSettings | None
-    ) -> tuple[Fitted, tuple[HeldOut, ...]]:
+    def _fits(self, structure: Structure, starts: tuple[Start, ...], first: VehicleSettings | None) -> Fits:
         begun = starts or (self._nearest(structure),)
         if first is not None:
             free = structure.free(first)
-            windows = [each for part in self.parts for each in part]
-            begun = (free.named(fit(free, windows, begun[0], _SEARCH_STEPS, _SEARCH_TOLERANCE).values),)
-        return fit_parts(structure.free(self.vehicle), self.parts, begun, _SEARCH_STEPS, _SEARCH_TOLERANCE)
+            found = fit(free, self.windows.windows, begun[0], _SEARCH_STEPS, _SEARCH_TOLERANCE)
+            begun = (free.named(found.values),)
+        free = structure.free(self.vehicle)
+        return fit_parts(free, self.windows, self.part, begun, _SEARCH_STEPS, _SEARCH_TOLERANCE)
 
-    def _rebuilt(self, structure: Structure, kept: Solution) -> tuple[Fitted, tuple[HeldOut, ...]]:
+    def _rebuilt(self, structure: Structure, kept: Solution) -> Fits:
         free = structure.free(self.vehicle)
         whole, *without = (FittedNumbers(free, *each) for each in zip(kept.values, kept.losses, strict=True))
-        held = (HeldOut(each, window_errors(each, part)) for each, part in zip(without, self.parts, strict=True))
-        return Fitted(free, whole.values, whole.loss, kept.hessian), tuple(held)
+        sets = (WindowSet(tuple(part)) for part in self.parts)
+        held = [(each, own.errors(free, each.values)) for each, own in zip(without, sets, strict=True)]
+        return Fitted(free, whole.values, whole.loss, kept.hessian), held
 
     def _nearest(self, structure: Structure) -> Start:
         """Give the values of the known structure that differs in the fewest blocks; the better one of two."""
@@ -285,22 +303,8 @@ class _Bench:
             union = Structure(asked, own.rules).free(self.vehicle)
             absent = {number.name: number.absent for number in union.numbers}
             values = union.values(absent | near.fit.free.named(near.fit.values))
-            self._outlooks[own] = found = Outlook.of(union, values, self.parts)
+            self._outlooks[own] = found = Outlook.of(union, values, self.windows, self.part)
         return found
-
-
-def _judged(structure: Structure, whole: Fitted, held: tuple[HeldOut, ...]) -> Judged:
-    errors = [each for part in held for each in part.errors]
-    without, joined = tuple(each.fitted for each in held), np.concatenate(errors)
-    return Judged(
-        structure,
-        float(joined.mean()),
-        block_errors(errors),
-        len(whole.values),
-        whole.condition_number,
-        whole,
-        without,
-    )
 
 
 def tried_blocks(

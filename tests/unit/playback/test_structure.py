@@ -10,7 +10,7 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback import structure
-from cpfls_cli.playback.fit import fit, window_errors
+from cpfls_cli.playback.fit import WindowSet, fit
 from cpfls_cli.playback.flight import motion_at
 from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.parameters import blocks_of
@@ -242,6 +242,7 @@ def test_flights_that_are_logged_fast_are_flown_in_steps_of_several_samples():
         weight[np.arange(len(weight)) % 5 != 4] = 0.0
         return replace(each, loss=Loss(weight, delta), every=1)
 
-    coarse, fine = (window_errors(found, own) for own in (windows, [of_all_samples(each) for each in windows]))
+    sets = (WindowSet(tuple(own)) for own in (windows, map(of_all_samples, windows)))
+    coarse, fine = (own.errors(found.free, found.values) for own in sets)
     assert np.concatenate(coarse) == pytest.approx(np.concatenate(fine), rel=0.05)
     assert np.concatenate(coarse).mean() == pytest.approx(np.concatenate(fine).mean(), rel=0.005)
