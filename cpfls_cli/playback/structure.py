@@ -220,7 +220,7 @@ class _Bench:
     """Judges structures; remembers all, and starts each fit from the nearest that is known.
 
     What a stopped search has kept becomes known only when it is asked for, so that the fits after it start from where
-    they would have started.
+    they would have started. `responses` are the blocks whose gain is not predicted: each is a start of its own.
     """
 
     vehicle: VehicleSettings
@@ -228,6 +228,7 @@ class _Bench:
     progress: Progress
     expected: int
     kept: Kept
+    responses: tuple[str, ...]
     known: dict[Structure, Judged] = field(default_factory=dict)
     _outlooks: dict[Structure, Outlook] = field(default_factory=dict)
 
@@ -248,7 +249,10 @@ class _Bench:
         return float(np.average(errors, weights=self.windows.counts))
 
     def judge(self, structure: Structure, *starts: Start, first: VehicleSettings | None = None) -> Judged:
-        """Fit and judge a structure, from the best of some starts; fitted to another vehicle first, if one is given."""
+        """Fit and judge a structure, from the best of some starts; fitted to another vehicle first, if one is given.
+
+        The last of the starts is flown once only where it is the best.
+        """
         if structure not in self.known:
             kept = self.kept.get(structure)
             whole, held = self._fits(structure, starts, first) if kept is None else self._rebuilt(structure, kept)
@@ -330,7 +334,9 @@ def choose(
     end.
     """
     blocks = tried_blocks(vehicle, flights, settings)
-    bench = _Bench(vehicle, parts_of(flights, settings), progress, len(blocks), kept)
+    # A first answer has one start, from which any response is added as other blocks are.
+    responses = () if settings.quick else _ACTUATION
+    bench = _Bench(vehicle, parts_of(flights, settings), progress, len(blocks), kept, responses)
     complete, added = True, None
     try:
         added = _grow(bench, blocks)
@@ -351,7 +357,7 @@ def _grow(bench: _Bench, blocks: tuple[str, ...]) -> Judged:
     # then no explanation is worth anything.
     open_ = bench.vehicle.unknown
     guessed = replace(bench.vehicle, unknown=tuple(name for name in open_ if name != INERTIA))
-    kinds = ((), *((block,) for block in _ACTUATION if block in blocks))
+    kinds = ((), *((block,) for block in bench.responses if block in blocks))
     starts = [bench.judge(Structure(kind), {}, first=guessed if INERTIA in open_ else None) for kind in kinds]
     grown = [_explore(bench, each, named) for each in starts]
     for present in ascending(grown, lambda each: each.error)[:_FITTED]:
@@ -369,7 +375,7 @@ def _explore(bench: _Bench, centre: Judged, blocks: tuple[str, ...]) -> Judged:
     The best and the simplest as predicted are fitted; the better of them, or the centre, comes back.
     """
     inside = centre.structure.blocks
-    open_ = tuple(block for block in blocks if block in inside or block not in _ACTUATION)
+    open_ = tuple(block for block in blocks if block in inside or block not in bench.responses)
     outlook = bench.outlook(centre, open_)
     errors: dict[Structure, Array] = {}
 
@@ -390,7 +396,7 @@ def _explore(bench: _Bench, centre: Judged, blocks: tuple[str, ...]) -> Judged:
         if not _keeps_up(bench, errors[fewer], errors[best], 1.0):
             break
         simplest = fewer
-    found = [bench.judge(each, outlook.start(each.blocks), centre.start(each)) for each in (best, simplest)]
+    found = [bench.judge(each, centre.start(each), outlook.start(each.blocks)) for each in (best, simplest)]
     return smallest([centre, *found], lambda each: each.error)
 
 
@@ -470,7 +476,7 @@ def _judge_hopeful(bench: _Bench, near: Judged, others: Sequence[Structure], mos
     errors = {each: outlook.errors(each.blocks) for each in new}
     for each in ascending(new, lambda each: float(errors[each].mean()))[:_FITTED]:
         if _keeps_up(bench, errors[each], best.by_block, most):
-            bench.judge(each, outlook.start(each.blocks), near.start(each))
+            bench.judge(each, near.start(each), outlook.start(each.blocks))
 
 
 def _keeps_up(bench: _Bench, errors: Array, best: Array, most: float) -> bool:

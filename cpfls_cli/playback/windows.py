@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import chain, pairwise
 from typing import NamedTuple
 
@@ -87,7 +87,7 @@ class Slopes(NamedTuple):
     """
 
     numbers: int
-    places: Sequence[tuple[int, int]]
+    places: tuple[tuple[int, int], ...]
     values: Callable[..., Iterable[Value]]
 
 
@@ -601,8 +601,24 @@ def _slices(count: int, most: int) -> Iterator[slice]:
         yield slice(first, min(first + most, count))
 
 
+@lru_cache(maxsize=1)
+def _made_once(
+    _places: tuple[tuple[int, int], ...], _translates: bool, horizon: int, runs: int, numbers: int
+) -> tuple[list[Array], list[Array], Array, Array]:
+    """Make the arrays that derivatives are composed in: a fit takes those of one vehicle again and again.
+
+    What is 0 stays so; the rest, which the places say, is filled anew each time. The end of a step follows from its
+    begin and its middle.
+    """
+    widths = (STATES, 2 * STATES), (numbers, numbers)
+    into, by = ([np.zeros((horizon, runs, STATES, n)) for n in own] for own in widths)
+    for component in _ADDED:
+        into[1][..., component, component] = 1.0
+    return into, by, np.zeros((runs, 2 * STATES, numbers)), np.empty((runs, horizon, STATES, numbers))
+
+
 class _Tangents:
-    """Derivatives of the states of some runs at a time by the numbers, in arrays that are made once."""
+    """Derivatives of the states of some runs at a time by the numbers."""
 
     def __init__(self, slopes: Slopes, leg: Leg, steps: Steps, most: int) -> None:
         self.most, self._slopes, self._runs = min(most, len(leg.path.diverged)), slopes, leg.runs
@@ -610,13 +626,8 @@ class _Tangents:
         self._gone = _gone(leg.path.diverged, horizon)
         passed = np.concatenate([*chain(*leg.path.passed)]).reshape(horizon, 2, -1, runs)
         self._passed, self._driven = np.moveaxis(passed, 0, 2), steps.arguments()
-        # What is 0 stays so; the rest is filled anew each time. The end follows from the begin and the middle.
-        widths = (STATES, 2 * STATES), (slopes.numbers, slopes.numbers)
-        self._into, self._by = ([np.zeros((horizon, self.most, STATES, n)) for n in own] for own in widths)
-        self._changes = np.zeros((self.most, 2 * STATES, slopes.numbers))
-        for component in _ADDED:
-            self._into[1][..., component, component] = 1.0
-        self._rows = np.empty((self.most, horizon, STATES, slopes.numbers))
+        shape = horizon, self.most, slopes.numbers
+        self._into, self._by, self._changes, self._rows = _made_once(slopes.places, leg.runs.translates, *shape)
 
     def of_runs(self, some: slice, shares: Array) -> Array:
         """Compose them from step to step, times shares of shape (run, step, STATES); (run, step, STATES, number)."""

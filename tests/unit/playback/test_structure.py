@@ -108,7 +108,7 @@ def test_a_search_goes_on_from_what_was_kept(flights, searched, number):
 def test_a_search_finds_what_fits_of_all_structures_find(flights, searched):
     """All 32 structures of these blocks are fitted: the best and the choice among them are those of the search."""
     choice, _ = searched
-    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {})
+    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {}, structure._ACTUATION)
     bench.known.update({each.structure: each for each in (choice.chosen, choice.best)})
     order = tried_blocks(STATED, flights, QUICK)
     for count in range(len(order) + 1):
@@ -122,7 +122,7 @@ def test_a_search_finds_what_fits_of_all_structures_find(flights, searched):
 
 def test_errors_are_predicted_near_a_fit(flights):
     """A block less, and one more: fitted, both come to what was predicted from the fit between them."""
-    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {})
+    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {}, structure._ACTUATION)
     base = ("inertia", "thrust_factor", "lag", "linear_damping", "rotor_drag", "flapping_moment")
     judged = bench.judge(Structure(base))
     outlook = bench.outlook(judged, ("drag_factor",))
@@ -137,7 +137,7 @@ def test_errors_are_predicted_near_a_fit(flights):
 class Bench:
     """Knows the error of each structure, its blocks one letter each, with noise that no comparison sees through."""
 
-    stays, vehicle = 1.0, STATED
+    stays, vehicle, responses = 1.0, STATED, structure._ACTUATION
 
     def __init__(self, errors):
         self.errors, self.known = errors, {}
