@@ -75,6 +75,21 @@ def test_a_search_tells_how_far_it_is(searched):
     assert choice.chosen.error < 0.3 * choice.nothing.error
 
 
+@pytest.mark.parametrize("quick", [False, True])
+def test_a_first_answer_grows_from_one_start(flights, quick):
+    """It adds a response of the rotors as it adds other blocks; a whole search begins with each of them alone."""
+    left_out = tuple(set(QUICK.leave_out) - {"lag", "slow_actuation"})
+    told = []
+    choice = chosen(
+        flights,
+        lambda judged, _: told.append(judged[-1].structure.blocks),
+        settings=replace(QUICK, leave_out=left_out, quick=quick),
+    )
+    starts = {("lag",), ("slow_actuation",)}
+    assert starts.isdisjoint(told) if quick else starts <= {*told}
+    assert "lag" in choice.chosen.structure.blocks
+
+
 @pytest.mark.parametrize("tried", [(), ("rotor_drag",)])
 def test_a_search_among_hardly_anything_comes_to_its_end(flights, tried):
     choice = chosen(flights, settings=replace(QUICK, leave_out=tuple(set(blocks_of(STATED)) - set(tried))))
