@@ -63,18 +63,20 @@ def find_history(
     """
     windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
     observer = fit_observer(fitted, windows, settings.history_s)
-    between = [_between(each) for each in windows]
-    without = WindowSet(tuple(between)).errors(fitted.free, fitted.values)
+    between = tuple(map(_between, windows))
     # What gains nothing where it was fitted gains nothing elsewhere.
-    observed = [errors_with_past(fitted, observer, each) for each in between]
-    if not _lowers(block_errors(without), block_errors(observed)):
+    plain, observed = WindowSet(between).errors(fitted.free, fitted.values), _with_past(fitted, observer, between)
+    if not _lowers(block_errors(plain), block_errors(observed)):
         return None
     parts, errors = parts_of(flights, settings), []
     for place, (part, without) in enumerate(zip(parts, chosen.without, strict=True)):
         training = [windows for other, kept in enumerate(parts) if other != place for windows in kept]
-        own = fit_observer(without, training, settings.history_s)
-        errors += [errors_with_past(without, own, windows) for windows in part]
+        errors += _with_past(without, fit_observer(without, training, settings.history_s), part)
     return observer if _lowers(chosen.by_block, block_errors(errors)) else None
+
+
+def _with_past(fitted: FittedNumbers, observer: Observer, windows: Sequence[FitWindows]) -> list[Array]:
+    return [errors_with_past(fitted, observer, each) for each in windows]
 
 
 def _lowers(without: Array, found: Array) -> bool:
