@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import chain, pairwise
 from typing import NamedTuple
 
@@ -601,20 +601,26 @@ def _slices(count: int, most: int) -> Iterator[slice]:
         yield slice(first, min(first + most, count))
 
 
-@lru_cache(maxsize=1)
-def _made_once(
-    _places: tuple[tuple[int, int], ...], _translates: bool, horizon: int, runs: int, numbers: int
-) -> tuple[Array, ...]:
+_Key = tuple[tuple[tuple[int, int], ...], bool, int, int, int]
+_made: dict[_Key, tuple[Array, ...]] = {}
+
+
+def _made_once(key: _Key) -> tuple[Array, ...]:
     """Make the arrays that derivatives are composed in: a fit takes those of one vehicle again and again.
 
     What is 0 stays so; the rest, which the places say, is filled anew each time. The middle of a step follows from its
     begin and the numbers, and its end from these and from the middle.
     """
+    if key in _made:
+        return _made[key]
+    # Those of the last vehicle go first, so that there are never two.
+    _made.clear()
+    *_, horizon, runs, numbers = key
     middle, end, moved = (np.zeros((horizon, runs, STATES, STATES + numbers)) for _ in range(3))
     for component in _ADDED:
         end[..., component, component] = 1.0
     through = np.zeros((horizon, runs, STATES, STATES))
-    return middle, through, end, moved, np.empty((runs, horizon, STATES, numbers))
+    return _made.setdefault(key, (middle, through, end, moved, np.empty((runs, horizon, STATES, numbers))))
 
 
 class _Tangents:
@@ -626,8 +632,8 @@ class _Tangents:
         self._gone = _gone(leg.path.diverged, horizon)
         passed = np.concatenate([*chain(*leg.path.passed)]).reshape(horizon, 2, -1, runs)
         self._passed, self._driven = np.moveaxis(passed, 0, 2), steps.arguments()
-        shape = horizon, self.most, slopes.numbers
-        *self._parts, self._rows = _made_once(slopes.places, leg.runs.translates, *shape)
+        key = slopes.places, leg.runs.translates, horizon, self.most, slopes.numbers
+        *self._parts, self._rows = _made_once(key)
 
     def of_runs(self, some: slice, shares: Array) -> Array:
         """Compose them from step to step, times shares of shape (run, step, STATES); (run, step, STATES, number)."""
