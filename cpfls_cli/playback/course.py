@@ -49,8 +49,7 @@ class Course:
     @property
     def start(self) -> State:
         """Measured states that the runs start from."""
-        motion = self.flight.motion
-        return State(*(part[self.starts] for part in (motion.position, motion.velocity, motion.rotation, motion.rate)))
+        return State(*(part[self.starts] for part in self.flight.motion[:4]))
 
     @property
     def commands(self) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -210,31 +210,28 @@ def fit(
     System Identification, chapter 4 (output error); Bock 1983 (multiple shooting: each window starts from what was
     measured).
     """
-    return fit_parts(free, [windows], [known], steps, tolerance)[0]
+    together = WindowSet(tuple(windows))
+    return fit_parts(free, together, np.zeros(len(windows), dtype=np.int64), [known], steps, tolerance)[0]
 
 
-class HeldOut(NamedTuple):
-    """Numbers fitted without a part of the windows, and the errors of these windows, flight by flight."""
-
-    fitted: FittedNumbers
-    errors: list[Array]
+Fits = tuple[Fitted, list[tuple[FittedNumbers, list[Array]]]]
+"""A fit to all windows, and those without each part with the errors of its windows, flight by flight."""
 
 
 def fit_parts(
     free: JointNumbers,
-    parts: Sequence[Sequence[FitWindows]],
+    windows: WindowSet,
+    part: IntArray,
     starts: Sequence[Mapping[str, float]],
     steps: int,
     tolerance: float,
-) -> tuple[Fitted, tuple[HeldOut, ...]]:
-    """Fit numbers to all parts of the windows, and from there, by one step, without each.
+) -> Fits:
+    """Fit numbers to all windows, and from there, by one step, without each part, with the errors of its windows.
 
     Without a part the derivatives at the fit to all are known: they are those of all less those of the part. Each step
     has to lower the loss without the part. Parameters are those of `fit`, but that it begins at the best of several
-    starts; a single part cannot be left out.
+    starts, and that `part` says which part the windows of each flight are; a single part cannot be left out.
     """
-    windows = WindowSet(tuple(window for part in parts for window in part))
-    place = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
     bounds = free.lows, free.highs
 
     @cache
@@ -247,7 +244,7 @@ def fit_parts(
 
         return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
 
-    every = place >= 0
+    every = part >= 0
     values = dict.fromkeys(tuple(np.clip(free.values(known), *bounds).tolist()) for known in starts)
     begun = [at(each).mean(every) for each in values]
     finite = [each for each in begun if np.isfinite(each.objective)]
@@ -256,17 +253,13 @@ def fit_parts(
     whole = best(every, smallest(finite, lambda each: each.objective), steps, tolerance)
     sums = at(tuple(whole.values.tolist()))
 
-    def without(part: int) -> HeldOut:
-        kept = place != part
+    held = []
+    for kept in (part != number for number in range(part[-1] + 1) if part[-1]):
         point = best(kept, sums.mean(kept), 1, 0.0)
         errors = at(tuple(point.values.tolist())).errors
-        return HeldOut(
-            FittedNumbers(free, point.values, point.loss),
-            [own for own, other in zip(errors, kept, strict=True) if not other],
-        )
-
-    found = tuple(without(part) for part in range(len(parts) if len(parts) > 1 else 0))
-    return Fitted(free, whole.values, whole.loss, whole.hessian), found
+        aside = [own for own, other in zip(errors, kept, strict=True) if not other]
+        held.append((FittedNumbers(free, point.values, point.loss), aside))
+    return Fitted(free, whole.values, whole.loss, whole.hessian), held
 
 
 @dataclass(frozen=True)
@@ -467,11 +460,6 @@ def uncertainty(fitted: Fitted, windows: Sequence[FitWindows]) -> Uncertainty:
     covariance = jackknife_covariance(moved * scale)
     conditional = np.diag(fitted.hessian) - free.prior.precision
     return Uncertainty(covariance, len(gradient), np.asarray(conditional > _INFORMED * free.prior.precision))
-
-
-def window_errors(fitted: FittedNumbers, windows: Sequence[FitWindows]) -> list[Array]:
-    """Weigh the errors of windows as the fit does, shapes (window,): about 1.1 for rates that stay."""
-    return WindowSet(tuple(windows)).errors(fitted.free, fitted.values)
 
 
 def stays_error(window: FitWindows) -> float:

@@ -12,6 +12,8 @@ integrates the disturbance. From the start on nothing is observed: ``d' = exp(-h
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
@@ -70,12 +72,21 @@ def past_of(flight: PlaybackFlight, starts: IntArray, samples: int) -> tuple[Int
     return np.maximum(steps, begins[:, None]), (steps >= begins[:, None]).astype(float)
 
 
-def missed_wrench(flight: PlaybackFlight, samples: IntArray, errors: Array, body: Body) -> Array:
-    """Turn errors of single steps into the torque and force missed, shape (step, 6), N m and N, body frame.
+def missed_before(
+    flight: PlaybackFlight, starts: IntArray, samples: int, single_steps: Callable[[IntArray], Array], body: Body
+) -> Array:
+    """Give what a model misses of the steps before each start, shape (run, samples, 6), N m and N, body frame.
 
-    `samples` are where the steps begin, `errors` as of `errors_of_runs`, shape (step, 4, 3).
+    0 where there is none. `single_steps` gives the errors of steps that begin at samples, shape (step, 4, 3), see
+    `errors_of_runs`.
     """
-    period, rotation = flight.motion.period, flight.motion.rotation[samples]
-    torque = -errors[:, 3] @ body.inertia / period
-    force = -body.mass / period * np.einsum("tji,tj->ti", rotation, errors[:, 1])
-    return np.hstack([torque, force if flight.translates else np.zeros_like(force)])
+    steps, known = past_of(flight, starts, samples)
+    first = int(steps.min(initial=int(starts.min())))
+    taken = np.arange(first, int(starts.max()))
+    missed = np.zeros((len(taken) + 1, 6))
+    if len(taken):
+        errors, period, rotation = single_steps(taken), flight.motion.period, flight.motion.rotation[taken]
+        missed[:-1, :3] = -errors[:, 3] @ body.inertia / period
+        if flight.translates:
+            missed[:-1, 3:] = -body.mass / period * np.einsum("tji,tj->ti", rotation, errors[:, 1])
+    return np.asarray(missed[steps - first] * known[:, :, None])

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.gauss_newton import minimised
@@ -24,12 +24,13 @@ from cpfls_cli.playback.fit import (
     FittedNumbers,
     FitWindows,
     SideBySide,
+    WindowSet,
     side_by_side,
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import PRIOR
-from cpfls_cli.playback.history import Observer, missed_wrench, past_of
+from cpfls_cli.playback.history import Observer, missed_before
 from cpfls_cli.playback.judging import block_errors, parts_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Judged
@@ -60,17 +61,28 @@ def find_history(
     `chosen` is the structure fitted without each part, which its observer is fitted to, without the part too; `fitted`
     the same, fitted to all flights.
     """
+    windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
+    observer = fit_observer(fitted, windows, settings.history_s)
+    between = tuple(map(_between, windows))
+    # What gains nothing where it was fitted gains nothing elsewhere.
+    plain, observed = WindowSet(between).errors(fitted.free, fitted.values), _with_past(fitted, observer, between)
+    if not _lowers(block_errors(plain), block_errors(observed)):
+        return None
     parts, errors = parts_of(flights, settings), []
     for place, (part, without) in enumerate(zip(parts, chosen.without, strict=True)):
         training = [windows for other, kept in enumerate(parts) if other != place for windows in kept]
-        observer = fit_observer(without, training, settings.history_s)
-        errors += [errors_with_past(without, observer, windows) for windows in part]
-    found = block_errors(errors)
-    better = chosen.by_block - found
-    if better.mean() <= mean_error(better):
-        return None
-    windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
-    return fit_observer(fitted, windows, settings.history_s)
+        errors += _with_past(without, fit_observer(without, training, settings.history_s), part)
+    return observer if _lowers(chosen.by_block, block_errors(errors)) else None
+
+
+def _with_past(fitted: FittedNumbers, observer: Observer, windows: Sequence[FitWindows]) -> list[Array]:
+    return [errors_with_past(fitted, observer, each) for each in windows]
+
+
+def _lowers(without: Array, found: Array) -> bool:
+    """Tell whether errors by block are lower than without, beyond their own error."""
+    better = without - found
+    return bool(better.mean() > mean_error(better))
 
 
 def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: float) -> Observer:
@@ -89,7 +101,7 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
 
 
 def errors_with_past(fitted: FittedNumbers, observer: Observer, windows: FitWindows) -> Array:
-    """Weigh the errors of windows as the fit does; see `window_errors`."""
+    """Weigh the errors of windows as the fit does, shape (window,)."""
     at = _vehicle(fitted)
     (begun,) = (_Begun.of(at, each, observer.past_s) for each in side_by_side([windows]))
     return losses_of(begun.flown(at, begun.pushed(observer)), begun.windows.loss)
@@ -145,14 +157,13 @@ class _Begun(NamedTuple):
 
 def _missed(at: VehicleAt, window: FitWindows, past_s: float) -> Array:
     flight = window.flight
-    steps, known = past_of(flight, window.starts, round(past_s / flight.motion.period))
-    samples = np.arange(int(steps.min(initial=window.starts[0])), int(window.starts.max()))
-    terms = at.rotor_terms(flight, samples)
     flown = at.flown(flight.motion.period, translates=flight.translates)
-    errors, _ = errors_of_runs(flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))
-    missed = np.zeros((len(samples) + 1, 6))
-    missed[:-1] = missed_wrench(flight, samples, errors[:, 0], flown.body)
-    return np.asarray(missed[steps - samples[0]] * known[:, :, None])
+
+    def single_steps(samples: IntArray) -> Array:
+        terms = at.rotor_terms(flight, samples)
+        return errors_of_runs(flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))[0][:, 0]
+
+    return missed_before(flight, window.starts, round(past_s / flight.motion.period), single_steps, flown.body)
 
 
 def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array) -> FitPoint:

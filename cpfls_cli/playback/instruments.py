@@ -12,7 +12,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.lag import best_delay, delayed
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import PlaybackFlight, motion_at
 
 _ALIKE = 0.7
 """Correlation of changes of the rates, or of the velocity, from which on two flights fly the same path. Unlike paths of
@@ -184,20 +184,13 @@ def _cut(flight: PlaybackFlight, part: slice) -> PlaybackFlight:
     """Take a part of a flight as a flight."""
     if part == slice(0, len(flight)):
         return flight
-    motion = flight.motion
-    motion = motion._replace(
-        position=motion.position[part],
-        velocity=motion.velocity[part],
-        rotation=motion.rotation[part],
-        rate=motion.rate[part],
-    )
     stretches = [
         slice(max(each.start, part.start) - part.start, min(each.stop, part.stop) - part.start)
         for each in flight.stretches
     ]
     return replace(
         flight,
-        motion=motion,
+        motion=motion_at(flight.motion, part),
         speed=flight.speed[part],
         stretches=tuple(each for each in stretches if each.stop - each.start > 1),
         wrench=None if flight.wrench is None else flight.wrench[part],

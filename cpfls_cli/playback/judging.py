@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS
 from cpfls_cli.errors import InputError
 from cpfls_cli.gauss_newton import damped_step
-from cpfls_cli.playback.fit import FittedNumbers, FitWindows, WindowSet, window_errors, windows_of
+from cpfls_cli.playback.fit import FitWindows, WindowSet, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.parameters import SLOW
@@ -116,15 +116,12 @@ class Outlook:
     part: IntArray
 
     @classmethod
-    def of(cls, free: JointNumbers, values: Array, parts: Sequence[Sequence[FitWindows]]) -> Outlook:
+    def of(cls, free: JointNumbers, values: Array, windows: WindowSet, part: IntArray) -> Outlook:
         """Evaluate runs and their derivatives once; pieces are the blocks of `block_errors`."""
-        windows = [window for part in parts for window in part]
-        pieces = _blocks([len(each.starts) for each in windows])
-        gradient, hessian = zip(*WindowSet(tuple(windows)).derivatives(free, values, pieces), strict=True)
-        fitted, scale = FittedNumbers(free, values, np.nan), free.scales
-        errors = window_errors(fitted, windows)
-        loss = [np.bincount(own, each) for own, each in zip(pieces, errors, strict=True)]
-        place = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+        pieces, scale = _blocks(windows.counts.tolist()), free.scales
+        errors = zip(pieces, windows.errors(free, values), strict=True)
+        loss = [np.bincount(own, each) for own, each in errors]
+        gradient, hessian = zip(*windows.derivatives(free, values, pieces), strict=True)
         return cls(
             free,
             values,
@@ -132,7 +129,7 @@ class Outlook:
             np.concatenate(gradient) * scale,
             np.concatenate(hessian) * scale[:, None] * scale,
             np.concatenate([np.bincount(own) for own in pieces]),
-            np.repeat(place, [len(own) for own in loss]),
+            np.repeat(part, [len(own) for own in loss]),
         )
 
     @property

@@ -12,7 +12,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
-from cpfls_cli.playback.history import Observer, missed_wrench, past_of
+from cpfls_cli.playback.history import Observer, missed_before
 from cpfls_cli.playback.model import VehicleModel, wrench_along
 from cpfls_cli.playback.motion import Body, MeasuredMotion, State
 from cpfls_cli.playback.windows import MOST_RUNS, Flown, Steps, errors_of_runs, rotation_errors
@@ -191,17 +191,14 @@ def observed(player: Player, flight: PlaybackFlight, starts: IntArray) -> Array:
 
     Starts ascend. Where a stretch begins later than the past that is asked for, it is observed from what there is.
     """
-    observer = player.observer
+    observer, period = player.observer, flight.motion.period
     assert observer is not None
-    period = flight.motion.period
-    steps, known = past_of(flight, starts, observer.samples(period))
-    taken = np.arange(int(steps.min()), int(starts[-1]))
-    missed = np.zeros((len(taken) + 1, 6))
-    if len(taken):
-        single = free_runs(replace(player, observer=None), flight, taken, 1).errors[:, 0]
-        missed[:-1] = missed_wrench(flight, taken, single, player.body)
-    weights = observer.weights(period)
-    return np.asarray(np.einsum("rsa,rs,sa->ra", missed[steps - int(steps.min())], known, weights))
+
+    def single_steps(samples: IntArray) -> Array:
+        return free_runs(replace(player, observer=None), flight, samples, 1).errors[:, 0]
+
+    missed = missed_before(flight, starts, observer.samples(period), single_steps, player.body)
+    return np.asarray(np.einsum("rsa,sa->ra", missed, observer.weights(period)))
 
 
 def in_the_air(flight: PlaybackFlight, wind: tuple[float, float, float]) -> PlaybackFlight:

@@ -10,18 +10,18 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.evolution.ranking import comparable
 from cpfls_cli.playback.fit import (
+    Fits,
     Fitted,
     FittedNumbers,
     FitWindows,
-    HeldOut,
+    WindowSet,
     fit,
     fit_parts,
     stays_error,
-    window_errors,
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -100,7 +100,7 @@ class Judged:
     Attributes
     ----------
     error : float
-        Mean over windows of all parts; see `window_errors`.
+        Mean over windows of all parts; about 1.1 for rates that stay.
     by_block : array, shape (block,)
         The same by flight, or by pieces of few flights; equal for all structures.
     condition_number : float
@@ -220,7 +220,7 @@ class _Bench:
     """Judges structures; remembers all, and starts each fit from the nearest that is known.
 
     What a stopped search has kept becomes known only when it is asked for, so that the fits after it start from where
-    they would have started.
+    they would have started. `responses` are the blocks whose gain is not predicted: each is a start of its own.
     """
 
     vehicle: VehicleSettings
@@ -228,41 +228,63 @@ class _Bench:
     progress: Progress
     expected: int
     kept: Kept
+    responses: tuple[str, ...]
     known: dict[Structure, Judged] = field(default_factory=dict)
     _outlooks: dict[Structure, Outlook] = field(default_factory=dict)
 
     @cached_property
+    def windows(self) -> WindowSet:
+        """Windows of all parts."""
+        return WindowSet(tuple(each for part in self.parts for each in part))
+
+    @cached_property
+    def part(self) -> IntArray:
+        """Which part they are of."""
+        return np.repeat(np.arange(len(self.parts)), [len(part) for part in self.parts])
+
+    @cached_property
     def stays(self) -> float:
         """Error of rates that stay, over the windows of all parts."""
-        windows = [each for part in self.parts for each in part]
-        counts = [len(each.starts) for each in windows]
-        return float(np.average([stays_error(each) for each in windows], weights=counts))
+        errors = [stays_error(each) for each in self.windows.windows]
+        return float(np.average(errors, weights=self.windows.counts))
 
     def judge(self, structure: Structure, *starts: Start, first: VehicleSettings | None = None) -> Judged:
-        """Fit and judge a structure, from the best of some starts; fitted to another vehicle first, if one is given."""
+        """Fit and judge a structure, from the best of some starts; fitted to another vehicle first, if one is given.
+
+        The last of the starts is flown once only where it is the best.
+        """
         if structure not in self.known:
             kept = self.kept.get(structure)
-            fits = self._fits(structure, starts, first) if kept is None else self._rebuilt(structure, kept)
-            self.known[structure] = _judged(structure, *fits)
+            whole, held = self._fits(structure, starts, first) if kept is None else self._rebuilt(structure, kept)
+            errors = [each for _, aside in held for each in aside]
+            self.known[structure] = Judged(
+                structure,
+                float(np.concatenate(errors).mean()),
+                block_errors(errors),
+                len(whole.values),
+                whole.condition_number,
+                whole,
+                tuple(fitted for fitted, _ in held),
+            )
             if kept is None:
                 self.progress(tuple(self.known.values()), max(self.expected, len(self.known)))
         return self.known[structure]
 
-    def _fits(
-        self, structure: Structure, starts: tuple[Start, ...], first: VehicleSettings | None
-    ) -> tuple[Fitted, tuple[HeldOut, ...]]:
+    def _fits(self, structure: Structure, starts: tuple[Start, ...], first: VehicleSettings | None) -> Fits:
         begun = starts or (self._nearest(structure),)
         if first is not None:
             free = structure.free(first)
-            windows = [each for part in self.parts for each in part]
-            begun = (free.named(fit(free, windows, begun[0], _SEARCH_STEPS, _SEARCH_TOLERANCE).values),)
-        return fit_parts(structure.free(self.vehicle), self.parts, begun, _SEARCH_STEPS, _SEARCH_TOLERANCE)
+            found = fit(free, self.windows.windows, begun[0], _SEARCH_STEPS, _SEARCH_TOLERANCE)
+            begun = (free.named(found.values),)
+        free = structure.free(self.vehicle)
+        return fit_parts(free, self.windows, self.part, begun, _SEARCH_STEPS, _SEARCH_TOLERANCE)
 
-    def _rebuilt(self, structure: Structure, kept: Solution) -> tuple[Fitted, tuple[HeldOut, ...]]:
+    def _rebuilt(self, structure: Structure, kept: Solution) -> Fits:
         free = structure.free(self.vehicle)
         whole, *without = (FittedNumbers(free, *each) for each in zip(kept.values, kept.losses, strict=True))
-        held = (HeldOut(each, window_errors(each, part)) for each, part in zip(without, self.parts, strict=True))
-        return Fitted(free, whole.values, whole.loss, kept.hessian), tuple(held)
+        sets = (WindowSet(tuple(part)) for part in self.parts)
+        held = [(each, own.errors(free, each.values)) for each, own in zip(without, sets, strict=True)]
+        return Fitted(free, whole.values, whole.loss, kept.hessian), held
 
     def _nearest(self, structure: Structure) -> Start:
         """Give the values of the known structure that differs in the fewest blocks; the better one of two."""
@@ -285,22 +307,8 @@ class _Bench:
             union = Structure(asked, own.rules).free(self.vehicle)
             absent = {number.name: number.absent for number in union.numbers}
             values = union.values(absent | near.fit.free.named(near.fit.values))
-            self._outlooks[own] = found = Outlook.of(union, values, self.parts)
+            self._outlooks[own] = found = Outlook.of(union, values, self.windows, self.part)
         return found
-
-
-def _judged(structure: Structure, whole: Fitted, held: tuple[HeldOut, ...]) -> Judged:
-    errors = [each for part in held for each in part.errors]
-    without, joined = tuple(each.fitted for each in held), np.concatenate(errors)
-    return Judged(
-        structure,
-        float(joined.mean()),
-        block_errors(errors),
-        len(whole.values),
-        whole.condition_number,
-        whole,
-        without,
-    )
 
 
 def tried_blocks(
@@ -326,7 +334,9 @@ def choose(
     end.
     """
     blocks = tried_blocks(vehicle, flights, settings)
-    bench = _Bench(vehicle, parts_of(flights, settings), progress, len(blocks), kept)
+    # A first answer has one start, from which any response is added as other blocks are.
+    responses = () if settings.quick else _ACTUATION
+    bench = _Bench(vehicle, parts_of(flights, settings), progress, len(blocks), kept, responses)
     complete, added = True, None
     try:
         added = _grow(bench, blocks)
@@ -347,7 +357,7 @@ def _grow(bench: _Bench, blocks: tuple[str, ...]) -> Judged:
     # then no explanation is worth anything.
     open_ = bench.vehicle.unknown
     guessed = replace(bench.vehicle, unknown=tuple(name for name in open_ if name != INERTIA))
-    kinds = ((), *((block,) for block in _ACTUATION if block in blocks))
+    kinds = ((), *((block,) for block in bench.responses if block in blocks))
     starts = [bench.judge(Structure(kind), {}, first=guessed if INERTIA in open_ else None) for kind in kinds]
     grown = [_explore(bench, each, named) for each in starts]
     for present in ascending(grown, lambda each: each.error)[:_FITTED]:
@@ -365,7 +375,7 @@ def _explore(bench: _Bench, centre: Judged, blocks: tuple[str, ...]) -> Judged:
     The best and the simplest as predicted are fitted; the better of them, or the centre, comes back.
     """
     inside = centre.structure.blocks
-    open_ = tuple(block for block in blocks if block in inside or block not in _ACTUATION)
+    open_ = tuple(block for block in blocks if block in inside or block not in bench.responses)
     outlook = bench.outlook(centre, open_)
     errors: dict[Structure, Array] = {}
 
@@ -386,7 +396,7 @@ def _explore(bench: _Bench, centre: Judged, blocks: tuple[str, ...]) -> Judged:
         if not _keeps_up(bench, errors[fewer], errors[best], 1.0):
             break
         simplest = fewer
-    found = [bench.judge(each, outlook.start(each.blocks), centre.start(each)) for each in (best, simplest)]
+    found = [bench.judge(each, centre.start(each), outlook.start(each.blocks)) for each in (best, simplest)]
     return smallest([centre, *found], lambda each: each.error)
 
 
@@ -466,7 +476,7 @@ def _judge_hopeful(bench: _Bench, near: Judged, others: Sequence[Structure], mos
     errors = {each: outlook.errors(each.blocks) for each in new}
     for each in ascending(new, lambda each: float(errors[each].mean()))[:_FITTED]:
         if _keeps_up(bench, errors[each], best.by_block, most):
-            bench.judge(each, outlook.start(each.blocks), near.start(each))
+            bench.judge(each, near.start(each), outlook.start(each.blocks))
 
 
 def _keeps_up(bench: _Bench, errors: Array, best: Array, most: float) -> bool:

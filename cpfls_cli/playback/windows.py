@@ -12,7 +12,7 @@ then composed step by step.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain, pairwise
@@ -87,7 +87,7 @@ class Slopes(NamedTuple):
     """
 
     numbers: int
-    places: Sequence[tuple[int, int]]
+    places: tuple[tuple[int, int], ...]
     values: Callable[..., Iterable[Value]]
 
 
@@ -601,8 +601,30 @@ def _slices(count: int, most: int) -> Iterator[slice]:
         yield slice(first, min(first + most, count))
 
 
+_Key = tuple[tuple[tuple[int, int], ...], bool, int, int, int]
+_made: dict[_Key, tuple[Array, ...]] = {}
+
+
+def _made_once(key: _Key) -> tuple[Array, ...]:
+    """Make the arrays that derivatives are composed in: a fit takes those of one vehicle again and again.
+
+    What is 0 stays so; the rest, which the places say, is filled anew each time. The middle of a step follows from its
+    begin and the numbers, and its end from these and from the middle.
+    """
+    if key in _made:
+        return _made[key]
+    # Those of the last vehicle go first, so that there are never two.
+    _made.clear()
+    *_, horizon, runs, numbers = key
+    middle, end, moved = (np.zeros((horizon, runs, STATES, STATES + numbers)) for _ in range(3))
+    for component in _ADDED:
+        end[..., component, component] = 1.0
+    through = np.zeros((horizon, runs, STATES, STATES))
+    return _made.setdefault(key, (middle, through, end, moved, np.empty((runs, horizon, STATES, numbers))))
+
+
 class _Tangents:
-    """Derivatives of the states of some runs at a time by the numbers, in arrays that are made once."""
+    """Derivatives of the states of some runs at a time by the numbers."""
 
     def __init__(self, slopes: Slopes, leg: Leg, steps: Steps, most: int) -> None:
         self.most, self._slopes, self._runs = min(most, len(leg.path.diverged)), slopes, leg.runs
@@ -610,51 +632,45 @@ class _Tangents:
         self._gone = _gone(leg.path.diverged, horizon)
         passed = np.concatenate([*chain(*leg.path.passed)]).reshape(horizon, 2, -1, runs)
         self._passed, self._driven = np.moveaxis(passed, 0, 2), steps.arguments()
-        # What is 0 stays so; the rest is filled anew each time. The end follows from the begin and the middle.
-        widths = (STATES, 2 * STATES), (slopes.numbers, slopes.numbers)
-        self._into, self._by = ([np.zeros((horizon, self.most, STATES, n)) for n in own] for own in widths)
-        self._changes = np.zeros((self.most, 2 * STATES, slopes.numbers))
-        for component in _ADDED:
-            self._into[1][..., component, component] = 1.0
-        self._rows = np.empty((self.most, horizon, STATES, slopes.numbers))
+        key = slopes.places, leg.runs.translates, horizon, self.most, slopes.numbers
+        *self._parts, self._rows = _made_once(key)
 
     def of_runs(self, some: slice, shares: Array) -> Array:
         """Compose them from step to step, times shares of shape (run, step, STATES); (run, step, STATES, number)."""
         count = some.stop - some.start
-        rows, changes = self._rows[:count], self._changes[:count]
-        change, middle = changes[:, :STATES], changes[:, STATES:]
-        change[:] = 0.0
+        rows = self._rows[:count]
+        middle, through, end, moved = (each[:, :count] for each in self._parts)
         with np.errstate(all="ignore"):
-            self._fill(some)
-            steps = zip(*(each[:, :count] for each in (*self._into, *self._by)), strict=True)
-            for step, (into_middle, into_end, middle_by, end_by) in enumerate(steps):
-                np.add(into_middle @ change, middle_by, out=middle)
-                np.add(into_end @ changes, end_by, out=change)
-                np.multiply(change, shares[:, step, :, None], out=rows[:, step])
+            self._fill(some.start, middle, through, end)
+            np.add(np.matmul(through, middle, out=moved), end, out=moved)
+            rows[:, 0] = moved[0, ..., STATES:]
+            for step in range(1, len(moved)):
+                np.add(moved[step, ..., :STATES] @ rows[:, step - 1], moved[step, ..., STATES:], out=rows[:, step])
+            rows *= shares[..., None]
         rows[self._gone[:, some].T] = 0.0
         return rows
 
-    def _fill(self, some: slice) -> None:
+    def _fill(self, first: int, middle: Array, through: Array, end: Array) -> None:
         """Differentiate the middle of each step, and its end by begin and middle, both by the numbers too."""
-        period, translates, count = self._runs.motion.period, self._runs.translates, some.stop - some.start
-        (middle, end), (middle_by, end_by) = ([each[:, :count] for each in own] for own in (self._into, self._by))
+        period, translates, some = (
+            self._runs.motion.period,
+            self._runs.translates,
+            slice(first, first + middle.shape[1]),
+        )
         driven = [[each[..., some].reshape(*each.shape[:-2], -1) for each in own] for own in self._driven]
         for component in _ADDED:
             middle[..., component, component] = 0.0
-        for stage, interval, by_state, by_number in (
-            (0, 0.5 * period, middle, middle_by),
-            (1, period, end[..., STATES:], end_by),
-        ):
+        for stage, interval, into, by_state in ((0, 0.5 * period, middle, middle), (1, period, end, through)):
             passed = tuple(self._passed[stage, :, :, some].reshape(15, -1))
             turn = scaled(interval, passed[12:])
-            into, shape = (middle, end)[stage], middle.shape[:2]
+            shape = middle.shape[:2]
             for place, (turned, own) in enumerate(zip(exponential(turn), right_jacobian(turn), strict=True)):
                 row, column = divmod(place, 3)
                 into[..., 3 + column, 3 + row] = turned.reshape(shape)
                 by_state[..., 3 + row, 6 + column] = interval * own.reshape(shape)
             for (row, column), slope in zip(self._slopes.places, self._slopes.values(passed, *driven), strict=True):
                 if translates or row >= 3:
-                    out = by_state[..., row, column] if column < STATES else by_number[..., row, column - STATES]
+                    out = (by_state if column < STATES else into)[..., row, column]
                     np.multiply(interval, slope if np.size(slope) == 1 else slope.reshape(shape), out=out)
         for component in _ADDED:
             middle[..., component, component] += 1.0

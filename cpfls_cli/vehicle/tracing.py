@@ -250,6 +250,8 @@ def _compiled(source: str, arrays: bool = False) -> dict[str, Any]:
     names: dict[str, Any] = {
         **(of_arrays if arrays else _FUNCTIONS),
         "array": np.array,
+        # The method takes twice as long of few values.
+        "sum_of": np.add.reduce,
         "inf": math.inf,
         "nan": math.nan,
     }
@@ -285,7 +287,7 @@ class Language(NamedTuple):
 
 _OPERATORS = {name: f"({{}} {name} {{}})" for name in ("+", "-", "*", "/", "<", ">", "**")} | {"negative": "(-{})"}
 PYTHON = Language({"where": "({1} if {0} else {2})"})
-ARRAYS = Language({"total": "{}.sum(0)"})
+ARRAYS = Language({"total": "sum_of({})"})
 _OF_ARRAYS = ("where", "largest", "smallest")
 _NUMPY = {"atan2": "arctan2", "largest": "maximum", "smallest": "minimum"}
 """Functions that NumPy has by another name."""

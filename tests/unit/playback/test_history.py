@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.playback.fit import Fitted, side_by_side, windows_of
+from cpfls_cli.playback.fit import Fitted, fit, side_by_side, windows_of
 from cpfls_cli.playback.history import Observer, past_of
-from cpfls_cli.playback.history_fit import _Begun, _point, _vehicle, errors_with_past, fit_observer
+from cpfls_cli.playback.history_fit import _Begun, _point, _vehicle, errors_with_past, find_history, fit_observer
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import free_runs, observed, player_of
+from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure
 from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights
+from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 from tests.builders.random_flights import VEHICLE, flight_of
 
 OBSERVER = Observer(
@@ -140,3 +142,10 @@ def test_gusts_that_last_are_forecast_on_a_flight_that_was_kept_aside(gusty):
     (windows,) = windows_of([kept], 0.5, 0.5)
     still = replace(observer, rate=np.full(6, 1e-9))
     assert errors_with_past(fitted, observer, windows).mean() < 0.7 * errors_with_past(fitted, still, windows).mean()
+
+
+def test_where_the_model_misses_nothing_no_part_is_fitted_to_see_that():
+    """Still air: the observer gains nothing on the flights that it was fitted to; fits without parts are not asked."""
+    flights = flown(truth(), ("figure", "steps"), duration_s=5.0, noise=MIDDLING, seed=2)
+    fitted = fit(Structure(TRUE_BLOCKS).free(STATED), windows_of(flights, 0.5, 0.5), {}, 12, 1e-4)
+    assert find_history(None, fitted, flights, PlaybackSettings()) is None

@@ -10,7 +10,7 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback import structure
-from cpfls_cli.playback.fit import fit, window_errors
+from cpfls_cli.playback.fit import WindowSet, fit
 from cpfls_cli.playback.flight import motion_at
 from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.parameters import blocks_of
@@ -75,6 +75,21 @@ def test_a_search_tells_how_far_it_is(searched):
     assert choice.chosen.error < 0.3 * choice.nothing.error
 
 
+@pytest.mark.parametrize("quick", [False, True])
+def test_a_first_answer_grows_from_one_start(flights, quick):
+    """It adds a response of the rotors as it adds other blocks; a whole search begins with each of them alone."""
+    left_out = tuple(set(QUICK.leave_out) - {"lag", "slow_actuation"})
+    told = []
+    choice = chosen(
+        flights,
+        lambda judged, _: told.append(judged[-1].structure.blocks),
+        settings=replace(QUICK, leave_out=left_out, quick=quick),
+    )
+    starts = {("lag",), ("slow_actuation",)}
+    assert starts.isdisjoint(told) if quick else starts <= {*told}
+    assert "lag" in choice.chosen.structure.blocks
+
+
 @pytest.mark.parametrize("tried", [(), ("rotor_drag",)])
 def test_a_search_among_hardly_anything_comes_to_its_end(flights, tried):
     choice = chosen(flights, settings=replace(QUICK, leave_out=tuple(set(blocks_of(STATED)) - set(tried))))
@@ -108,7 +123,7 @@ def test_a_search_goes_on_from_what_was_kept(flights, searched, number):
 def test_a_search_finds_what_fits_of_all_structures_find(flights, searched):
     """All 32 structures of these blocks are fitted: the best and the choice among them are those of the search."""
     choice, _ = searched
-    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {})
+    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {}, structure._ACTUATION)
     bench.known.update({each.structure: each for each in (choice.chosen, choice.best)})
     order = tried_blocks(STATED, flights, QUICK)
     for count in range(len(order) + 1):
@@ -122,7 +137,7 @@ def test_a_search_finds_what_fits_of_all_structures_find(flights, searched):
 
 def test_errors_are_predicted_near_a_fit(flights):
     """A block less, and one more: fitted, both come to what was predicted from the fit between them."""
-    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {})
+    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {}, structure._ACTUATION)
     base = ("inertia", "thrust_factor", "lag", "linear_damping", "rotor_drag", "flapping_moment")
     judged = bench.judge(Structure(base))
     outlook = bench.outlook(judged, ("drag_factor",))
@@ -137,7 +152,7 @@ def test_errors_are_predicted_near_a_fit(flights):
 class Bench:
     """Knows the error of each structure, its blocks one letter each, with noise that no comparison sees through."""
 
-    stays, vehicle = 1.0, STATED
+    stays, vehicle, responses = 1.0, STATED, structure._ACTUATION
 
     def __init__(self, errors):
         self.errors, self.known = errors, {}
@@ -242,6 +257,7 @@ def test_flights_that_are_logged_fast_are_flown_in_steps_of_several_samples():
         weight[np.arange(len(weight)) % 5 != 4] = 0.0
         return replace(each, loss=Loss(weight, delta), every=1)
 
-    coarse, fine = (window_errors(found, own) for own in (windows, [of_all_samples(each) for each in windows]))
+    sets = (WindowSet(tuple(own)) for own in (windows, map(of_all_samples, windows)))
+    coarse, fine = (own.errors(found.free, found.values) for own in sets)
     assert np.concatenate(coarse) == pytest.approx(np.concatenate(fine), rel=0.05)
     assert np.concatenate(coarse).mean() == pytest.approx(np.concatenate(fine).mean(), rel=0.005)
