@@ -130,7 +130,7 @@ def diagnose(
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     doubts = [
-        *_doubts(unnamed, judged, named.unidentified, settings),
+        *_doubts(unnamed, judged, settings),
         *(refused.sentence for refused in named.refusals),
     ]
     notes = [*not_judged(held_out), *([] if named.differ else doubts)]
@@ -197,9 +197,10 @@ class _Named(NamedTuple):
 
     def in_gusts(self, judged: JudgedEffect) -> JudgedEffect:
         """Take the p-value of an effect by instruments, and drop rivals of a lag: a fit sees the loop."""
-        if judged.effect.name not in self.sure:
-            return judged
-        effect = replace(judged.effect, p_value=self.sure[judged.effect.name])
+        effect = replace(judged.effect, identified=judged.effect.name not in self.unidentified)
+        if effect.name not in self.sure:
+            return replace(judged, effect=effect)
+        effect = replace(effect, p_value=self.sure[effect.name])
         return replace(judged, effect=effect, alternatives=() if CATALOGUE[effect.name].is_lag else judged.alternatives)
 
 
@@ -273,9 +274,7 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
     return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure, unidentified=loose)
 
 
-def _doubts(
-    unnamed: Sequence[str], judged: Sequence[JudgedEffect], loose: Sequence[str], settings: GapSettings
-) -> Iterator[str]:
+def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
     """Say what intervals cover, and which effects are not significant jointly with the others."""
     if unnamed:
         yield (
@@ -285,7 +284,7 @@ def _doubts(
     for effect in (each.effect for each in judged):
         if effect.p_value > settings.significance:
             yield f"{effect.name} is not significant jointly with the others, p = {effect.p_value:.2g}"
-        if effect.name in loose:
+        if not effect.identified:
             yield (
                 f"instruments do not identify the numbers of {effect.name}: they come from a fit to all motion, in"
                 " which the loop answers gusts, and may be off by more than their intervals"

@@ -305,11 +305,19 @@ def corrected(
     if not found.contradictions:
         _directions(made, [each.signals for each in flights])
     if found.verdict in _WRITES and not found.contradictions:
-        sure = [each for each in found.effects if each.name not in found.rivals]
+        sure = []
         for each in found.effects:
-            if each not in sure:
+            title, excitation = find(each.name).title, find(each.name).excitation
+            if each.name in found.rivals:
                 rivals = joined([find(rival.name).title for rival in found.rivals[each.name]], "or")
-                made.unchanged.append(f"{find(each.name).title}: these flights cannot separate it from {rivals}")
+                made.unchanged.append(f"{title}: these flights cannot separate it from {rivals}")
+            elif not each.identified:
+                made.unchanged.append(
+                    f"{title}, {_values(each)}: setpoints do not show it, and a fit sees how the loop answers gusts "
+                    f"too; fly, with setpoints in the log: {excitation}"
+                )
+            else:
+                sure.append(each)
         _put_in(made, sure)
         _not_found(made, found)
     elif found.verdict == GapVerdict.NO_GAP:
@@ -447,12 +455,15 @@ def _say_hidden(made: _Corrections, name: str, stated: Stated, reason: str | Non
     made.unchanged.append(f"{name} {stated.written(stated.value):.4g}: {why}")
 
 
-def _not_held(made: _Corrections, each: NamedEffect) -> None:
-    entry = find(each.name)
-    values = ", ".join(
+def _values(each: NamedEffect) -> str:
+    return ", ".join(
         f"{number.name} {number.value:.4g} [{number.low:.4g}, {number.high:.4g}] {number.unit}"
         for number in each.numbers
     )
+
+
+def _not_held(made: _Corrections, each: NamedEffect) -> None:
+    entry, values = find(each.name), _values(each)
     made.elsewhere.append(
         f"{entry.title}: {entry.formula}{', with ' if values else ''}{values}; the format has no number for it: "
         f"{_BY_HAND[made.of.model.format]}; `cpfls export extended.h5 --format c` writes the lines"

@@ -10,7 +10,7 @@ at a speed w in rad/s, thrust is ``motorConstant w^2`` along z of the rotor's li
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from os.path import isdir, isfile
 from pathlib import Path
 
@@ -197,12 +197,7 @@ def read_sdf(file: Path) -> SimulatorModel:
     model = _model_of(root)
     parts, notes = _Parts(model), list[str]()
     if not parts.motors:
-        named = sorted({plugin.attributes.get("filename", "?") for plugin in parts.plugins})
-        raise InputError(
-            f"{file}: none of its plugins is a motor model that is known here ({', '.join(named) or 'it has none'}); "
-            "known are gz-sim-multicopter-motor-model-system, libgazebo_motor_model.so and "
-            "librotors_gazebo_motor_model.so"
-        )
+        raise no_motor(file, parts.plugins)
     motors = sorted(parts.motors, key=lambda each: motor_number(each[1]))
     spinning = {scope + text_of(plugin, "jointName"): scope for scope, plugin in motors}
     base = _base(parts, motors[0][0], motors[0][1])
@@ -212,6 +207,15 @@ def read_sdf(file: Path) -> SimulatorModel:
     placed = {body.name: body for body in bodies}
     rotors = tuple(rotor_of(plugin, placed.get(scope + text_of(plugin, "linkName"))) for scope, plugin in motors)
     return SimulatorModel(model.name, "sdf", bodies, rotors, CANNOT, tuple(notes), tuple(parts.files))
+
+
+def no_motor(file: Path, plugins: Sequence[Node]) -> InputError:
+    """Make the error of a file none of whose plugins is known."""
+    named = sorted({plugin.attributes.get("filename", "?") for plugin in plugins})
+    return InputError(
+        f"{file}: none of its plugins is a motor model that is known here ({', '.join(named) or 'it has none'}); known "
+        "are gz-sim-multicopter-motor-model-system, libgazebo_motor_model.so and librotors_gazebo_motor_model.so"
+    )
 
 
 def motor_number(plugin: Node) -> int:

@@ -21,7 +21,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.simulators.document import Node, Stated, read_xml
 from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, part_of, pose, rotated, turning
 from cpfls_cli.simulators.sdf import CANNOT as CANNOT_OF_PLUGINS
-from cpfls_cli.simulators.sdf import MOTOR, motor_number, rotor_of, text_of
+from cpfls_cli.simulators.sdf import MOTOR, motor_number, no_motor, rotor_of, text_of
 
 RPM = 30 / np.pi
 GRAVITY = 9.8
@@ -46,8 +46,10 @@ def read_urdf(file: Path) -> SimulatorModel:
     links = {link.name: link for link in root.all("link")}
     if not links:
         raise root.error("has no <link>; give the file of a vehicle")
-    plugins = (node for own in root.all("gazebo") for node in own.all("plugin"))
+    plugins = [node for own in root.all("gazebo") for node in own.all("plugin")]
     motors = sorted((each for each in plugins if MOTOR.search(each.attributes.get("filename", ""))), key=motor_number)
+    if not motors and any(text_of(each, "jointName") for each in plugins):
+        raise no_motor(file, plugins)
     placed = _placed(root, links, [text_of(each, "jointName") for each in motors])
     bodies = tuple(_body(links[name], placed[name], notes) for name in placed)
     if motors:

@@ -156,6 +156,13 @@ def test_what_the_file_keeps_decides_whether_an_inertia_is_of_no_body(mine):
     assert [each.element for each in said.changes] == ["izz"]
 
 
+def test_numbers_that_instruments_do_not_identify_stay(mine):
+    loose = replace(effect("drag_factor_error", error=0.2), identified=False)
+    said, _ = correct(mine, loose, effect("parameter_error", thrust_scale=-0.17))
+    assert [each.element for each in said.changes] == ["motorConstant"]
+    assert said.unchanged[0].startswith("wrong drag (yaw) factor, error 0.2 [0.195, 0.205] 1: setpoints do not show it")
+
+
 def test_a_yaw_torque_is_corrected_once(mine):
     wrong = effect("drag_factor_error", error=0.2), effect("parameter_error", inertia_z=0.8)
     said, new = correct(mine, *wrong)

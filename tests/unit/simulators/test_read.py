@@ -195,12 +195,13 @@ def test_urdf_with_motor_plugins_is_the_vehicle_of_the_sdf(tmp_path):
         (("<jointName>rotor_2_joint<", "<jointName>none<"), "the joint rotor_2_joint turns, and a study has one rigid"),
         (('lower="0" upper="0"', 'lower="0" upper="1"'), "the joint frame_joint turns"),
         (("<motorNumber>2</motorNumber>", ""), "has no <motorNumber>"),
+        (("multicopter-motor-model", "lift-drag"), "none of its plugins is a motor model that is known here"),
         (('<origin xyz="0.0325269 -', '<origin rpy="0 1 0" xyz="0.0325269 -'), "not along z of the body"),
     ],
 )
 def test_urdf_with_motor_plugins_is_refused(tmp_path, change, words):
     path = tmp_path / "bad.urdf"
-    path.write_text(urdf_of(SMALL).replace(*change, 1))
+    path.write_text(urdf_of(SMALL).replace(*change))
     with pytest.raises(InputError) as refused:
         read_model(path)
     assert words in str(refused.value)
