@@ -349,9 +349,8 @@ def _concluded(
     taken = held_out.removed_by_numbers(NOISE if still else 0.0)
     numbers = wrong_numbers(estimates, effects, taken)
     effects += [numbers] if numbers is not None else []
-    before, after = (held_out.size(each).floors for each in (held_out.parameters, held_out.after))
     # Where wrong numbers leave no gap, there is none that names could take a share of.
-    removed = held_out.shares(as_given=numbers is not None and not (before > CLEAR).any())
+    removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)
     if not named:
         # Faults and wrong numbers alone: of all the gap, where one is left.
         removed = held_out.shares(as_given=True) if effects and remainder else {}
@@ -359,6 +358,7 @@ def _concluded(
     listed = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
     once = {(rival.name, rival.instead_of, rival.jointly_with): rival for rival in listed}
     rivals = (*once.values(), *untried(hypothesis, named, settings))
+    before, after = (held_out.size(each).floors for each in (held_out.parameters, held_out.after))
     remains = bool(remainder)
     if effects:
         remains = gap_remains(before, after, remainder, settings.named_share, len(named))
