@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import BoolArray
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.consistency.audit import Audit, audit
@@ -24,7 +24,13 @@ from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.actuation import decided_by_instruments
-from cpfls_cli.gap.naming.by_instruments import by_instruments, significant_effects, unidentified, unidentified_axes
+from cpfls_cli.gap.naming.by_instruments import (
+    by_instruments,
+    significant_effects,
+    unidentified,
+    unidentified_axes,
+    with_lean,
+)
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     all_numbers,
@@ -110,7 +116,8 @@ def diagnose(
         if gusts is not None and gusts.split.any():
             quiet = np.minimum(quiet, gusts.noise(windows))
             flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
-            named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
+            across = gusts.found.size[3:5]
+            named = _by_instruments(_named(flights, settings, rng, progress), given, settings, across)
             gusts = _gusts(named, given, settings)
     losses = _losses(flights, named, settings, rng)
     if losses:
@@ -240,10 +247,12 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | No
     return air(found.hypothesis, found.estimates.linear, found.block, given, settings)
 
 
-def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
+def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, across: Array) -> _Named:
     """Judge what was named with the numbers that instruments identify, without what is 0 by them.
 
     A loop that answers gusts looks like a lag, so lags are named where they are significant by instruments.
+
+    `across`: gusts along x and y, shape (2,), N.
     """
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
@@ -263,7 +272,7 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
         fit = fewer
     loose = tuple(effect.name for effect in unidentified(fit, found))
     lags = decided_by_instruments(found, named.effects, given)
-    judgement = judge.judge(lags.found)
+    judgement = judge.judge(with_lean(lags.found, across))
     if not lags.chances:
         refusals += [
             Refusal(each.effect.name, "a loop that answers gusts looks alike, and instruments do not identify it")
