@@ -46,7 +46,7 @@ NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 class Hidden(NamedTuple):
     """What flies, what the right file and the wrong one hold, and the name; commands alone may be logged.
 
-    A centre of mass, m, is where the wrong file's link has to have it.
+    A centre of mass, m, is where the wrong file's link has to have it; `formats` are those that can state the error.
     """
 
     truth: Truth
@@ -55,6 +55,7 @@ class Hidden(NamedTuple):
     name: str
     commands: bool = False
     centre: tuple[float, float] = (0.0, 0.0)
+    formats: tuple[str, ...] = FORMATS
 
 
 class Answer(NamedTuple):
@@ -90,6 +91,11 @@ def _hidden() -> Iterator[tuple[str, Hidden]]:
         size = f"centre of mass {1e3 * np.hypot(*offset):.1f} mm, {truth.mass:.2g} kg"
         wrong = replace(truth.vehicle, rotors=tuple(moved))
         yield size, Hidden(truth, flown, _of(flown, wrong), "com_offset", centre=offset)
+    first, *others = true.vehicle.rotors
+    wrong = replace(true.vehicle, rotors=(replace(first, spin=-first.spin), *others))
+    # Directions are in the code of gym-pybullet-drones, not in its file.
+    stating = tuple(form for form in FORMATS if form != "urdf")
+    yield "a rotor's direction", Hidden(true, right, _of(right, wrong), "", formats=stating)
     late = true._replace(lag_s=0.03)
     wrong, slow = (VehicleModel(vehicle=true.vehicle, response=RotorResponse(lag_s=lag)) for lag in (0.001, 0.03))
     yield "lag of 30 ms", Hidden(late, slow, wrong, "motor_lag", commands=True)
@@ -113,9 +119,9 @@ def main(draws: int = 10, only: str = "", first: int = 0) -> None:
             if only in what:
                 answers = list(pool.map(partial(_answer, hidden), range(first, first + draws)))
                 names.append([what, *_named(hidden, answers)])
-                sizes += [[what, form, *_judged(form, answers)] for form in FORMATS]
+                sizes += [[what, form, *_judged(form, answers)] for form in hidden.formats]
                 progress(names[-1])
-                progress([row[1:] for row in sizes[-len(FORMATS) :]])
+                progress([row[1:] for row in sizes[-len(hidden.formats) :]])
     table("simulator_files_names", "hidden | draws | right name | wrong name | verdicts", names)
     print()
     header = "hidden | file | corrected | hidden numbers within their intervals | draws with others touched"
@@ -136,7 +142,7 @@ def _answer(hidden: Hidden, draw: int) -> Answer:
     found = diagnose(flights[:-1], flights[-1:], GapSettings(), np.random.default_rng(draw)).diagnosis
     formats = {}
     with tempfile.TemporaryDirectory() as folder:
-        for form in FORMATS:
+        for form in hidden.formats:
             right, wrong = (_written(Path(folder), form, each) for each in (hidden.right, hidden.wrong))
             of = of_log(read_model(wrong), None, None)
             of = replace(of, spins=tuple(each.spin for each in stated.rotors))
@@ -156,7 +162,9 @@ def _compared(
     right: Path, wrong: Path, changes: Sequence[Change], centre: tuple[float, float]
 ) -> tuple[list[bool], int]:
     """Tell of each hidden number that is written whether its interval holds the truth, and count the others."""
-    wrongs, rights = (path.read_text().splitlines() for path in (wrong, right))
+    # Of words that are directions, the signs.
+    texts = (path.read_text().replace(">ccw<", ">1<").replace(">cw<", ">-1<") for path in (wrong, right))
+    wrongs, rights = (text.splitlines() for text in texts)
     # A gear is written where the gain of the same actuator is wrong.
     before_gain, true_gain = (stated.value for each in (wrong, right) if (stated := read_model(each).rotors[0].thrust))
     within, others = [], 0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,18 @@ Write = Callable[[Sheet, Held, Sequence[str], str], str]
 """Takes a model, what the target holds of it, what it does not, in words, and the name of the file."""
 
 
+class Otherwise(NamedTuple):
+    """What a form flies otherwise than any sum of weights.
+
+    `words`: what that is. `fly`: from the text of the file and a course to states at the samples behind each start,
+    shape (run, horizon, ...); with ``own=False`` without it. `step_s`: longest step that it is flown with.
+    """
+
+    words: str
+    fly: Callable[..., State]
+    step_s: float
+
+
 @dataclass(frozen=True)
 class Form:
     """A form that a model is exported in.
@@ -45,21 +57,7 @@ class Form:
     write: Write
     also: str = ""
     lacks: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Target(Form):
-    """A form of which something flies otherwise than any sum of weights.
-
-    `fly`, `fly_as_held`: from the text of the file and a course to states at the samples behind each start, shape (run,
-    horizon, ...); the second leaves out what it does `otherwise`, in words. `step_s`: longest step that it is flown
-    with.
-    """
-
-    fly: Callable[[str, Course], State]
-    fly_as_held: Callable[[str, Course], State]
-    step_s: float
-    otherwise: str
+    otherwise: Otherwise | None = None
 
 
 def _whole(model: VehicleModel) -> tuple[Held, Holds]:
@@ -80,25 +78,15 @@ FORMS: dict[str, Form] = {
     "sdf": Form("Gazebo's motor model", ".sdf", sdf_held, sdf_text),
     "px4": Form("PX4's Gazebo", ".sdf", sdf_held, px4.px4_text, px4.AIRFRAME),
     "crazyflow": Form("crazyflow", ".toml", crazyflow_held, crazyflow_text),
-    "urdf": Target(
-        "gym-pybullet-drones",
-        ".urdf",
-        urdf_held,
-        urdf_text,
-        fly=fly_urdf,
-        fly_as_held=partial(fly_urdf, in_world=False),
-        step_s=1e-3,
-        otherwise=OTHERWISE,
+    "urdf": Form(
+        "gym-pybullet-drones", ".urdf", urdf_held, urdf_text, otherwise=Otherwise(OTHERWISE, fly_urdf, step_s=1e-3)
     ),
-    "ardupilot": Target(
+    "ardupilot": Form(
         "ArduPilot's SITL",
         ".json",
         ardupilot.ardupilot_held,
         ardupilot.ardupilot_text,
-        fly=ardupilot.fly_ardupilot,
-        fly_as_held=partial(ardupilot.fly_ardupilot, own=False),
-        step_s=ardupilot.STEP_S,
-        otherwise=ardupilot.OTHERWISE,
+        otherwise=Otherwise(ardupilot.OTHERWISE, ardupilot.fly_ardupilot, ardupilot.STEP_S),
     ),
     "rotorpy": Form("RotorPy", ".py", rotorpy_held, rotorpy_text),
     "pegasus": Form("Pegasus Simulator", ".py", pegasus_held, pegasus_text),
@@ -150,8 +138,7 @@ def exported(sheet: Sheet, form: str, file: str) -> Exported:
 def _left(sheet: Sheet, held: Held, holds: Holds, form: Form) -> tuple[tuple[Missing, ...], tuple[str, ...]]:
     """List what is left of a vehicle, and say so."""
     about_hover = missing(sheet.model, held, holds, np.array(sheet.floor), sheet.wind)
-    otherwise = [*_otherwise(sheet, held, form)] if isinstance(form, Target) else []
-    left = (*about_hover, *otherwise, *sheet.outside)
+    left = (*about_hover, *_otherwise(sheet, held, form), *sheet.outside)
     remarks = (*([form.lacks] if form.lacks else []), *(each.sentence for each in left))
     if len(about_hover) - any(sheet.wind) > 1:
         off = together(sheet.model, held).sentence
@@ -159,18 +146,17 @@ def _left(sheet: Sheet, held: Held, holds: Holds, form: Form) -> tuple[tuple[Mis
     return left, remarks or (f"{form.title} holds all of it.",)
 
 
-def _otherwise(sheet: Sheet, held: Held, target: Target) -> Iterator[Missing]:
-    """Tell how far half a second about hover ends off by what a target does otherwise than a sum of weights."""
-    text, course = target.write(sheet, held, (), f"uav{target.ending}"), _probe_course(sheet.model, held, target.step_s)
-    ends = [course.errors(fly(text, course))[:, -1] for fly in (target.fly, target.fly_as_held)]
-    off = Off.of(np.linalg.norm(ends[0] - ends[1], axis=2).mean(axis=0))
-    if max(off) > NOTHING:
-        yield Missing(target.otherwise, 0.0, 0.0, np.nan, off)
-
-
-def _probe_course(model: VehicleModel, held: Held, step_s: float) -> Course:
-    """Arrange the flight about hover for a target: a run of each of its stretches."""
-    flight = probe_flight(model)
+def _otherwise(sheet: Sheet, held: Held, form: Form) -> Iterator[Missing]:
+    """Tell how far half a second about hover ends off by what a form does otherwise than a sum of weights."""
+    if form.otherwise is None:
+        return
+    words, fly, step_s = form.otherwise
+    flight = probe_flight(sheet.model)
     horizon = len(flight) // len(flight.stretches) - 1
     finer = max(1, round(flight.motion.period / step_s))
-    return Course(flight, flight.starts(horizon, 1), horizon, finer, gravity=held.body.gravity)
+    course = Course(flight, flight.starts(horizon, 1), horizon, finer, gravity=held.body.gravity)
+    text = form.write(sheet, held, (), f"uav{form.ending}")
+    ends = [course.errors(fly(text, course, own=own))[:, -1] for own in (True, False)]
+    off = Off.of(np.linalg.norm(ends[0] - ends[1], axis=2).mean(axis=0))
+    if max(off) > NOTHING:
+        yield Missing(words, 0.0, 0.0, np.nan, off)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import BoolArray
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.consistency.audit import Audit, audit
@@ -24,7 +24,13 @@ from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel
 from cpfls_cli.gap.naming.actuation import decided_by_instruments
-from cpfls_cli.gap.naming.by_instruments import by_instruments, significant_effects, unidentified, unidentified_axes
+from cpfls_cli.gap.naming.by_instruments import (
+    by_instruments,
+    significant_effects,
+    unidentified,
+    unidentified_axes,
+    with_lean,
+)
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     all_numbers,
@@ -110,7 +116,8 @@ def diagnose(
         if gusts is not None and gusts.split.any():
             quiet = np.minimum(quiet, gusts.noise(windows))
             flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
-            named = _by_instruments(_named(flights, settings, rng, progress), given, settings)
+            across = gusts.found.size[3:5]
+            named = _by_instruments(_named(flights, settings, rng, progress), given, settings, across)
             gusts = _gusts(named, given, settings)
     losses = _losses(flights, named, settings, rng)
     if losses:
@@ -130,7 +137,7 @@ def diagnose(
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     doubts = [
-        *_doubts(unnamed, judged, named.unidentified, settings),
+        *_doubts(unnamed, judged, settings),
         *(refused.sentence for refused in named.refusals),
     ]
     notes = [*not_judged(held_out), *([] if named.differ else doubts)]
@@ -197,9 +204,10 @@ class _Named(NamedTuple):
 
     def in_gusts(self, judged: JudgedEffect) -> JudgedEffect:
         """Take the p-value of an effect by instruments, and drop rivals of a lag: a fit sees the loop."""
-        if judged.effect.name not in self.sure:
-            return judged
-        effect = replace(judged.effect, p_value=self.sure[judged.effect.name])
+        effect = replace(judged.effect, identified=judged.effect.name not in self.unidentified)
+        if effect.name not in self.sure:
+            return replace(judged, effect=effect)
+        effect = replace(effect, p_value=self.sure[effect.name])
         return replace(judged, effect=effect, alternatives=() if CATALOGUE[effect.name].is_lag else judged.alternatives)
 
 
@@ -239,10 +247,12 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | No
     return air(found.hypothesis, found.estimates.linear, found.block, given, settings)
 
 
-def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) -> _Named:
+def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, across: Array) -> _Named:
     """Judge what was named with the numbers that instruments identify, without what is 0 by them.
 
     A loop that answers gusts looks like a lag, so lags are named where they are significant by instruments.
+
+    `across`: gusts along x and y, shape (2,), N.
     """
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
@@ -262,7 +272,7 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
         fit = fewer
     loose = tuple(effect.name for effect in unidentified(fit, found))
     lags = decided_by_instruments(found, named.effects, given)
-    judgement = judge.judge(lags.found)
+    judgement = judge.judge(with_lean(lags.found, across))
     if not lags.chances:
         refusals += [
             Refusal(each.effect.name, "a loop that answers gusts looks alike, and instruments do not identify it")
@@ -273,9 +283,7 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings) ->
     return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure, unidentified=loose)
 
 
-def _doubts(
-    unnamed: Sequence[str], judged: Sequence[JudgedEffect], loose: Sequence[str], settings: GapSettings
-) -> Iterator[str]:
+def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
     """Say what intervals cover, and which effects are not significant jointly with the others."""
     if unnamed:
         yield (
@@ -285,7 +293,7 @@ def _doubts(
     for effect in (each.effect for each in judged):
         if effect.p_value > settings.significance:
             yield f"{effect.name} is not significant jointly with the others, p = {effect.p_value:.2g}"
-        if effect.name in loose:
+        if not effect.identified:
             yield (
                 f"instruments do not identify the numbers of {effect.name}: they come from a fit to all motion, in"
                 " which the loop answers gusts, and may be off by more than their intervals"
@@ -350,7 +358,8 @@ def _concluded(
     taken = held_out.removed_by_numbers(NOISE if still else 0.0)
     numbers = wrong_numbers(estimates, effects, taken)
     effects += [numbers] if numbers is not None else []
-    removed = held_out.shares()
+    # Where wrong numbers leave no gap, there is none that names could take a share of.
+    removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)
     if not named:
         # Faults and wrong numbers alone: of all the gap, where one is left.
         removed = held_out.shares(as_given=True) if effects and remainder else {}

@@ -111,7 +111,7 @@ body frame, (run, 3)."""
 
 
 def fly_body(course: Course, mass: float, inertia: Array, wrench: Wrench, lag: float) -> State:
-    """Fly a rigid body by the published equations of a target, semi-implicit; see `Target.fly`.
+    """Fly a rigid body by the published equations of a target, semi-implicit; see `Otherwise.fly`.
 
     Parameters
     ----------

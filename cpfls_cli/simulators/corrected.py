@@ -14,8 +14,8 @@ Of the effects that `gap` names, those whose formula is the simulator's become n
 - ``products_of_inertia``, ``rotor_drag``, ``motor_lag``: as they are. ``rolling_moment`` is positive for rotors that
   turn counter-clockwise and negative for others, since the plugin's formula has no sign of the turn.
 
-A number is replaced only where the interval leaves the stated one out, at 95 % for all numbers together (Bonferroni):
-of four that are right one would else be moved in every sixth file.
+A number is replaced only where the interval leaves the stated one out at the rate of errors that names are given at,
+for all numbers together (Bonferroni): at 95 % each, of four that are right one would be moved in every sixth file.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import visible
 from cpfls_cli.flightlog.airframe import turns_by_rotors
 from cpfls_cli.gap.naming.results import Conclusion, Estimate, GapVerdict, NamedEffect
+from cpfls_cli.gap.settings import RARE
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.simulators.document import Node, Span, Stated, raw_bytes
 from cpfls_cli.simulators.literals import with_comment
@@ -53,12 +54,13 @@ _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
 _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_up": "lag"}
 """Numbers of a rotor that are effects of their own, which a study's vehicle has none of, by their quantity."""
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
-_OF_XML = ("sdf", "urdf", "mjcf")
+_OF_PLUGINS = ("sdf", "urdf-gazebo")
+_OF_XML = (*_OF_PLUGINS, "urdf", "mjcf")
 _ROUNDING, _SAME = 1e-9, 1e-6
 _LEAST_S = 5.0
 """Length of a flight that shows single rotors."""
 _BY_HAND = {
-    "sdf": "a plugin of your own that adds this force and torque to the first link at each step",
+    **dict.fromkeys(_OF_PLUGINS, "a plugin of your own that adds this force and torque to the first link at each step"),
     "urdf": "applyExternalForce and applyExternalTorque at each step",
     "mjcf": "data.xfrc_applied of the body at each step",
     "rotorpy": "a class of your own under Multirotor, whose compute_body_wrench adds it",
@@ -66,15 +68,16 @@ _BY_HAND = {
     "crazyflow": "dist_f and dist_t at each step",
     "crazyflie": "nothing: the firmware has no model of it",
 }
+_OF_PLUGIN = {
+    "thrust": "motorConstant",
+    "ratio": "momentConstant",
+    "lag_up": "timeConstantUp",
+    "lag_down": "timeConstantDown",
+    "drag": "rotorDragCoefficient",
+    "rolling": "rollingMomentCoefficient",
+}
 _TAGS = {
-    "sdf": {
-        "thrust": "motorConstant",
-        "ratio": "momentConstant",
-        "lag_up": "timeConstantUp",
-        "lag_down": "timeConstantDown",
-        "drag": "rotorDragCoefficient",
-        "rolling": "rollingMomentCoefficient",
-    },
+    **dict.fromkeys(_OF_PLUGINS, _OF_PLUGIN),
     "urdf": {"thrust": "kf", "torque": "km", "drag": "drag_coeff_xy"},
     "mjcf": {
         "thrust": "gear z",
@@ -96,7 +99,7 @@ _TAGS = {
 }
 """Names of the numbers of a rotor in each format; what a format does not name it cannot hold."""
 _NOT_STATED = {
-    "sdf": "it has no place in the motor plugin",
+    **dict.fromkeys(_OF_PLUGINS, "it has no place in the motor plugin"),
     "urdf": "the file states none; write kf and km into <properties>, as gym-pybullet-drones reads them, or scale the "
     "forces and torques that you apply",
     "mjcf": "controls are newtons, so no number of the file is wrong: put the factor on what makes controls of speeds",
@@ -188,10 +191,10 @@ class _Corrections:
 
     @cached_property
     def wider(self) -> float:
-        """By how much an interval at 95 % for all numbers together is wider than that of one."""
+        """By how much an interval that rarely leaves out any of all numbers is wider than one at 95 % of one."""
         from scipy.stats import norm
 
-        return float(norm.isf(0.025 / max(self.numbers, 1)) / norm.isf(0.025))
+        return float(norm.isf(0.5 * RARE / max(self.numbers, 1)) / norm.isf(0.025))
 
     @property
     def rotors(self) -> list[Rotor]:
@@ -219,7 +222,7 @@ class _Corrections:
                 share = other.value / before if before else 1.0
                 same = share * new, *sorted((share * low, share * high))
                 self.replace(name, other, _Found(*same), words, whom, None)
-        elif room is not None and self.of.model.format == "sdf":
+        elif room is not None and self.of.model.format in _OF_PLUGINS:
             self.put(room, f"<{name}>{text}</{name}>")
             self.note(room.file, name, stated.where, (before, float(text), low, high), words, whom)
         else:
@@ -302,11 +305,19 @@ def corrected(
     if not found.contradictions:
         _directions(made, [each.signals for each in flights])
     if found.verdict in _WRITES and not found.contradictions:
-        sure = [each for each in found.effects if each.name not in found.rivals]
+        sure = []
         for each in found.effects:
-            if each not in sure:
+            title, excitation = find(each.name).title, find(each.name).excitation
+            if each.name in found.rivals:
                 rivals = joined([find(rival.name).title for rival in found.rivals[each.name]], "or")
-                made.unchanged.append(f"{find(each.name).title}: these flights cannot separate it from {rivals}")
+                made.unchanged.append(f"{title}: these flights cannot separate it from {rivals}")
+            elif not each.identified:
+                made.unchanged.append(
+                    f"{title}, {_values(each)}: setpoints do not show it, and a fit sees how the loop answers gusts "
+                    f"too; fly, with setpoints in the log: {excitation}"
+                )
+            else:
+                sure.append(each)
         _put_in(made, sure)
         _not_found(made, found)
     elif found.verdict == GapVerdict.NO_GAP:
@@ -372,7 +383,7 @@ def _directions(made: _Corrections, flights: Sequence[Signals]) -> None:
             where = "the format states no direction" if rotor.turn is None else rotor.turn.where
             made.elsewhere.append(f"{says}; {where}: turn it round there")
         else:
-            span, is_word = rotor.turn.span, made.of.model.format == "sdf"
+            span, is_word = rotor.turn.span, made.of.model.format in _OF_PLUGINS
             old = raw_bytes(span.file)[span.start : span.end]
             flipped = old[1:] if old[:1] == b"-" else b"-" + old.removeprefix(b"+")
             made.edits[span] = (b"ccw" if spin > 0 else b"cw") if is_word else flipped
@@ -444,12 +455,15 @@ def _say_hidden(made: _Corrections, name: str, stated: Stated, reason: str | Non
     made.unchanged.append(f"{name} {stated.written(stated.value):.4g}: {why}")
 
 
-def _not_held(made: _Corrections, each: NamedEffect) -> None:
-    entry = find(each.name)
-    values = ", ".join(
+def _values(each: NamedEffect) -> str:
+    return ", ".join(
         f"{number.name} {number.value:.4g} [{number.low:.4g}, {number.high:.4g}] {number.unit}"
         for number in each.numbers
     )
+
+
+def _not_held(made: _Corrections, each: NamedEffect) -> None:
+    entry, values = find(each.name), _values(each)
     made.elsewhere.append(
         f"{entry.title}: {entry.formula}{', with ' if values else ''}{values}; the format has no number for it: "
         f"{_BY_HAND[made.of.model.format]}; `cpfls export extended.h5 --format c` writes the lines"
@@ -585,7 +599,7 @@ def _inertia(made: _Corrections, wanted: Mapping[int, _Found]) -> None:
         new = found.plus(float(own.inertia[INERTIA_ENTRIES[entry]]) - total)
         words = f"moment of inertia {ENTRIES[entry]} of {{whom}} is {{share}}"
         words += "; about z flights show its ratio to the yaw torque alone" if entry == 2 else ""
-        room = None if own.node is None else own.node.first("inertia")
+        room = own.node.first("inertia") if own.node is not None and made.of.model.format == "sdf" else None
         made.replace(ENTRIES[entry], own.entries[entry], new, words, own.name or "the vehicle", room)
 
 

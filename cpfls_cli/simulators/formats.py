@@ -40,13 +40,15 @@ class Format:
     ending: str = ""
 
 
+_OF_PLUGIN = "SI; speeds in rad/s, motorConstant N s^2, momentConstant m, rotorDragCoefficient N s^2/(m rad)"
+_OF_URDF = "x forward, y left, z up; origins in m and rad, roll pitch yaw about fixed axes"
 FORMATS = (
     Format(
         "sdf",
         "Gazebo",
         "sdf",
         lambda file, _: read_sdf(file),
-        "SI; speeds in rad/s, motorConstant N s^2, momentConstant m, rotorDragCoefficient N s^2/(m rad)",
+        _OF_PLUGIN,
         "x forward, y left, z up; poses in m and rad, roll pitch yaw about fixed axes",
         "sdformat.org/spec; gz-sim MulticopterMotorModel.cc; PX4-SITL_gazebo-classic gazebo_motor_model.cpp",
     ),
@@ -56,8 +58,17 @@ FORMATS = (
         "robot",
         lambda file, _: read_urdf(file),
         "SI; kf N/rpm^2, km N m/rpm^2, thrust2weight of 9.8 m/s^2, drag_coeff N s^2/(m rad)",
-        "x forward, y left, z up; origins in m and rad, roll pitch yaw about fixed axes",
+        _OF_URDF,
         "wiki.ros.org/urdf/XML; gym-pybullet-drones BaseAviary.py",
+    ),
+    Format(
+        "urdf-gazebo",
+        "Gazebo",
+        "",
+        lambda file, _: read_urdf(file),
+        _OF_PLUGIN,
+        _OF_URDF,
+        "wiki.ros.org/urdf/XML; rotors_simulator gazebo_motor_model.cpp",
     ),
     Format(
         "mjcf",

@@ -235,7 +235,7 @@ class SimulatorModel:
         """Where the mass stands."""
         with_mass = [body for body in self.bodies if body.mass.value > 0]
         rest = len(with_mass) - 1
-        return self.bodies[0].mass.where + (f", and {rest} more links fixed to it, rotors among them" if rest else "")
+        return self.heaviest.mass.where + (f", and {rest} more links fixed to it, rotors among them" if rest else "")
 
 
 def _require_body(body: Body) -> None:
@@ -268,7 +268,7 @@ def checked(model: SimulatorModel) -> SimulatorModel:
     if lift is not None and lift < weight:
         raise InputError(
             f"{model.file}: {model.mass_kg:.4g} kg weigh {weight:.3g} N, and its {len(model.rotors)} rotors lift at "
-            f"most {lift:.3g} N: it cannot hover; check the mass ({model.bodies[0].mass.where}), and "
+            f"most {lift:.3g} N: it cannot hover; check the mass ({model.heaviest.mass.where}), and "
             f"thrust and limit of the rotors ({model.rotors[0].where})"
         )
     return replace(model, notes=(*model.notes, *_oddities(model)))

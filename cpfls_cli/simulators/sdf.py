@@ -10,7 +10,7 @@ at a speed w in rad/s, thrust is ``motorConstant w^2`` along z of the rotor's li
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from os.path import isdir, isfile
 from pathlib import Path
 
@@ -77,7 +77,7 @@ class _Parts:
                     self._frames[name] = node, scope, own, own
                 case "joint":
                     self.joints[name] = node
-                    self._frames[name] = node, scope, own, scope + _text(node, "child")
+                    self._frames[name] = node, scope, own, scope + text_of(node, "child")
                 case "frame":
                     attached = node.attributes.get("attached_to", "")
                     self._frames[name] = node, scope, own, scope + attached if attached else own
@@ -106,7 +106,7 @@ class _Parts:
             self._frames[frame] = placed
             self._add(model, scope, frame, depth + 1)
             return
-        name = f"{scope}{_text(node, 'name') or model.name}::"
+        name = f"{scope}{text_of(node, 'name') or model.name}::"
         self._frames[name] = placed
         self._add(model, name, name, depth + 1)
 
@@ -134,7 +134,7 @@ class _Parts:
 
 
 def _included(node: Node) -> Path:
-    uri = _text(node, "uri")
+    uri = text_of(node, "uri")
     name = uri.removeprefix("model://").removeprefix("file://")
     folders = [node.file.parent, node.file.parent.parent]
     for place in (folder / name for folder in folders if name):
@@ -151,7 +151,8 @@ def _included(node: Node) -> Path:
     )
 
 
-def _text(node: Node, tag: str) -> str:
+def text_of(node: Node, tag: str) -> str:
+    """Give the text of an element below; empty where there is none."""
     found = node.first(tag)
     return "" if found is None else found.text.strip()
 
@@ -196,24 +197,29 @@ def read_sdf(file: Path) -> SimulatorModel:
     model = _model_of(root)
     parts, notes = _Parts(model), list[str]()
     if not parts.motors:
-        named = sorted({plugin.attributes.get("filename", "?") for plugin in parts.plugins})
-        raise InputError(
-            f"{file}: none of its plugins is a motor model that is known here ({', '.join(named) or 'it has none'}); "
-            "known are gz-sim-multicopter-motor-model-system, libgazebo_motor_model.so and "
-            "librotors_gazebo_motor_model.so"
-        )
-    motors = sorted(parts.motors, key=lambda each: _motor_number(each[1]))
-    spinning = {scope + _text(plugin, "jointName"): scope for scope, plugin in motors}
+        raise no_motor(file, parts.plugins)
+    motors = sorted(parts.motors, key=lambda each: motor_number(each[1]))
+    spinning = {scope + text_of(plugin, "jointName"): scope for scope, plugin in motors}
     base = _base(parts, motors[0][0], motors[0][1])
     held = _rigid(parts, base, set(spinning), notes)
     inverse = np.asarray(np.linalg.inv(parts.pose(base)), dtype=float)
     bodies = tuple(_body(parts.links[name], name, inverse @ parts.pose(name), notes) for name in held)
     placed = {body.name: body for body in bodies}
-    rotors = tuple(_rotor(parts, scope, plugin, placed, inverse) for scope, plugin in motors)
+    rotors = tuple(rotor_of(plugin, placed.get(scope + text_of(plugin, "linkName"))) for scope, plugin in motors)
     return SimulatorModel(model.name, "sdf", bodies, rotors, CANNOT, tuple(notes), tuple(parts.files))
 
 
-def _motor_number(plugin: Node) -> int:
+def no_motor(file: Path, plugins: Sequence[Node]) -> InputError:
+    """Make the error of a file none of whose plugins is known."""
+    named = sorted({plugin.attributes.get("filename", "?") for plugin in plugins})
+    return InputError(
+        f"{file}: none of its plugins is a motor model that is known here ({', '.join(named) or 'it has none'}); known "
+        "are gz-sim-multicopter-motor-model-system, libgazebo_motor_model.so and librotors_gazebo_motor_model.so"
+    )
+
+
+def motor_number(plugin: Node) -> int:
+    """Give the number of the motor of a plugin; raises InputError where it has none."""
     node = plugin.first("motorNumber")
     if node is None:
         raise plugin.error("has no <motorNumber>; write which motor it is, from 0")
@@ -221,10 +227,10 @@ def _motor_number(plugin: Node) -> int:
 
 
 def _base(parts: _Parts, scope: str, plugin: Node) -> str:
-    joint = parts.joints.get(scope + _text(plugin, "jointName"))
+    joint = parts.joints.get(scope + text_of(plugin, "jointName"))
     if joint is None:
-        raise plugin.error(f"its joint {_text(plugin, 'jointName')!r} is not in the file; correct <jointName>")
-    parent = scope + _text(joint, "parent")
+        raise plugin.error(f"its joint {text_of(plugin, 'jointName')!r} is not in the file; correct <jointName>")
+    parent = scope + text_of(joint, "parent")
     if parent not in parts.links:
         raise joint.error(f"its parent {parent!r} is not in the file; correct <parent>")
     return parent
@@ -236,7 +242,7 @@ def _rigid(parts: _Parts, base: str, spinning: set[str], notes: list[str]) -> li
     ends = {}
     for name, joint in parts.joints.items():
         scope = name.removesuffix(joint.name)
-        ends[name] = [scope + _text(joint, end) for end in ("parent", "child")]
+        ends[name] = [scope + text_of(joint, end) for end in ("parent", "child")]
     while open_:
         link = open_.pop()
         for name, both in ends.items():
@@ -277,25 +283,33 @@ def _body(link: Node, name: str, placed: Array, notes: list[str]) -> Body:
     return part_of(name, mass_node.number(), entries, placed, _pose(own), place, inertial)
 
 
-def _rotor(parts: _Parts, scope: str, plugin: Node, placed: dict[str, Body], inverse: Array) -> Rotor:
-    name = scope + _text(plugin, "linkName")
-    if name not in placed:
-        raise plugin.error(f"its link {name!r} is not a part of the vehicle; correct <linkName>")
+def rotor_of(plugin: Node, link: Body | None) -> Rotor:
+    """Make the rotor of a motor plugin, of the link that it names.
+
+    Raises
+    ------
+    InputError
+        If that is no part of the vehicle, or the plugin states a number that it does not take.
+    """
+    if link is None:
+        raise plugin.error(f"its link {text_of(plugin, 'linkName')!r} is not a part of the vehicle; correct <linkName>")
     turn = plugin.first("turningDirection")
     if turn is None or turn.text.strip() not in ("ccw", "cw"):
-        raise plugin.error(f"turningDirection is {_text(plugin, 'turningDirection')!r}; write ccw or cw")
+        raise plugin.error(f"turningDirection is {text_of(plugin, 'turningDirection')!r}; write ccw or cw")
     spin = 1 if turn.text.strip() == "ccw" else -1
-    if _text(plugin, "motorType") not in ("", "velocity"):
-        raise plugin.error(f"motorType is {_text(plugin, 'motorType')!r}; the plugin knows velocity alone: write that")
+    if text_of(plugin, "motorType") not in ("", "velocity"):
+        raise plugin.error(
+            f"motorType is {text_of(plugin, 'motorType')!r}; the plugin knows velocity alone: write that"
+        )
     found = {tag: _stated(plugin, tag) for tag in DEFAULTS}
     for tag in ("motorConstant", "momentConstant", "maxRotVelocity", "timeConstantUp", "timeConstantDown"):
         if not found[tag].value > 0:
             raise plugin.error(f"{tag} is {found[tag].value:g}; write a number above 0")
     return Rotor(
-        name,
-        f"{plugin.file.name} line {plugin.line}: motor plugin of {name}",
-        placed[name].centre,
-        (inverse @ parts.pose(name))[:3, 2],
+        link.name,
+        f"{plugin.file.name} line {plugin.line}: motor plugin of {link.name}",
+        link.centre,
+        link.link[:, 2],
         spin,
         thrust=found["motorConstant"],
         ratio=found["momentConstant"],

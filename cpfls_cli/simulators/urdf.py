@@ -1,14 +1,17 @@
-"""URDF: links with inertials and joints; of gym-pybullet-drones the element ``properties`` too.
+"""URDF: links with inertials and joints, with motor plugins of Gazebo or the ``properties`` of gym-pybullet-drones.
 
-Its equations, as published with it (``BaseAviary.py``): with rotor speeds n in rpm, ``kf n^2`` is the thrust along z at
-the centre of mass of ``prop0_link`` to ``prop3_link``, the body turns about z by ``km (-n0^2 + n1^2 - n2^2 + n3^2)``,
-the other way round for the racer, ``thrust2weight`` is the largest thrust of all rotors over the weight, and drag is
-``drag_coeff_xy``, ``drag_coeff_z`` times the velocity times the sum of the rotor speeds in rad/s.
+Plugins are those of SDF, each in an element ``gazebo``, and the joints of their rotors turn. The equations of
+gym-pybullet-drones, as published with it (``BaseAviary.py``): with rotor speeds n in rpm, ``kf n^2`` is the thrust
+along z at the centre of mass of ``prop0_link`` to ``prop3_link``, the body turns about z by
+``km (-n0^2 + n1^2 - n2^2 + n3^2)``, the other way round for the racer, ``thrust2weight`` is the largest thrust of all
+rotors over the weight, and drag is ``drag_coeff_xy``, ``drag_coeff_z`` times the velocity times the sum of the rotor
+speeds in rad/s.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +20,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.simulators.document import Node, Stated, read_xml
 from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, part_of, pose, rotated, turning
+from cpfls_cli.simulators.sdf import CANNOT as CANNOT_OF_PLUGINS
+from cpfls_cli.simulators.sdf import MOTOR, motor_number, no_motor, rotor_of, text_of
 
 RPM = 30 / np.pi
 GRAVITY = 9.8
@@ -30,24 +35,33 @@ CANNOT = (
 
 
 def read_urdf(file: Path) -> SimulatorModel:
-    """Read URDF of a vehicle; without the properties of gym-pybullet-drones it states no rotors.
+    """Read URDF of a vehicle; without motor plugins or the properties of gym-pybullet-drones it states no rotors.
 
     Raises
     ------
     InputError
-        If the vehicle is not one rigid body.
+        If the vehicle is not one rigid body, or a plugin states what it does not take.
     """
     root, notes = read_xml(file), list[str]()
     links = {link.name: link for link in root.all("link")}
     if not links:
         raise root.error("has no <link>; give the file of a vehicle")
-    placed = _placed(root, links)
+    plugins = [node for own in root.all("gazebo") for node in own.all("plugin")]
+    motors = sorted((each for each in plugins if MOTOR.search(each.attributes.get("filename", ""))), key=motor_number)
+    if not motors and any(text_of(each, "jointName") for each in plugins):
+        raise no_motor(file, plugins)
+    placed = _placed(root, links, [text_of(each, "jointName") for each in motors])
     bodies = tuple(_body(links[name], placed[name], notes) for name in placed)
+    if motors:
+        # Gazebo, too, counts a link without inertial as none.
+        named = dict(zip(placed, bodies, strict=True))
+        rotors = tuple(rotor_of(each, named.get(text_of(each, "linkName"))) for each in motors)
+        return SimulatorModel(root.name, "urdf-gazebo", bodies, rotors, CANNOT_OF_PLUGINS, (), (file,))
     with_mass = [body for body in bodies if body.mass.value > 0]
     properties = next((node for node in root.walk() if node.tag == "properties"), None)
     if properties is None or "kf" not in properties.attributes:
         notes.append("states no rotors: it has no <properties> with kf and km, as gym-pybullet-drones reads them")
-        rotors: tuple[Rotor, ...] = ()
+        rotors = ()
     else:
         rotors = _rotors(file, root, properties, bodies)
         # PyBullet takes the mass of the first link for the weight.
@@ -56,8 +70,8 @@ def read_urdf(file: Path) -> SimulatorModel:
     return SimulatorModel(root.name, "urdf", bodies, rotors, CANNOT, tuple(notes), (file,))
 
 
-def _placed(root: Node, links: dict[str, Node]) -> dict[str, Array]:
-    """Give the pose of each link in that of the first, shape (4, 4)."""
+def _placed(root: Node, links: dict[str, Node], spinning: Sequence[str]) -> dict[str, Array]:
+    """Give the pose of each link in that of the first, shape (4, 4); joints of rotors may turn."""
     joints = root.all("joint")
     children = {_link_of(joint, "child"): joint for joint in joints}
     first = next((name for name in links if name not in children), None)
@@ -72,7 +86,7 @@ def _placed(root: Node, links: dict[str, Node]) -> dict[str, Array]:
                 continue
             if child not in links:
                 raise joint.error(f"its child {child!r} is not in the file; correct <child>")
-            if joint.attributes.get("type") != "fixed":
+            if joint.name not in spinning and _turns(joint):
                 raise turning(joint, f"the joint {joint.name}")
             found[child] = found[above] @ _origin(joint.first("origin"))
             open_.append(child)
@@ -80,6 +94,14 @@ def _placed(root: Node, links: dict[str, Node]) -> dict[str, Array]:
     if loose:
         raise links[loose[0]].error(f"the link {loose[0]} hangs on no joint; add one, or remove it")
     return found
+
+
+def _turns(joint: Node) -> bool:
+    limit, kind = joint.first("limit"), joint.attributes.get("type")
+    if limit is None or kind not in ("revolute", "prismatic"):
+        return kind != "fixed"
+    # An end that is not stated is 0.
+    return any(limit.number(end).value for end in ("lower", "upper") if end in limit.attributes)
 
 
 def _link_of(joint: Node, end: str) -> str:

@@ -70,6 +70,35 @@ def sdf_of(truth, *, thrust=1.0, inertia=(1.0, 1.0, 1.0), rotor_mass=1e-5, spins
     return MODEL.format(mass=truth.mass - 4 * rotor_mass, x=stated[0], y=stated[1], z=stated[2], parts="".join(parts))
 
 
+URDF = """<?xml version="1.0"?>
+<robot name="mine">
+  <link name="base_link"/>
+  <link name="frame"><inertial><mass value="{mass:.9g}"/><inertia ixx="{x:.9g}" iyy="{y:.9g}" izz="{z:.9g}" ixy="0"
+    ixz="0" iyz="0"/></inertial></link>
+  <joint name="frame_joint" type="revolute"><limit lower="0" upper="0" effort="0" velocity="0"/>
+    <parent link="base_link"/><child link="frame"/></joint>
+{parts}</robot>
+"""
+URDF_ROTOR = """  <link name="rotor_{index}"/>
+  <joint name="rotor_{index}_joint" type="continuous"><origin xyz="{x:.6g} {y:.6g} 0"/><axis xyz="0 0 1"/>
+    <parent link="base_link"/><child link="rotor_{index}"/></joint>
+  <gazebo>
+{motor}  </gazebo>
+"""
+
+
+def urdf_of(truth, *, thrust=1.0, spins=(-1, 1, -1, 1)):
+    """URDF of what flies with Gazebo's motor plugins, with a thrust that is so many times the true one."""
+    numbers = {"thrust": thrust * truth.thrust_factor, "ratio": truth.drag_factor / truth.thrust_factor}
+    motors = [
+        MOTOR.format(index=index, turn="ccw" if spin > 0 else "cw", **numbers) for index, spin in enumerate(spins)
+    ]
+    places = zip(truth.places, motors, strict=True)
+    parts = [URDF_ROTOR.format(index=index, x=x, y=y, motor=motor) for index, ((x, y), motor) in enumerate(places)]
+    x, y, z = truth.inertia
+    return URDF.format(mass=truth.mass, x=x, y=y, z=z, parts="".join(parts))
+
+
 def write_log(path, flight):
     """Write a flight as a table with its setpoints."""
     motion = flight.motion

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from math import ceil
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.holding import Held
-from cpfls_cli.export.registry import FORMS, Exported, Target
+from cpfls_cli.export.registry import FORMS, Exported
 from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.motion import State
@@ -88,7 +89,7 @@ def verified(
         finer = 1 if np.isinf(target.step_s) else ceil(flight.motion.period / target.step_s - 1e-9)
         flown, limit = _limit(form, text, course, finer)
         fine = _fine(held, course)
-        if isinstance(described, Target):
+        if described.otherwise is not None:
             # What no sum of weights is counts as not held, and not as a fault of the equations.
             otherwise = course.errors(target.fly(text, replace(course, finer=finer))) - flown
     for errors in (replayed, same, flown, limit, fine, otherwise):
@@ -121,7 +122,7 @@ def _limit(form: str, text: str, course: Course, finer: int) -> tuple[Array, Arr
     """Fly with the step of the target and with halves of it: each takes a term of ``a h + b h^2 + ...`` out."""
     target, described = FLYING[form], FORMS[form]
     steps = [replace(course, finer=finer * 2**level) for level in range(target.levels)]
-    fly = described.fly_as_held if isinstance(described, Target) else target.fly
+    fly = target.fly if described.otherwise is None else partial(described.otherwise.fly, own=False)
     once, *rest = found = [course.errors(fly(text, each)) for each in steps]
     for power in range(1, len(rest) + 1):
         found = [(2**power * fine - coarse) / (2**power - 1) for coarse, fine in pairwise(found)]

@@ -191,7 +191,7 @@ def _momentum_drag(momentum: float, weight: float, column: float, speed: float, 
 
 
 def fly_ardupilot(text: str, course: Course, *, own: bool = True) -> State:
-    """Fly an exported vehicle by the equations of ArduPilot's multicopter, or without `OTHERWISE`; see `Target.fly`."""
+    """Fly an exported vehicle by the equations of ArduPilot's multicopter; see `Otherwise.fly`."""
     keys = json.loads("\n".join(line for line in text.splitlines() if not line.startswith("#")))
     motors, mass, most = keys["num_motors"], keys["mass"], keys["rotor_speed_max_rad_s"]
     order = np.array(keys["rotors"]) - 1

@@ -138,8 +138,8 @@ def add_point(root: ElementTree.Element, name: str, place: Array) -> None:
     ElementTree.SubElement(joint, "child", link=f"{name}_link")
 
 
-def fly_urdf(text: str, course: Course, *, in_world: bool = True) -> State:
-    """Fly an exported vehicle by the published equations of gym-pybullet-drones; see `Target.fly`.
+def fly_urdf(text: str, course: Course, *, own: bool = True) -> State:
+    """Fly an exported vehicle by the published equations of gym-pybullet-drones; see `Otherwise.fly`.
 
     Drag acts along the axes of the world, as there, or along those of the body.
     """
@@ -159,10 +159,9 @@ def fly_urdf(text: str, course: Course, *, in_world: bool = True) -> State:
         force = (kf * squares)[..., None] * [0.0, 0.0, 1.0]
         torque = np.cross(hubs, force).sum(axis=1)
         torque[:, 2] += km * (squares @ _TURNS)
-        if in_world:
+        turned = drag * air
+        if own:
             turned = np.einsum("nji,nj->ni", rotation, drag * np.einsum("nij,nj->ni", rotation, air))
-        else:
-            turned = drag * air
         return torque, force.sum(axis=1) - speed.sum(axis=1, keepdims=True) * turned
 
     return fly_body(course, mass, inertia, push, 0.0)

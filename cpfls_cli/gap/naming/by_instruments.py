@@ -94,6 +94,23 @@ def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]
     return np.clip(values + change, *ends.T), np.clip(values + without, *ends.T)
 
 
+def with_lean(found: NamedFit, across: Array) -> NamedFit:
+    """Let the thrust be larger by what a vehicle that leans against gusts takes for a lack of it.
+
+    Against a gust that is fixed in the world it tilts by the gust over its weight, and as much of the gust is along its
+    thrust, downwards on the mean; of one that is fixed in its body, as the drag of rotors is, nothing is.
+
+    `across`: gusts along x and y, shape (2,), N; not finite where they are not known.
+    """
+    vehicle, parameters = found.hypothesis.flights[0].signals.vehicle, found.estimates.parameters
+    lean = float(np.sum(across[np.isfinite(across)] ** 2)) / (vehicle.mass_kg * vehicle.gravity_m_s2) ** 2
+    wider = (
+        replace(each, high=each.high + lean * (1 + each.value)) if each.name == "thrust_scale" else each
+        for each in parameters
+    )
+    return found._replace(estimates=replace(found.estimates, parameters=tuple(wider)))
+
+
 def unidentified_axes(found: NamedFit, given: Instruments) -> BoolArray:
     """Mark the body axes, shape (3,), whose inertia instruments do not identify: a fit shows that of the loop."""
     vehicle = found.hypothesis.places[0][1]

@@ -71,6 +71,12 @@ class HeldOut:
         better = largest(of_kind, lambda name: of_kind[name])
         return clear or {better: of_kind[better]}
 
+    @property
+    def closed_by_numbers(self) -> bool:
+        """Whether the gap of the model as given is clear, and none with its own numbers refitted."""
+        given, own = (self.size(each).floors for each in (self.before, self.parameters))
+        return bool((given > CLEAR).any() and not (own > CLEAR).any())
+
     def share_removed(self, before: Array, after: Array, channels: slice = slice(None)) -> float:
         """Compute the share of a gap, shape (window, 6), in floors, that was removed above the noise.
 

@@ -62,6 +62,10 @@ class NamedEffect:
     p_value: float = about("probability that chance explains as much, over the whole catalogue")
     share: float = about("part of the gap above the floor that returns without it")
     sentence: str = about("what it means, in plain words")
+    identified: bool = about(
+        "whether the flights identify its numbers; in gusts a fit that no instruments support shows the loop too",
+        default=True,
+    )
 
     @property
     def coefficients(self) -> dict[str, Estimate]:

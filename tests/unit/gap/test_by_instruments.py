@@ -10,8 +10,9 @@ from scipy.stats import ttest_1samp
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_instruments
-from cpfls_cli.gap.naming.by_instruments import _chance, _Source, _strong, significant_effects
-from cpfls_cli.gap.naming.estimate import NamedFit
+from cpfls_cli.gap.naming.by_instruments import _chance, _Source, _strong, significant_effects, with_lean
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit
+from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.innovations import PER_WINDOW, innovations
 from cpfls_cli.playback.instruments import held as stays
@@ -122,3 +123,16 @@ def test_runs_that_are_too_short_tell_nothing_of_what_was_before():
     new, known, _ = innovations(rows, [each[..., -1] for each in rows], [each[..., :-1] for each in rows])
     assert [len(each) for each in new] == [len(each) for each in known]
     assert len(new[0]) == 0 < len(new[1])
+
+
+@pytest.mark.parametrize(("across", "more"), [((0.3, 0.4), 0.0025), ((0.3, np.inf), 0.0009), ((np.nan, np.nan), 0.0)])
+def test_a_vehicle_that_leans_against_gusts_may_have_more_thrust(across, more):
+    """Of 1 kg at 10 m/s^2: gusts of 0.5 N that are fixed in the world push it down by 0.025 N on the mean."""
+    vehicle = SimpleNamespace(mass_kg=1.0, gravity_m_s2=10.0)
+    flights = [SimpleNamespace(signals=SimpleNamespace(vehicle=vehicle))]
+    numbers = [Estimate(name, "1", 0.2, 0.19, 0.21, (-0.9, 3.0)) for name in ("inertia_x", "thrust_scale")]
+    given = NamedFit(SimpleNamespace(flights=flights), Estimates(np.zeros(0), (), tuple(numbers), ()), None, None)
+    inertia, thrust = with_lean(given, np.array(across)).estimates.parameters
+    assert inertia == numbers[0]
+    assert (thrust.value, thrust.low) == (0.2, 0.19)
+    assert thrust.high == pytest.approx(0.21 + 1.2 * more)

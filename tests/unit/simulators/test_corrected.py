@@ -16,7 +16,7 @@ from cpfls_cli.simulators.study import of_log
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gap_artifacts import named_effect
 from tests.builders.gusty_flights import SMALL
-from tests.builders.simulator_files import FRAME, SECTION, rotorpy_of, sdf_of
+from tests.builders.simulator_files import FRAME, SECTION, rotorpy_of, sdf_of, urdf_of
 
 URDF = """<robot name="cf2">
   <properties arm="0.046" kf="{kf}" km="1.3e-12" thrust2weight="3" drag_coeff_xy="1e-7"/>
@@ -111,6 +111,28 @@ def test_thrust_alone_leaves_the_inertia(mine):
     assert "+      <motorConstant>1.66e-08</motorConstant><!-- from a data sheet -->" in said.diff
 
 
+def test_plugins_of_urdf_are_corrected_and_put_in(tmp_path):
+    """Numbers where they stand, drag where the plugin lacks it, and products of inertia where no number has a place."""
+    path = tmp_path / "mine.urdf"
+    path.write_text(
+        urdf_of(SMALL)
+        .replace("<rotorDragCoefficient>0</rotorDragCoefficient>", "")
+        .replace(' ixy="0"\n    ixz="0"', "")
+    )
+    found = (
+        effect("parameter_error", inertia_x=(-0.2, 0.01), thrust_scale=(-0.17, 0.01)),
+        effect("rotor_drag", k_d=(2e-5, 1e-6)),
+        effect("products_of_inertia", I_xy=(4e-6, 1e-7), I_xz=(0.0, 1e-7), I_yz=(0.0, 1e-7)),
+    )
+    said, new = correct(path, *found)
+    assert [each.element for each in said.changes] == ["motorConstant", "ixx", "rotorDragCoefficient"]
+    for rotor in new.rotors:
+        assert rotor.thrust.value == pytest.approx(0.83 * SMALL.thrust_factor)
+        assert rotor.drag.value == 2e-5
+    assert new.inertia[0, 0] == pytest.approx(0.8 * 0.83 * SMALL.inertia[0], rel=1e-3)
+    assert any(each.startswith("ixy = ") and each.endswith("write it there") for each in said.elsewhere)
+
+
 def test_an_inertia_about_z_of_no_body_is_a_yaw_torque(mine):
     """Flights show the ratio of the two: the other one is wrong where this one cannot be."""
     said, new = correct(mine, effect("parameter_error", inertia_z=0.25, thrust_scale=-0.17))
@@ -132,6 +154,13 @@ def test_an_inertia_about_z_of_no_body_is_a_yaw_torque(mine):
 def test_what_the_file_keeps_decides_whether_an_inertia_is_of_no_body(mine):
     said, _ = correct(mine, effect("parameter_error", inertia_x=(-0.4, 0.6), inertia_z=0.15))
     assert [each.element for each in said.changes] == ["izz"]
+
+
+def test_numbers_that_instruments_do_not_identify_stay(mine):
+    loose = replace(effect("drag_factor_error", error=0.2), identified=False)
+    said, _ = correct(mine, loose, effect("parameter_error", thrust_scale=-0.17))
+    assert [each.element for each in said.changes] == ["motorConstant"]
+    assert said.unchanged[0].startswith("wrong drag (yaw) factor, error 0.2 [0.195, 0.205] 1: setpoints do not show it")
 
 
 def test_a_yaw_torque_is_corrected_once(mine):

@@ -13,7 +13,7 @@ from cpfls_cli.simulators.formats import FORMATS, read_model
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.gusty_flights import LARGE, SMALL
 from tests.builders.playback_flights import truth
-from tests.builders.simulator_files import sdf_of
+from tests.builders.simulator_files import sdf_of, urdf_of
 from tests.builders.vehicle_models import HEXA, vehicle_of, whole
 
 CLOSE = {"rtol": 1e-9, "atol": 1e-15}
@@ -170,6 +170,42 @@ def test_a_link_of_urdf_without_inertial_has_no_mass(tmp_path):
     assert read.mass_kg == 2
     np.testing.assert_allclose(read.centre, 0)
     assert "states no mass, and counts as none" in read.notes[0]
+
+
+def test_urdf_with_motor_plugins_is_the_vehicle_of_the_sdf(tmp_path):
+    paths = [tmp_path / "mine.urdf", tmp_path / "mine.sdf"]
+    for path, text in zip(paths, (urdf_of(SMALL), sdf_of(SMALL, rotor_mass=0.0)), strict=True):
+        path.write_text(text)
+    own, wanted = map(read_model, paths)
+    assert (own.format, own.notes) == ("urdf-gazebo", ())
+    assert own.mass_kg == pytest.approx(wanted.mass_kg)
+    of_rotors = 4e-10 * np.diag([1, 1, 2])
+    np.testing.assert_allclose(own.inertia, wanted.inertia - of_rotors, rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(own.hubs, wanted.hubs, atol=1e-12)
+    for rotor, its in zip(own.rotors, wanted.rotors, strict=True):
+        for name in ("thrust", "ratio", "speed_max", "lag_up", "drag", "rolling"):
+            assert getattr(rotor, name).value == getattr(its, name).value
+        assert (rotor.name, rotor.spin) == (its.name, its.spin)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("<linkName>rotor_2<", "<linkName>rotor_9<"), "its link 'rotor_9' is not a part of the vehicle"),
+        (("<jointName>rotor_2_joint<", "<jointName>none<"), "the joint rotor_2_joint turns, and a study has one rigid"),
+        (('lower="0" upper="0"', 'lower="0" upper="1"'), "the joint frame_joint turns"),
+        (("<motorNumber>2</motorNumber>", ""), "has no <motorNumber>"),
+        (("multicopter-motor-model", "lift-drag"), "none of its plugins is a motor model that is known here"),
+        (('<origin xyz="0.0325269 -', '<origin rpy="0 1 0" xyz="0.0325269 -'), "not along z of the body"),
+    ],
+)
+def test_urdf_with_motor_plugins_is_refused(tmp_path, change, words):
+    path = tmp_path / "bad.urdf"
+    path.write_text(urdf_of(SMALL).replace(*change))
+    with pytest.raises(InputError) as refused:
+        read_model(path)
+    assert words in str(refused.value)
+    assert "bad.urdf" in str(refused.value)
 
 
 @pytest.mark.parametrize(
