@@ -137,8 +137,7 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
     tried: list[tuple[Candidate, ...]] = [(*others, each) for each in alike]
     if len(candidate.effect.shapes) > 1 and not _lags(others):
         tried += [(*others, *pair) for pair in combinations(alike, 2)]
-    numbers, gap = free_numbers(own.chosen), step.above_floor - own.gain > step.least_gain(own.gain)
-    moved = [_moved(each, step) for each in tried if gap or free_numbers(each) <= numbers]
+    numbers, moved = free_numbers(own.chosen), [_moved(each, step) for each in tried]
     fair = [each for each in moved if free_numbers(each.chosen) <= numbers or _is_better(each, own, step)]
     return [own, *fair, *(scored for scored in ranked[1:] if not _lags([scored.candidate]))]
 
