@@ -11,16 +11,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import MOST_BLOCKS, contiguous
 from cpfls_cli.effects.signals import white_noise
-from cpfls_cli.filters import SecondOrder
 from cpfls_cli.gap.balance.balance_system import residual_along
 from cpfls_cli.gap.balance.noise_floor import modulated
 from cpfls_cli.gap.naming.estimate import NamedFit, estimates_of, places_of
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.rounding import tied
 from cpfls_cli.weak_form.windows import windows
-
-_WINDOW_S = 4.0
-"""Of windows whose spectrum is about as narrow as the resonance of springs."""
 
 
 def with_noisy_rate(found: NamedFit) -> NamedFit:
@@ -69,7 +65,9 @@ class _Balance:
         linear = found.estimates.linear.copy()
         linear[places_of(hypothesis)[index][0]] = 0.0
         shortest = min(len(flight.signals) for flight in hypothesis.flights)
-        own = windows(self.period, min(_WINDOW_S, shortest * self.period / 4), found.settings.overlap)
+        # As long as a block, their spectrum is about as narrow as the resonance of lightly damped springs.
+        seconds = min(found.settings.block_s, shortest * self.period / 4)
+        own = windows(self.period, seconds, found.settings.overlap)
         samples, size = len(own.weight), np.sqrt((own.weight**2).sum())
         # Beyond the highest frequency that the effect may have, as far as the log goes.
         ends = [
@@ -101,39 +99,35 @@ class _Balance:
         views = (sliding_window_view(each[:, :3], len(kernel), axis=0)[:: self.hop] for each in signals)
         return np.concatenate([(view @ kernel).swapaxes(1, 2) for view in views])
 
-    def _column(self, shapes: Array) -> Array:
-        passing = self._filter(shapes)
-        return self._rows([passing.along(each) for each in self.momenta], self.differentiate)
-
-    def _filter(self, shapes: Array) -> SecondOrder:
+    def _column(self, shapes: Array) -> tuple[Array, Array]:
+        """Compute the column at shapes, shape (window, frequency, 3), and the gain of its filter, shape (fine,)."""
         named = {each.name: float(value) for each, value in zip(self.effect.shapes, shapes, strict=True)}
         assert self.effect.filters is not None, "asked for"
-        return self.effect.filters(named, self.period)
+        passing = self.effect.filters(named, self.period)
+        return self._rows([passing.along(each) for each in self.momenta], self.differentiate), passing.gain(self.turn)
 
     def _products(self, columns: Sequence[Array]) -> Array:
         """Multiply torque of the rest, inertial torque and columns, shape (window, frequency, 3, side, side)."""
         every = np.stack([self.rest - self.inertial, self.inertial, *columns], axis=-1)
         return np.asarray((every.conj()[..., None] * every[..., None, :]).real)
 
-    def _misfit(self, number: Array, products: Array, at: Array) -> float:
+    def _misfit(self, number: Array, products: Array, gains: Array) -> float:
         """Give twice the negative logarithm of the likelihood of a window, but for what is constant."""
-        coefficient, gain, away = number[:3], number[3:6], number[6:]
-        sides = np.stack([np.ones(3), gain, -coefficient, *(-coefficient * each for each in away)], axis=1)
+        coefficient, gain, along = number[:3], number[3:6], np.array([1.0, *number[6:]])
+        sides = np.column_stack([np.ones(3), gain, -np.outer(coefficient, along)])
         square = ((products @ sides[:, :, None])[..., 0] * sides).sum(axis=2)
-        passes = self._filter(at + away if len(away) else at).gain(self.turn)
-        through = np.abs((gain - coefficient * passes[:, None]) * self.turn[:, None] / self.period) ** 2
+        through = np.abs((gain - np.outer(along @ gains, coefficient)) * self.turn[:, None] / self.period) ** 2
         return float((square / (self.share @ through * self.rate**2 + self.torque**2)).sum())
 
     def _least(
-        self, products: Array, at: Array, start: Array, bounds: Sequence[tuple[float, float]]
+        self, products: Array, gains: Array, start: Array, bounds: Sequence[tuple[float, float]]
     ) -> tuple[float, Array]:
-        """Find coefficients, gains and, within bounds, changes of the shapes with the least misfit."""
+        """Find coefficients, gains of the inertia and, within bounds, changes of the shapes with the least misfit."""
         from scipy.optimize import minimize
 
         known = [each.bounds(self.vehicle) for each in self.effect.coefficients]
-        first = np.concatenate([start, np.zeros(len(bounds))])
         every = [*known, *[(0.1, 10.0)] * 3, *bounds]
-        done = minimize(self._misfit, first, args=(products, at), method="L-BFGS-B", bounds=every)
+        done = minimize(self._misfit, start, args=(products, gains), method="L-BFGS-B", bounds=every)
         return float(done.fun), done.x
 
     def fitted(self) -> tuple[Array, Array]:
@@ -144,30 +138,42 @@ class _Balance:
         start = np.array([0.3] * 3 + [1.0] * 3)
 
         def profile(shapes: Array) -> float:
-            return self._least(self._products([self._column(shapes)]).mean(axis=0), shapes, start, [])[0]
+            column, gain = self._column(shapes)
+            return self._least(self._products([column]).mean(axis=0), gain[None], start, [])[0]
 
-        grid = [np.array([f, d]) for f in self.effect.shapes[0].grid for d in self.effect.shapes[1].grid[:2]]
-        shapes = minimize(
-            profile, min(grid, key=profile), method="Nelder-Mead", bounds=bounds, options={"xatol": 2e-3, "fatol": 1e-2}
-        ).x
-        # Half the width of a resonance: less bends it little, and more is not looked at.
-        step = np.array([0.1, 0.3]) * shapes
-        near = np.diag(step / 10)
-        apart = [(self._column(shapes + each) - self._column(shapes - each)) / (2 * each.sum()) for each in near]
-        products = self._products([self._column(shapes), *apart])
+        # Over the frequency there are several valleys.
+        grid = [
+            min((np.array([f, d]) for d in self.effect.shapes[1].grid[:2]), key=profile)
+            for f in self.effect.shapes[0].grid
+        ]
+        starts = sorted(grid, key=profile)[:3]
+        ends = [
+            minimize(profile, each, method="Nelder-Mead", bounds=bounds, options={"xatol": 2e-3, "fatol": 1e-3})
+            for each in starts
+        ]
+        shapes = min(ends, key=lambda end: end.fun).x
+        # Within the width of the resonance column and gain are taken to be linear in the shapes, both alike: else the
+        # noise in the column would be more than what its gain says.
+        step = np.array([shapes[0], 0.5]) * shapes[1]
+        sides = [self._column(shapes)]
+        for by in np.diag(step / 10):
+            ahead, behind = self._column(shapes + by), self._column(shapes - by)
+            sides.append(tuple((a - b) / (2 * by.sum()) for a, b in zip(ahead, behind, strict=True)))
+        columns, gains = zip(*sides, strict=True)
+        products, gain = self._products(columns), np.array(gains)
         block = contiguous(len(products), min(MOST_BLOCKS, len(products) // 4))
         sums = np.array([products[block == number].sum(axis=0) for number in np.unique(block)])
         low, high = np.array(bounds).T - shapes
         within = list(zip(np.maximum(-step, low), np.minimum(step, high), strict=True))
-        counts = np.bincount(block)
-        best = self._least(sums.sum(axis=0) / len(block), shapes, start, within)[1]
+        whole = sums.sum(axis=0)
+        best = self._least(whole / len(block), gain, np.append(start, 0.0 * step), within)[1]
         without = [
-            self._least((sums.sum(axis=0) - own) / (len(block) - count), shapes, best[:6], within)[1]
-            for own, count in zip(sums, counts, strict=True)
+            self._least((whole - own) / (len(block) - count), gain, best, within)[1]
+            for own, count in zip(sums, np.bincount(block), strict=True)
         ]
-        every = np.array([best, *without])
-        number = np.column_stack([every[:, :3], shapes + every[:, 6:]])
-        return number[0], number[1:]
+        exact = self._least(whole[..., :3, :3] / len(block), gain[:1], start, [])[1]
+        number = np.append(exact[:3], shapes)
+        return number, number + (np.array(without) - best)[:, [0, 1, 2, 6, 7]]
 
     def open_ends(self, numbers: Sequence[Estimate]) -> tuple[Estimate, ...]:
         """Widen the interval of a shape on a bound to the next point of its grid: nothing else identifies it there."""
