@@ -47,6 +47,11 @@ class SecondOrder:
         )
         return cls(over / under[0], under / under[0], upper[2])
 
+    def gain(self, turn: Array) -> Array:
+        """Give its gain at complex turns a sample, ``j w dt``."""
+        back = np.exp(-turn)
+        return np.asarray(np.polyval(self.over[::-1], back) / np.polyval(self.under[::-1], back))
+
     def settled(self, value: Numbers) -> Numbers:
         """Give the state after a long time at a value, shape (2, ...): what older samples will add to the next two."""
         later = self.over[2] * value - self.under[2] * self.level * value

@@ -11,6 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.hooks import Actuation, Body, PhysicalNumbers, SensorLog, SensorTest, VehicleParts
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.filters import SecondOrder
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench, about_centre
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -138,6 +139,8 @@ class Effect:
     holds: frozenset[str] = frozenset()  # Effects that are special cases of this one, which is then not their rival.
     # Whether the columns hold the derivative of the body rates, and with it the noise of the gyroscope.
     rate_derivative: bool = False
+    # ``filters(shape, period) -> SecondOrder``: what the body's momentum, axis by axis, goes through in its columns.
+    filters: Callable[[Mapping[str, float], float], SecondOrder] | None = None
     # Place in the catalogue, in the actuator chain and, from the last to the first, in the log of the sensors.
     order: int = 1000
     of_all_forces: bool = False  # Whether it has a lever for the forces of all other effects.

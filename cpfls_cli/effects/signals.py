@@ -298,7 +298,7 @@ def fused(values: Array, rate: Array | None, period: float) -> Array:
     """
     if rate is None:
         return values
-    own, slope = _white(values), _white(rate) * period
+    own, slope = white_noise(values), white_noise(rate) * period
     if own == 0.0:
         return values
     # Loaded where it is needed: who reads a model waits for nothing of scipy.
@@ -317,6 +317,6 @@ def fused(values: Array, rate: Array | None, period: float) -> Array:
     return np.asarray(solveh_banded(bands, right))
 
 
-def _white(values: Array) -> float:
-    """Estimate the standard deviation of white noise from third differences."""
-    return float(np.sqrt(np.mean(np.diff(values, 3) ** 2) / 20))
+def white_noise(values: Array) -> Array:
+    """Estimate the standard deviation of white noise from third differences, shape (time, ...) to (...)."""
+    return np.asarray(np.sqrt(np.mean(np.diff(values, 3, axis=0) ** 2, axis=0) / 20))

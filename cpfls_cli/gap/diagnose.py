@@ -22,7 +22,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
-from cpfls_cli.gap.extended import ExtendedModel
+from cpfls_cli.gap.extended import ExtendedModel, renewed
 from cpfls_cli.gap.naming.actuation import decided_by_instruments
 from cpfls_cli.gap.naming.by_instruments import (
     by_instruments,
@@ -42,6 +42,7 @@ from cpfls_cli.gap.naming.causes import (
 )
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
+from cpfls_cli.gap.naming.noisy_rate import with_noisy_rate
 from cpfls_cli.gap.naming.open_questions import not_excited, unexplained_channels, untried, with_unnamed
 from cpfls_cli.gap.naming.ranking import RankedStep
 from cpfls_cli.gap.naming.results import (
@@ -134,6 +135,9 @@ def diagnose(
     estimates = replace(wider, effects=held_by)
     fit = found._replace(estimates=estimates)
     judged = [named.in_gusts(each) for each in judge_effects(fit, named.effects, rng)]
+    hypothesis, estimates, *_ = with_noisy_rate(fit)
+    known = renewed([each.effect for each in judged], hypothesis, estimates)
+    judged = [replace(each, effect=effect) for each, effect in zip(judged, known, strict=True)]
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     doubts = [

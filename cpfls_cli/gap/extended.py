@@ -20,6 +20,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, Preparation, 
 from cpfls_cli.gap.naming.by_instruments import by_instruments, unidentified_axes
 from cpfls_cli.gap.naming.estimate import Estimates, effect_sentence, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, held_out
+from cpfls_cli.gap.naming.noisy_rate import with_noisy_rate
 from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.residual.air import in_air, known_motion
@@ -132,13 +133,13 @@ def extend(
         unidentified = unidentified_axes(found, given)
         flights, logged, repaired = ([f.as_stated(unidentified) for f in each] for each in (flights, logged, repaired))
         found = by_instruments(fitted(flights, start.chosen, floor, settings), given)
-    hypothesis, estimates, *_ = found
+    hypothesis, estimates, *_ = with_noisy_rate(found)
     unseen = held_out(logged, repaired, hypothesis, estimates.linear, floor)
     if first is not None:
         unseen = replace(unseen, before=first.unseen.before, parameters=first.unseen.parameters)
     _require_smaller(unseen)
     model = ExtendedModel.of(base, hypothesis, estimates, audit)
-    return Refit(model, tuple(_renewed(effects, hypothesis, estimates)), estimates, unseen)
+    return Refit(model, tuple(renewed(effects, hypothesis, estimates)), estimates, unseen)
 
 
 def _require_smaller(unseen: HeldOut) -> None:
@@ -151,17 +152,18 @@ def _require_smaller(unseen: HeldOut) -> None:
         raise ComputationError(f"not extended: the gap on the held-out flights does not shrink: {sizes}")
 
 
-def _renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Estimates) -> list[NamedEffect]:
+def renewed(effects: Sequence[NamedEffect], hypothesis: System, estimates: Estimates) -> list[NamedEffect]:
+    """Give effects the numbers of a fit."""
     fitted = {
         candidate.effect.name: (candidate, linear, numbers)
         for candidate, linear, numbers in zip(hypothesis.chosen, estimates.of_effect, estimates.effects, strict=True)
     }
-    renewed = []
+    known = []
     for effect in effects:
         if effect.candidate is None:
-            renewed.append(effect)
+            known.append(effect)
             continue
         candidate, linear, numbers = fitted[effect.name]
         sentence = effect_sentence(candidate.effect, numbers, hypothesis.vehicle)
-        renewed.append(replace(effect, shape=candidate.shape, linear=linear, numbers=numbers, sentence=sentence))
-    return renewed
+        known.append(replace(effect, shape=candidate.shape, linear=linear, numbers=numbers, sentence=sentence))
+    return known

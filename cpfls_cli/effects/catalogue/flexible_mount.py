@@ -8,12 +8,17 @@ from cpfls_cli.effects.actuation import second_order
 from cpfls_cli.effects.effect import Columns, Effect, Shape, of_axes
 from cpfls_cli.effects.hooks import Body
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.filters import SecondOrder
 from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull
 from cpfls_cli.vehicle.values import ZERO, Vector, add, plus, scaled, subtract, times
 
 
+def _swing(shape: Mapping[str, float], period: float) -> SecondOrder:
+    return second_order(shape["frequency_hz"], shape["damping"], period, (1.0, 0.0, 0.0))
+
+
 def _columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
-    swing = second_order(shape["frequency_hz"], shape["damping"], signals.period, (1.0, 0.0, 0.0))
+    swing = _swing(shape, signals.period)
     momentum = np.zeros((len(signals), 6, 3))
     momentum[:, :3] = swing.along(signals.body_rate)[:, :, None] * np.diag(signals.vehicle.inertia_kg_m2[:3])
     return Columns(np.zeros_like(momentum), momentum)
@@ -58,5 +63,6 @@ EFFECT = Effect(
         Shape("damping", "1", (0.02, 0.1, 0.3), "their damping ratio", first=0.1),
     ),
     rate_derivative=True,
+    filters=_swing,
     carried=Body(_pull, (0.0,) * 6),
 )

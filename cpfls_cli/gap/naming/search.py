@@ -126,7 +126,7 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
     """Score an effect, and behind it all that could take its place, given the look at the others and it.
 
     What lies between command and rotors is scored with shapes moved, and two of these can replace one with two
-    shapes; more numbers than it has need a gain.
+    shapes; each number more than it has needs the gain of Schwarz's criterion, as in the choice.
     """
     ranked = sorted(step.ranking, key=lambda scored: scored.candidate.effect.name != candidate.effect.name)
     if not _lags([candidate]):
@@ -137,9 +137,10 @@ def in_place_of(candidate: Candidate, step: RankedStep) -> list[Scored]:
     tried: list[tuple[Candidate, ...]] = [(*others, each) for each in alike]
     if len(candidate.effect.shapes) > 1 and not _lags(others):
         tried += [(*others, *pair) for pair in combinations(alike, 2)]
-    numbers, gap = free_numbers(own.chosen), step.above_floor - own.gain > step.least_gain(own.gain)
-    moved = [_moved(each, step) for each in tried if gap or free_numbers(each) <= numbers]
-    fair = [each for each in moved if free_numbers(each.chosen) <= numbers or _is_better(each, own, step)]
+    numbers, moved = free_numbers(own.chosen), [_moved(each, step) for each in tried]
+    worth = np.log(step.hypothesis.residual.size)
+    more = [max(free_numbers(each.chosen) - numbers, 0) for each in moved]
+    fair = [each for each, added in zip(moved, more, strict=True) if not added or each.gain - own.gain > added * worth]
     return [own, *fair, *(scored for scored in ranked[1:] if not _lags([scored.candidate]))]
 
 

@@ -11,7 +11,9 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming.ranking import rank_effects
+from cpfls_cli.gap.naming.estimate import fitted
+from cpfls_cli.gap.naming.noisy_rate import with_noisy_rate
+from cpfls_cli.gap.naming.ranking import best_floor, rank_effects
 from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, forward_selection, in_place_of
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rotations import cross
@@ -81,23 +83,23 @@ def turned(torque, share=0.0, natural=1.0, damping=0.0):
 HALVES = np.arange(2 * len(TIME) + 1) * PERIOD / 2
 
 
-def logged(rates, speed, seed, **known):
+def logged(rates, speed, seed, gyro=0.003, **known):
     rng = np.random.default_rng(100 + seed)
     return weak(
         Signals(
             time=TIME,
             vehicle=VEHICLE,
-            body_rate=rates + 0.003 * rng.standard_normal(rates.shape),
+            body_rate=rates + gyro * rng.standard_normal(rates.shape),
             rotor_speed=speed + 0.5 * rng.standard_normal(speed.shape),
             **known,
         )
     )
 
 
-def on_springs(seed, **spring):
+def on_springs(seed, gyro=0.003, **spring):
     waves = Waves(seed)
     speed = rotor_demand(VEHICLE, THRUST, waves.at(TIME)).speed
-    return logged(turned(waves.at(HALVES), **spring), speed, seed)
+    return logged(turned(waves.at(HALVES), **spring), speed, seed, gyro)
 
 
 def late(seed, answer):
@@ -131,6 +133,20 @@ def test_a_part_on_springs_is_named_with_its_frequency_and_share():
     assert names_of(chosen) == {"flexible_mount"}
     assert shape_of(chosen, "flexible_mount")["frequency_hz"] == pytest.approx(2.65, rel=0.02)
     assert shape_of(chosen, "flexible_mount")["damping"] == pytest.approx(0.1, rel=0.1)
+
+
+def test_noise_of_the_gyroscope_takes_nothing_off_the_share_on_springs():
+    """The column amplifies it at its own frequency, and least squares make its numbers too small."""
+    flights = [on_springs(seed, 0.02, share=0.3, natural=2 * np.pi * 2.65, damping=0.1) for seed in (4, 5, 6)]
+    own = candidate("flexible_mount", frequency_hz=2.65, damping=0.1)
+    squares = fitted(flights, [own], best_floor(system(flights, [own])), SETTINGS)
+    likely = with_noisy_rate(squares)
+    small, right = ({each.name: each for each in found.estimates.effects[0]} for found in (squares, likely))
+    truth = {"share_x": 0.3, "share_y": 0.3, "share_z": 0.3, "frequency_hz": 2.65, "damping": 0.1}
+    assert small["share_z"].high < 0.3
+    assert all(right[name].low <= value <= right[name].high for name, value in truth.items())
+    assert abs(right["share_z"].value - 0.3) < 0.5 * abs(small["share_z"].value - 0.3)
+    assert likely.hypothesis.shape_values == pytest.approx([right[name].value for name in ("frequency_hz", "damping")])
 
 
 def test_a_stiff_body_has_no_springs():
