@@ -44,7 +44,7 @@ LACK_RECIPE = (
 
 _SEED = 1
 _ROWS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
-_REFITTED = "refitted numbers of the vehicle"
+REFITTED = "refitted numbers of the vehicle"
 
 
 class References(NamedTuple):
@@ -173,7 +173,7 @@ class Sheet:
         if model.effects:
             known = [CATALOGUE[effect.name] for effect in model.effects]
             # What corrects the numbers of the vehicle is refitted with every effect, whether or not they were wrong.
-            titles = [_REFITTED if each.kind == "parameter" else each.title for each in known]
+            titles = [REFITTED if each.kind == "parameter" else each.title for each in known]
             yield f"Effects: {', '.join(dict.fromkeys(titles))}."
         if model.remainder is not None:
             rows = ", ".join(_ROWS[row] for row in model.remainder.rows)

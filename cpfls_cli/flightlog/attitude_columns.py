@@ -111,7 +111,10 @@ class Reading(NamedTuple):
         return 0.0 if self.rates is None else self.rates.explained
 
     def beats_all(self, witnesses: Witnesses) -> bool:
-        """Tell whether it is as named, and no other reading can be so much better that it would be taken."""
+        """Tell whether it is as named, and no other reading of angles can be so much better that it would be taken.
+
+        No share is above 1, and every other way to read three angles has a price.
+        """
         follows = self.explained > 1 - _AS_GOOD_RATES
         leans = witnesses.ground is None or self.place_share > 1 - _AS_GOOD_LEAN
         return self.price == 0 and follows and leans and abs(self.attitude.level) > 1 - _AS_LEVEL

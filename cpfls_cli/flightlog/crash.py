@@ -25,16 +25,17 @@ _OVER_S, _OVER = 3.0, 0.2
 # Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
 # below which it does not turn, as a share of what is usual and by itself.
 _STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
-# Difference between four rotors, which have none to spare, that turns every vehicle by 10 rad/s in that time; and the
-# rate below which something else than they must hold it.
-_HELD_FOUR, _HELD_RAD_S = 0.4, 2.0
+# Norm of the differences of four rotors, which have none to spare, from their mean; the rate below which something else
+# than they must hold it; the cosine between weight and rotors of what leans; and the share of the largest rotor that
+# all others are below where it works alone.
+_HELD_FOUR, _HELD_RAD_S, _LEANS, _ALONE = 0.4, 2.0, 0.95, 0.25
 # Before the end of a stretch, where a crash is looked for; flight before that, which shows what it does in flight; and
 # the time from its last wild motion to the end, in which no pilot has recovered.
 _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
 # After the end of a stretch, where its crash may go on, and until when a vehicle that crashed lies.
 _THEN_S, _LIES_S = 1.0, 3.0
 # Times the largest of the flight before, and sizes at least, the last in gravity, that no rotor makes.
-_BEYOND, _WILD_RAD_S, _WILD_RAD_S2, _HARD = 1.5, 5.0, 100.0, 3.0
+BEYOND, _WILD_RAD_S, _WILD_RAD_S2, HARD = 1.5, 5.0, 100.0, 3.0
 # Rate and lean beyond those of the flight before, at least, by which control is lost where a rotor is at its limit, as
 # a share of the largest command.
 _STRAINED_RAD_S, _STRAINED_RAD, _AT_LIMIT = 1.0, 0.5, 0.95
@@ -155,7 +156,9 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     if signs.slow is None or signs.rate is None or not active.any():
         return Resting(nowhere, nowhere)
     held = active & _held_four(signs)
-    free = active & ~held if (active & ~held).any() else active
+    if (active & ~held).sum() * signs.period <= _FEWEST_S:
+        held = nowhere
+    free = active & ~held
     lively = free & (signs.slow > LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else free
     turned = averaged(signs.rate, signs.period, _REST_S)
@@ -207,12 +210,18 @@ def _unlike(rotors: Array) -> Array:
 
 
 def _held_four(signs: Signs) -> BoolArray:
-    """Mark where four rotors ask for a turn that none can fly without, and a vehicle that feels its weight rocks."""
+    """Mark where four rotors ask for a turn that none can fly without, of a vehicle that leans or hangs on one of them.
+
+    What flies level feels its weight along its rotors, and may be trimmed for a weight off its centre or a weak rotor.
+    """
     if signs.rotors is None or signs.rotors.shape[1] != 4 or signs.felt is None or signs.slow is None:
         return np.zeros(len(signs.time), dtype=bool)
     asked = np.linalg.norm(averaged(_unlike(signs.rotors), signs.period, SLOW_S), axis=1) > _HELD_FOUR
-    weight = np.linalg.norm(averaged(signs.felt, signs.period, _REST_S), axis=1)
+    felt = averaged(signs.felt, signs.period, _REST_S)
+    weight = np.linalg.norm(felt, axis=1)
     held = (weight > _WEIGHT[0]) & (weight < _WEIGHT[1]) & (averaged(signs.slow, signs.period, _REST_S) < _HELD_RAD_S)
+    largest = np.sort(averaged(np.nan_to_num(signs.rotors), signs.period, SLOW_S), axis=1)
+    held &= (np.abs(felt[:, 2]) < _LEANS * weight) | (largest[:, -2] < _ALONE * largest[:, -1])
     # What has lost two of its rotors falls over within that time.
     long = np.ones(max(1, round(_LIES_S / signs.period)), dtype=bool)
     return np.asarray(binary_opening(smoothed(asked & held, signs.period, SLOW_S), long), dtype=bool)
@@ -260,7 +269,7 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
         if hit is None and signs.felt is not None:
             # By a force that its flight never had.
             size = np.linalg.norm(signs.felt, axis=1)
-            least = max(_HARD, _BEYOND * float(size[slice(*part)].max()))
+            least = max(HARD, BEYOND * float(size[slice(*part)].max()))
             struck = after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
             hit = int(struck[0]) if len(struck) else None
         return {"rotors stop in the air": after} | ({} if hit is None else {"impact": hit})
@@ -301,7 +310,7 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
 
     def beyond(values: Array, least: float) -> BoolArray:
         most = float(np.max(values[before]))
-        return np.asarray(late & (values[first:stop] > max(_BEYOND * most, least)), dtype=bool)
+        return np.asarray(late & (values[first:stop] > max(BEYOND * most, least)), dtype=bool)
 
     spins = np.linalg.norm(np.gradient(signs.body_rate, signs.period, axis=0), axis=1)
     wild, strained = beyond(signs.turning, _WILD_RAD_S), beyond(signs.turning, _STRAINED_RAD_S)
@@ -312,7 +321,7 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
         strained |= beyond(np.arccos(np.clip(up, -1.0, 1.0)), _STRAINED_RAD)
     if signs.rotors is not None:
         strained &= (signs.rotors[first:stop] >= _AT_LIMIT * float(np.nanmax(signs.rotors))).any(axis=1)
-    hard = nothing if signs.felt is None else beyond(np.linalg.norm(signs.felt, axis=1), _HARD)
+    hard = nothing if signs.felt is None else beyond(np.linalg.norm(signs.felt, axis=1), HARD)
     # A touchdown jolts too; but then the vehicle stands on its feet.
     wild = wild | hard | beyond(spins, _WILD_RAD_S2) if lies_then else wild
     return wild, hard, nothing if signs.rotors is None else strained
@@ -355,5 +364,5 @@ def _falls(signs: Signs) -> list[tuple[int, int]]:
         return []
     size, most = np.linalg.norm(signs.felt, axis=1), round(_FALL_S / signs.period)
     long = [(first, after) for first, after in runs(size < _FALLS) if after - first >= most]
-    jolts = [(first, after + np.flatnonzero(size[after : after + most] > _HARD)) for first, after in long]
+    jolts = [(first, after + np.flatnonzero(size[after : after + most] > HARD)) for first, after in long]
     return [(first, int(own[0])) for first, own in jolts if len(own)]

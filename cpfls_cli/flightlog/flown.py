@@ -189,8 +189,11 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
     level, rate = signs.level, signs.turning
     assert level is not None, "asked for"
     # Thrust goes as the square of the level, or with it: who mostly climbs hovers at less than his usual level.
-    felt = None if signs.felt is None else averaged(np.linalg.norm(signs.felt, axis=1), signs.period, _TURN_S)
-    of_hover = level if felt is None else level / np.sqrt(np.maximum(felt, 1.0))
+    felt, of_hover = None, level
+    if signs.felt is not None:
+        felt = averaged(np.linalg.norm(signs.felt, axis=1), signs.period, _TURN_S)
+        # By the mean force, in which vibration is none.
+        of_hover = level / np.sqrt(np.maximum(np.linalg.norm(averaged(signs.felt, signs.period, _TURN_S), axis=1), 1.0))
     hover = float(np.median(of_hover[level > _OF_LARGEST * largest]))
     carrying = np.asarray(level > _OF_HOVER * hover, dtype=bool)
     if rate is not None and carrying.any():
@@ -279,7 +282,9 @@ def _held(signs: Signs, active: BoolArray) -> str:
         moved = np.gradient(felt, signs.period, axis=0)[active, :2]
         power, both = float((turned**2).mean()), float((turned * moved).mean())
         alike = both / np.sqrt(power * float((moved**2).mean()) + 1e-12)
-        if power < _SWINGS_RAD_S**2 or min(both / power, alike) < _AS_HELD:
+        swings = power > _SWINGS_RAD_S**2
+        # What does not swing slowly, as its mean does not at 2 Hz, is judged as it swings fast.
+        if (swings and min(both / power, alike) < _AS_HELD) or not (swings or over_s == SLOW_S):
             return ""
     return "the weight turns through it as it turns"
 

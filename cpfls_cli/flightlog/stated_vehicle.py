@@ -325,6 +325,11 @@ _USUAL_BITS = 176126  # LOG_BITMASK of ArduCopter 4 by default.
 _NONE: Final[Parameters] = MappingProxyType({})
 
 
+def shown_slowly(rotors_hz: float) -> str:
+    """Say up to which frequency rotors that are logged so often, Hz, show the motion."""
+    return f"rotors are logged {rotors_hz:.2g} times a second, which shows no motion above {rotors_hz / 2:.2g} Hz"
+
+
 def log_faster(what: str, least_hz: float, *systems: str, parameters: Parameters = _NONE) -> str:
     """Ask for what is logged too slowly faster, and say what to set in the autopilots that wrote the logs.
 

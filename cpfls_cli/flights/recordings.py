@@ -24,7 +24,7 @@ from cpfls_cli.errors import ComputationError, ConfigError, InputError
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
-from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster, shown_slowly
 from cpfls_cli.flights.flight import Imported, read_whole
 from cpfls_cli.flights.imported import commanded_speed, imported
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
@@ -174,11 +174,11 @@ def _recording(flight: ReadFlight, study: Study) -> tuple[Recording, tuple[str, 
     signals, notes = signals_of(flight, known, study)
     if signals.rotor_speed is not None:
         require_rotors(study)
-    hz, slow = flight.updated_hz.get("rotor_speed" if "rotor_speed" in known else "rotor_command"), ""
-    if hz is not None and hz < SLOW_HZ:
+    hz = flight.updated_hz.get("rotor_speed" if "rotor_speed" in known else "rotor_command", 1 / signals.period)
+    slow = ""
+    if signals.rotor_speed is not None and hz < SLOW_HZ:
         slow = (
-            f"the rotors are logged {hz:.2g} times a second, which shows no motion above {hz / 2:.2g} Hz: inertia, drag"
-            f" factor, lag and effects on the torque cannot be found; first"
+            f"the {shown_slowly(hz)}: inertia, drag factor, lag and effects on the torque cannot be found; first"
             f" {log_faster('rotors and body rates', FAST_HZ, flight.system)}"
         )
     notes = (*warnings, *notes, *doubts_on_voltage(known, flight.units))

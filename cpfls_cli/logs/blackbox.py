@@ -74,8 +74,9 @@ def _contents(content: bytes) -> LogContents:
     stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
     parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
     system, first = header.get("Firmware revision", ""), {"": 1e-6 * float(rows[0, 1])} if len(rows) else {}
-    if header.get("Firmware type") == "Cleanflight" and "setpoint[0]" in columns and not system.startswith(_WRITERS):
-        # A fork under a name of its own: Betaflight calls itself so, and its kin alone log setpoints.
+    if header.get("Firmware type") == "Cleanflight" and "setpoint[0]" in units and not system.startswith(_WRITERS):
+        # A fork under a name of its own: Betaflight calls itself so, and its kin alone log setpoints. By the comma its
+        # parameters are not taken for those of Betaflight (`Firmware.wrote`).
         system = f"Betaflight, as {system}"
     return LogContents({"": columns}, units, parameters, system, (lost,) if broken else (), _flown_at(header), first)
 

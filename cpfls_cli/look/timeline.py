@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation, median_filter, uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray, runs
+from cpfls_cli.flightlog.crash import BEYOND, HARD
 from cpfls_cli.flightlog.names import is_of
 from cpfls_cli.flightlog.recognised import Recognition
 from cpfls_cli.flightlog.topics import STAMP, Topics
@@ -32,7 +33,7 @@ _ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S = 1e-4, 0.985, 3, 0.05
 """Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus at a smaller one
 that make it one; and how long a rotor is there, s."""
 
-_LIES, _LIES_S, _HARD, _BEYOND, _HARD_S = -0.7, 1.0, 3.0, 1.5, 1.5
+_LIES, _LIES_S, _HARD_S = -0.7, 1.0, 1.5
 """Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity and
 times the largest of its flight, and how long before the end of a flight it may come, s."""
 
@@ -217,7 +218,7 @@ def _landing(flight: LogFlight, begin: float, end: float, at: float) -> Event:
         rows = np.flatnonzero((sensor.time >= end - _HARD_S) & (sensor.time <= max(at, end) + _NEAR_S))
         sizes, before = felt[rows], felt[(sensor.time >= begin) & (sensor.time < end - _HARD_S)]
         # What its rotors make in flight is no ground.
-        if sizes.max(initial=0.0) > max(_HARD, _BEYOND * before.max(initial=0.0)):
+        if sizes.max(initial=0.0) > max(HARD, BEYOND * before.max(initial=0.0)):
             # It is then that it touches the ground; the autopilot takes a while to be sure.
             touches, text = float(sensor.time[rows[sizes.argmax()]]), f"lands hard, with {sizes.max():.2g} g"
             return Event(time_s=touches, kind="landing", text=text, severity="warning")

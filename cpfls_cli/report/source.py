@@ -50,7 +50,7 @@ class Source(Generic[R]):
     vehicle: VehicleSettings
     parameters: int
     header: store.Origin = field(kw_only=True)
-    wordings: dict[str, str] = field(default_factory=dict, kw_only=True, repr=False, compare=False)
+    wordings: dict[str, str] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def format(self) -> str:

@@ -18,7 +18,7 @@ from cpfls_cli.config.load import stored_study
 from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Missing, Off, sized
-from cpfls_cli.export.sheet import Sheet
+from cpfls_cli.export.sheet import REFITTED, Sheet
 from cpfls_cli.flights.models import any_model, modelled
 from cpfls_cli.pages.model import against, impossible_in_words, worth_in_words
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
@@ -109,7 +109,8 @@ def _in_numbers(effect: ModelEffect) -> str:
     """Say what an effect is and which numbers it has, so that others can add it."""
     units = {each.name: "" if each.unit in ("", "1") else f" {each.unit}" for each in effect.known.numbers}
     numbers = ", ".join(f"{name} = {value:.4g}{units[name]}" for name, value in effect.values.items())
-    return f"{effect.known.title} ({effect.known.formula}; {numbers})"
+    title = REFITTED if effect.known.kind == "parameter" else effect.known.title
+    return f"{title} ({effect.known.formula}; {numbers})"
 
 
 def _evidence(record: IdentifiedModel) -> dict[str, Any]:

@@ -46,7 +46,7 @@ from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.config.yaml_text import to_yaml
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import ConfigError, InputError
-from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, shown_slowly
 from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
@@ -194,6 +194,7 @@ WORDS: Mapping[str, Any] = {
     "log_faster": log_faster,
     "section": lambda r: to_yaml({"vehicle": vehicle_section(r)}).rstrip(),
     "shares": shares_in_words,
+    "shown_slowly": shown_slowly,
     "to_know": _to_know,
     "too_heavy": too_heavy,
     "wanting": _reasons,

@@ -204,9 +204,9 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
 
 
 def negligible(power: Array) -> Array:
-    """Compute the size of a gap, shape (6,), below which nobody could use a correction.
+    """Compute the size of a gap, shape (6,), N m and N, below which nobody could use a correction.
 
-    `power`: mean squares of torque and force of the motion, shape (6,).
+    `power`: mean squares of torque and force of the motion, shape (6,), (N m)^2 and N^2, body axes; known of all.
     """
     torque, force = np.sqrt(power[:3]), np.sqrt(np.mean(power[3:]))
     return NEGLIGIBLE * np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[force] * 3])

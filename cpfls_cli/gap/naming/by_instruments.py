@@ -39,13 +39,15 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
 
     With the regressors X, the residual r and the prediction Z of X by instruments, the numbers change by d with
     ``sum Z^T (r - X d) = 0``. A gust correlates with X, which the loop moves to answer it, and not with Z. Weakly
-    identified numbers stay as they were, and all do where the flights are too short for errors. Bounds count as
-    standard deviations of a normal prior, as in the search.
+    identified numbers stay as they were, but for inertia and couplings, which are those of the config then; all stay
+    where the flights are too short for errors. Bounds count as standard deviations of a normal prior, as in the search.
 
     Reference: Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak
     instruments).
     """
-    found = at = _of_config(found)
+    stated = at = _of_config(found)
+    if not _sources(at, given):
+        return found
     moved = np.zeros(len(found.values), dtype=bool)
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
@@ -59,7 +61,7 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error):
             break
-    return at._replace(estimates=_with_unidentified(found, at.estimates, moved))
+    return at._replace(estimates=_with_unidentified(stated, at.estimates, moved))
 
 
 def _of_config(found: NamedFit) -> NamedFit:

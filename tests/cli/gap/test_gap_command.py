@@ -61,7 +61,7 @@ def test_json_has_every_promised_key(found):
     assert found.summary["where"]["channels"] == ["torque y", "torque x"]
     assert {"parameters", "split", "extension", "disagreement"} <= set(found.summary)
     assert set(found.summary["effects"][0]) == {
-        "name", "coefficients", "p_value", "share", "sentence",
+        "name", "coefficients", "identified", "p_value", "share", "sentence",
     }  # fmt: skip
     assert json.loads((found.folder / "gap.json").read_text()) == found.summary
     assert {"findings", "warnings"} <= set(found.summary["audit"])

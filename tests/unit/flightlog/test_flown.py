@@ -88,8 +88,10 @@ def test_what_does_not_fly_is_said_to(level, height, rate, reason):
     assert (flown.flies, flown.reasons) == (False, (reason,))
 
 
-def test_a_stand_feels_the_weight_turn_and_a_flight_does_not():
-    lean = 0.2 * np.sin(4 * TIME)
+@pytest.mark.parametrize("turns_rad_s", [4.0, 4 * np.pi])
+def test_a_stand_feels_the_weight_turn_and_a_flight_does_not(turns_rad_s):
+    """Also where it swings at 2 Hz, of which a mean over half a second holds nothing."""
+    lean = 0.2 * np.sin(turns_rad_s * TIME)
 
     def flown(side):
         signs = Signs(
@@ -104,8 +106,26 @@ def test_a_stand_feels_the_weight_turn_and_a_flight_does_not():
     assert not stand.flies
     assert stand.reasons == ("no flight in it: the weight turns through it as it turns, as on a test stand",)
     # Drag follows speed, which the lean makes, late; an acceleration of the world has the other sign.
-    assert flown(0.05 * np.cos(4 * TIME)).flies
+    assert flown(0.05 * np.cos(turns_rad_s * TIME)).flies
     assert flown(np.sin(lean)).flies
+
+
+def test_vibration_on_the_ground_is_no_thrust():
+    rng = np.random.default_rng(2)
+    level = between(18, 32, 0.5, 0.22)
+    rate = np.column_stack([turning(18, 32, 0.6), 0 * TIME, 0 * TIME])
+    force = np.array([0.0, 0.0, 1.0]) + rng.standard_normal((len(TIME), 3))
+    flown = find_flown(Signs(time=TIME, rotors=np.repeat(level[:, None], 4, axis=1), body_rate=rate, force=force))
+    assert flown.span_s == (pytest.approx(18.0, abs=1.0), pytest.approx(32.0, abs=1.0))
+
+
+@pytest.mark.parametrize("shares", [(1.42, 1.42, 0.58, 0.58), (1.4, 0.6, 1.4, 0.6), (1.9, 0.9, 0.9, 0.9)])
+def test_a_trimmed_vehicle_and_one_with_a_weak_rotor_fly(shares):
+    """They feel their weight along the rotors, however unlike these are."""
+    rotors = np.full((len(TIME), 4), 0.5) * shares
+    rate = np.column_stack([turning(0, 40), 0 * TIME, 0 * TIME])
+    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=np.tile([0.0, 0.0, 1.0], (len(TIME), 1))))
+    assert (flown.flies, flown.span_s, flown.ended) == (True, None, "")
 
 
 def test_a_quadrotor_without_one_rotor_spins_or_is_held():

@@ -5,6 +5,7 @@ import struct
 import numpy as np
 import pytest
 
+from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import log_contents, log_flights
 from tests.builders.blackbox_logs import BATTERY, BEEP, END, FACTS, FIELDS, NAMES, RESUMED, SLOW, flight, frames, header
@@ -109,6 +110,10 @@ def test_a_fork_of_betaflight_under_a_name_of_its_own_is_its_kin(read):
     assert contents.system == "Betaflight, as Otherflight 4.3.4 (norevision)"
     assert contents.units["setpoint[0]"] == "deg/s"
     assert read(content).system == "Otherflight 4.3.4 (norevision)"
+    assert not AUTOPILOTS["betaflight"].firmware.wrote(contents.system)
+    for unknown in ("", "Otherflight", "Other-Flight 4.3.4 (x)"):
+        content = header(**{"Firmware revision": unknown}) + b"".join(frames(flight()))
+        assert read(renamed(content, **names)).system == unknown
 
 
 def test_what_is_broken_costs_the_frames_up_to_the_next_whole_one(read):

@@ -167,7 +167,7 @@ def test_logs_too_slow_for_what_is_flown_are_to_be_faster_before_another_flight(
     assert own.verdict == Trust.NOT_DETERMINED
     (said,) = [line for line in against(replace(own, rotors_logged_hz=9.9)) if "rotors" in line]
     assert said == (
-        "The rotors are logged 9.9 times a second, which shows no motion above 5.0 Hz. Flights logged so say no more; "
+        "The rotors are logged 9.9 times a second, which shows no motion above 5 Hz. Flights logged so say no more; "
         "first log rotors and body rates at 100 Hz or more."
     )
     assert slow_words(replace(own, rotors_logged_hz=9.9, logged_by=("Betaflight 4.5.1",))).endswith(
