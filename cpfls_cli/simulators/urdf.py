@@ -48,7 +48,8 @@ def read_urdf(file: Path) -> SimulatorModel:
         raise root.error("has no <link>; give the file of a vehicle")
     plugins = [node for own in root.all("gazebo") for node in own.all("plugin")]
     motors = sorted((each for each in plugins if MOTOR.search(each.attributes.get("filename", ""))), key=motor_number)
-    if not motors and any(text_of(each, "jointName") for each in plugins):
+    # Other plugins of ROS name joints too.
+    if not motors and any(text_of(each, "jointName") and each.first("motorNumber") for each in plugins):
         raise no_motor(file, plugins)
     placed = _placed(root, links, [text_of(each, "jointName") for each in motors])
     bodies = tuple(_body(links[name], placed[name], notes) for name in placed)

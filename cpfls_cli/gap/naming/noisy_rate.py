@@ -9,14 +9,14 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.blocks import MOST_BLOCKS, contiguous
+from cpfls_cli.blocks import FEWEST_BLOCKS, MOST_BLOCKS, contiguous
 from cpfls_cli.effects.signals import white_noise
 from cpfls_cli.gap.balance.balance_system import residual_along
 from cpfls_cli.gap.balance.noise_floor import modulated
 from cpfls_cli.gap.naming.estimate import NamedFit, estimates_of, places_of
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.rounding import tied
-from cpfls_cli.weak_form.windows import windows
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows
 
 
 def with_noisy_rate(found: NamedFit) -> NamedFit:
@@ -27,7 +27,8 @@ def with_noisy_rate(found: NamedFit) -> NamedFit:
     both noises have in it, which depends on the numbers themselves: of the sum of ``|r|^2 / (|g - c F|^2 w^2 s_rate^2 +
     s_torque^2)`` the least is sought, with the filter F, its coefficients c, and the gains g of the inertia, which are
     free. Noise is taken for white, as the signals' third differences show it. Other effects stay as they are, and all
-    do in gusts, which are no noise of a sensor.
+    do in gusts, which are no noise of a sensor, in flights too short for an error, and where a coefficient ends as
+    large as it may be: another valley is deeper there.
 
     Reference: Pintelon and Schoukens 2012, System Identification, chapter 9 (errors in variables, noise known).
     """
@@ -36,9 +37,12 @@ def with_noisy_rate(found: NamedFit) -> NamedFit:
     if index is None or hypothesis.gusty.any():
         return found
     balance = _Balance(found, index)
-    if not ((balance.rate > 0) & (balance.torque > 0)).all():
+    if balance.blocks < FEWEST_BLOCKS or not ((balance.rate > 0) & (balance.torque > 0)).all():
         return found
     number, without = balance.fitted()
+    most = np.array([each.bounds(balance.vehicle)[1] for each in balance.effect.coefficients])
+    if tied(number[: len(most)], most).any():
+        return found
     own, shapes = places_of(hypothesis)[index]
     places = np.r_[own, shapes]
     values, left_out = found.values, np.tile(found.values, (len(without), 1))
@@ -56,6 +60,7 @@ class _Balance:
 
     `rest`, `inertial`, shape (window, frequency, 3), N m: residual without the effect, inertial torque of the config.
     `rate`, `torque`, shape (3,), N m s and N m: standard deviations of the noise of a sample of momentum and torque.
+    `blocks`: of time, 0 where flights are too short for these windows or logged too slowly for their frequencies.
     """
 
     def __init__(self, found: NamedFit, index: int) -> None:
@@ -64,10 +69,14 @@ class _Balance:
         self.period = hypothesis.flights[0].signals.period
         linear = found.estimates.linear.copy()
         linear[places_of(hypothesis)[index][0]] = 0.0
-        shortest = min(len(flight.signals) for flight in hypothesis.flights)
+        self.blocks = 0
         # As long as a block, their spectrum is about as narrow as the resonance of lightly damped springs.
-        seconds = min(found.settings.block_s, shortest * self.period / 4)
+        longest = max(len(flight.signals) for flight in hypothesis.flights) * self.period
+        seconds = min(found.settings.block_s, longest / 4)
+        if seconds < FEWEST_SAMPLES * self.period:
+            return
         own = windows(self.period, seconds, found.settings.overlap)
+        used = [number for number, flight in enumerate(hypothesis.flights) if own.count(len(flight.signals)) > 1]
         samples, size = len(own.weight), np.sqrt((own.weight**2).sum())
         # Beyond the highest frequency that the effect may have, as far as the log goes.
         ends = [
@@ -76,6 +85,8 @@ class _Balance:
             *(f.cut_off[:3].min() for f in hypothesis.flights),
         ]
         highest = int(min(ends) * samples * self.period)
+        if highest < FEWEST_SAMPLES:
+            return
         at = [modulated(own, cycles / (samples * self.period)) for cycles in range(1, highest)]
         self.hop, self.average = own.hop, np.stack([each.weight for each in at], axis=1) / size
         self.differentiate = -np.stack([each.slope for each in at], axis=1) / size
@@ -83,10 +94,10 @@ class _Balance:
         near = np.abs(fine) < (highest + 3) / samples
         self.share = power[:, near] / power.sum(axis=1, keepdims=True)
         self.turn = 2j * np.pi * fine[near]
-        along = [residual_along(hypothesis, number, linear) for number in range(len(hypothesis.flights))]
+        along = [residual_along(hypothesis, number, linear) for number in used]
         self.vehicle = hypothesis.vehicle
         moments = np.array(hypothesis.vehicle.inertia_kg_m2[:3])
-        self.momenta = [signals.body_rate * moments for signals in hypothesis.signals]
+        self.momenta = [hypothesis.signals[number].body_rate * moments for number in used]
         turned = [each.momentum for each in along if each.momentum is not None]
         self.rest = self._rows([each.direct for each in along], self.average) + self._rows(turned, self.differentiate)
         self.inertial = self._rows(self.momenta, self.differentiate)
@@ -94,6 +105,7 @@ class _Balance:
             np.sqrt(np.mean([white_noise(each[:, :3]) ** 2 for each in signals], axis=0))
             for signals in (self.momenta, [each.direct for each in along])
         )
+        self.blocks = min(MOST_BLOCKS, len(self.rest) // 4)
 
     def _rows(self, signals: list[Array], kernel: Array) -> Array:
         views = (sliding_window_view(each[:, :3], len(kernel), axis=0)[:: self.hop] for each in signals)
@@ -161,7 +173,7 @@ class _Balance:
             sides.append(tuple((a - b) / (2 * by.sum()) for a, b in zip(ahead, behind, strict=True)))
         columns, gains = zip(*sides, strict=True)
         products, gain = self._products(columns), np.array(gains)
-        block = contiguous(len(products), min(MOST_BLOCKS, len(products) // 4))
+        block = contiguous(len(products), self.blocks)
         sums = np.array([products[block == number].sum(axis=0) for number in np.unique(block)])
         low, high = np.array(bounds).T - shapes
         within = list(zip(np.maximum(-step, low), np.minimum(step, high), strict=True))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
@@ -147,6 +147,22 @@ def test_noise_of_the_gyroscope_takes_nothing_off_the_share_on_springs():
     assert all(right[name].low <= value <= right[name].high for name, value in truth.items())
     assert abs(right["share_z"].value - 0.3) < 0.5 * abs(small["share_z"].value - 0.3)
     assert likely.hypothesis.shape_values == pytest.approx([right[name].value for name in ("frequency_hz", "damping")])
+
+
+def test_a_short_flight_takes_nothing_from_long_ones_and_gives_no_numbers_alone():
+    spring = {"share": 0.3, "natural": 2 * np.pi * 2.65, "damping": 0.1}
+    whole = [on_springs(seed, **spring) for seed in (4, 5, 6)]
+    short = weak(stretch_of(whole[2].signals, slice(0, round(2.0 / PERIOD))))
+    own = candidate("flexible_mount", frequency_hz=2.65, damping=0.1)
+
+    def squares(flights):
+        return fitted(flights, [own], best_floor(system(flights, [own])), SETTINGS)
+
+    likely = {each.name: each for each in with_noisy_rate(squares([*whole[:2], short])).estimates.effects[0]}
+    assert likely["frequency_hz"].value == pytest.approx(2.65, rel=0.02)
+    assert all(likely[name].value == pytest.approx(0.3, abs=0.05) for name in ("share_x", "share_y", "share_z"))
+    alone = squares([weak(stretch_of(whole[0].signals, slice(0, round(12.0 / PERIOD))))])
+    assert with_noisy_rate(alone) is alone
 
 
 def test_a_stiff_body_has_no_springs():
