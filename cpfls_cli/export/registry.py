@@ -147,7 +147,7 @@ def _left(sheet: Sheet, held: Held, holds: Holds, form: Form) -> tuple[tuple[Mis
 
 
 def _otherwise(sheet: Sheet, held: Held, form: Form) -> Iterator[Missing]:
-    """Tell how far half a second about hover ends off by what a form does otherwise than a sum of weights."""
+    """Compute how far half a second about hover ends off by what a form does otherwise than a sum of weights."""
     if form.otherwise is None:
         return
     words, fly, step_s = form.otherwise

@@ -182,7 +182,7 @@ class _Inverse:
 def _inverted(matrix: Array, tolerance: float) -> _Inverse | None:
     """Invert a matrix whose eigenvalues below a share of the largest count as zero; None where all are zero.
 
-    A Cholesky decomposition does that, beside the few eigenvectors that are asked for: of a large matrix by few steps
+    A Cholesky decomposition does that, with the few eigenvectors that are asked for: of a large matrix by few steps
     of Lanczos, if it has full rank, of others by a tridiagonal form. Where it fails all eigenvectors are computed.
     """
     with suppress(np.linalg.LinAlgError):
@@ -211,19 +211,19 @@ def _reduced(matrix: Array, tolerance: float) -> _Inverse | None:
     size = len(matrix)
     if size < _FEW:
         return None
-    form, diagonal, beside, reflectors, _ = lapack.dsytrd(matrix, lower=1, lwork=_WORK * size)
+    form, diagonal, off_diagonal, reflectors, _ = lapack.dsytrd(matrix, lower=1, lwork=_WORK * size)
 
     def turned_back(vectors: Numbers) -> Numbers:
         below = lapack.dormqr("L", "N", form[1:, :-1], reflectors, vectors[1:], _WORK * size)[0]
         return np.concatenate([vectors[:1], below])
 
     last = (size - 1, size - 1)
-    (largest,) = linalg.eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=last, check_finite=False)
+    (largest,) = linalg.eigvalsh_tridiagonal(diagonal, off_diagonal, select="i", select_range=last, check_finite=False)
     if not largest > 0:
         return None
     near_zero = (-largest, tolerance * largest)
     none = turned_back(
-        linalg.eigh_tridiagonal(diagonal, beside, select="v", select_range=near_zero, check_finite=False)[1]
+        linalg.eigh_tridiagonal(diagonal, off_diagonal, select="v", select_range=near_zero, check_finite=False)[1]
     )
     factor = linalg.cho_factor(matrix + largest * none @ none.T, check_finite=False)
 
@@ -234,7 +234,9 @@ def _reduced(matrix: Array, tolerance: float) -> _Inverse | None:
     if missing := none.shape[1]:
         return _Inverse(apply, missing)
     lowest = (0, _LOWEST_DIRECTIONS - 1)
-    values, vectors = linalg.eigh_tridiagonal(diagonal, beside, select="i", select_range=lowest, check_finite=False)
+    values, vectors = linalg.eigh_tridiagonal(
+        diagonal, off_diagonal, select="i", select_range=lowest, check_finite=False
+    )
     return _Inverse(apply, 0, largest, values[0], turned_back(vectors))
 
 
@@ -257,18 +259,18 @@ def _extreme(apply: Callable[[Array], Array], size: int) -> tuple[float, Array] 
     basis = np.zeros((_STEPS + 1, size))
     basis[0] = np.random.default_rng(0).standard_normal(size)
     basis[0] /= np.linalg.norm(basis[0])
-    diagonal, beside = np.zeros(_STEPS), np.zeros(_STEPS)
+    diagonal, off_diagonal = np.zeros(_STEPS), np.zeros(_STEPS)
     for step in range(min(_STEPS, size)):
         known, ahead = basis[: step + 1], apply(basis[step])
         diagonal[step] = ahead @ basis[step]
         for _ in range(2):
             ahead = ahead - (known @ ahead) @ known
-        beside[step] = np.linalg.norm(ahead)
+        off_diagonal[step] = np.linalg.norm(ahead)
         if step % 5 == 4 or step + 1 == size:
-            values, vectors = linalg.eigh_tridiagonal(diagonal[: step + 1], beside[:step], check_finite=False)
-            if beside[step] * np.abs(vectors[-1, -1]) <= _SETTLED * values[-1]:
+            values, vectors = linalg.eigh_tridiagonal(diagonal[: step + 1], off_diagonal[:step], check_finite=False)
+            if off_diagonal[step] * np.abs(vectors[-1, -1]) <= _SETTLED * values[-1]:
                 return float(values[-1]), known.T @ vectors[:, : -1 - _LOWEST_DIRECTIONS : -1]
-        basis[step + 1] = ahead / beside[step]
+        basis[step + 1] = ahead / off_diagonal[step]
     return None
 
 

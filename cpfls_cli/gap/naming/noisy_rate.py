@@ -190,9 +190,9 @@ class _Balance:
     def open_ends(self, numbers: Sequence[Estimate]) -> tuple[Estimate, ...]:
         """Widen the interval of a shape on a bound to the next point of its grid: nothing else identifies it there."""
         ends = {s.name: ((s.grid[0], s.grid[1]), (s.grid[-1], s.grid[-2])) for s in self.effect.shapes}
-        for name, (bound, beside) in ((name, end) for name, both in ends.items() for end in both):
+        for name, (bound, inside) in ((name, end) for name, both in ends.items() for end in both):
             numbers = [
-                replace(n, low=min(n.low, beside), high=max(n.high, beside))
+                replace(n, low=min(n.low, inside), high=max(n.high, inside))
                 if n.name == name and tied(np.array(n.value), np.array(bound))
                 else n
                 for n in numbers
