@@ -23,19 +23,17 @@ from scipy import signal
 from benchmarks.shared.measure import program, table
 from benchmarks.shared.studies import paper_flight, paper_selection, paper_study
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque
+from cpfls_cli.dynamics import InertiaFunctions, inertia_matrix, newton_euler_torque
 from cpfls_cli.identification.data import TorqueData, axis_scale
 from cpfls_cli.identification.evaluator import decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.trajectory.rotation import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
-from cpfls_cli.validation.bands import band, inertia_band
-from cpfls_cli.validation.bootstrap import bootstrap
+from cpfls_cli.validation.bands import band, bootstrap, inertia_band
 
 NOISE, TIME_CONSTANT, ATTITUDES = 0.05, 5.0, 100
 INERTIA, DURATION_S, SAMPLES = np.diag([0.6, 0.6, 1.2]), 54.86, 5487

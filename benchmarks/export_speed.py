@@ -11,13 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.shared.measure import in_turn, program, table
-from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
+from cpfls_cli.dynamics import CELLS, InertiaFunctions, coriolis_matrix
 from cpfls_cli.export.points import reference_points
 from cpfls_cli.export.source import c_source
-from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import uniform_breakpoints
+from cpfls_cli.fuzzy.basis import InputRange
+from cpfls_cli.regressor.regressor import Motion, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders.exported_models import sheet_of
 from tests.builders.exported_vehicles import sheet_of_vehicle

@@ -39,6 +39,7 @@ from markupsafe import Markup
 from cpfls_cli.errors import visible
 from cpfls_cli.report.content import (
     STRUCK,
+    UNKNOWN,
     Block,
     Box,
     Cell,
@@ -51,8 +52,14 @@ from cpfls_cli.report.content import (
     Table,
     Text,
     Tone,
+    change,
+    number,
+    percent,
+    printed,
+    sentence,
+    whole_percent,
+    with_interval,
 )
-from cpfls_cli.report.numbers import UNKNOWN, change, number, percent, printed, sentence, whole_percent, with_interval
 from cpfls_cli.result import column
 from cpfls_cli.version import __version__
 from cpfls_cli.words import joined

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from cpfls_cli import page, store
-from cpfls_cli.artifacts.gate import stage_module
+from cpfls_cli.artifacts.gate import InputFile, stage_module
 from cpfls_cli.artifacts.job import Job, go_on, input_file, take_inputs
 from cpfls_cli.artifacts.output import (
     check_folder,
@@ -29,7 +29,6 @@ from cpfls_cli.artifacts.output import (
     write_files,
     write_text,
 )
-from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError, visible
 from cpfls_cli.report.canvas import figure_html, picture_of, pictures

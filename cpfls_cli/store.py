@@ -19,13 +19,23 @@ import h5py
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.gate import (
+    CONFIG,
+    INPUTS,
+    PART,
+    SCHEMA_VERSION,
+    DatasetSpec,
+    dataset_of,
+    held_format,
+    identified,
+    opened_file,
+    stage_module,
+)
 from cpfls_cli.artifacts.gate import Origin as Origin
-from cpfls_cli.artifacts.gate import dataset_of, held_format, identified, opened_file, stage_module
 from cpfls_cli.artifacts.gate import format_name as format_name
 from cpfls_cli.artifacts.gate import read_origin as read_origin
 from cpfls_cli.artifacts.output import sealed_output
 from cpfls_cli.artifacts.patience import patient
-from cpfls_cli.artifacts.spec import CONFIG, INPUTS, PART, SCHEMA_VERSION, DatasetSpec
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.result import AXES, About, Described, described_fields, maps
 from cpfls_cli.words import some

@@ -12,8 +12,8 @@ import click
 import typer
 from mkdocs.structure.files import File, Files
 
-from cpfls_cli.cli.app import app
-from cpfls_cli.config.keys import commented_default
+from cpfls_cli.cli.stages import app
+from cpfls_cli.config.check import commented_default
 from cpfls_cli.stages.info import described, formats
 
 ROOT = Path(__file__).parents[1]

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from cpfls_cli import rotations, store
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.config.load import load_study
-from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix, turning_law
+from cpfls_cli.dynamics import coriolis_matrix, turning_law
 from cpfls_cli.inertia import six_parameters
 
 FREQUENCY, DAMPING = 2 * np.pi * np.array([1.2, 1.2, 0.5]), 1.0

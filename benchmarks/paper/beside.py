@@ -21,9 +21,8 @@ from benchmarks.paper.printed import (
     PrintedColumn,
 )
 from benchmarks.paper.replicates import Setting, Spread, Sweep, joined_sweeps
-from cpfls_cli.identification.scores import MODEL, TRAINING, Judged
-from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.identification.identify import MODEL, TRAINING, Judged
+from cpfls_cli.report.content import UNKNOWN, Block, Cell, Folded, Plot, Section, Table, Text, change, number, percent
 from cpfls_cli.report.source import Source
 
 _LACKS_SWEEP = Text(

@@ -22,9 +22,9 @@ from benchmarks.paper.replicates import ALL_SAMPLES, Setting, Sweep, joined_swee
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.path import PlannedPath
-from cpfls_cli.identification.scores import MODEL, TRAINING
+from cpfls_cli.identification.identify import MODEL, TRAINING
 from cpfls_cli.reduction.selection import Selection
-from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.report.content import UNKNOWN, change, number, percent
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.words import joined
 
@@ -400,7 +400,7 @@ def _continuity(sources: Sources) -> Measurement:
 
 def _jump(model: Source[IdentifiedModel]) -> float:
     """Find by how much torque changes across 2 pi, as a share of the largest there."""
-    from cpfls_cli.regressor.motion import Motion
+    from cpfls_cli.regressor.regressor import Motion
 
     rng = np.random.default_rng(0)
     attitude, rate, acceleration = rng.uniform(-1.0, 1.0, (3, _SEAM_STATES, 3))

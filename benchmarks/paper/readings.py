@@ -25,8 +25,7 @@ from benchmarks.paper.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.arrays import Array
 from cpfls_cli.flights.flight import Simulated
 from cpfls_cli.report.canvas import GREY, plot, style_of
-from cpfls_cli.report.content import Block, Cell, Folded, Plot, Table, Text
-from cpfls_cli.report.numbers import UNKNOWN, number, percent
+from cpfls_cli.report.content import UNKNOWN, Block, Cell, Folded, Plot, Table, Text, number, percent
 from cpfls_cli.report.source import Source
 from cpfls_cli.words import joined
 

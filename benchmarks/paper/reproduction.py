@@ -43,13 +43,24 @@ from benchmarks.paper.search_claims import (
 )
 from cpfls_cli.flights.flight import MOTION
 from cpfls_cli.flights.prediction import AlongFlight
-from cpfls_cli.fuzzy.inputs import seesaw
-from cpfls_cli.fuzzy.membership import breakpoints
-from cpfls_cli.identification.scores import AXES, MODEL, TRAINING
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.fuzzy.basis import breakpoints, seesaw
+from cpfls_cli.identification.identify import AXES, MODEL, TRAINING
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
-from cpfls_cli.report.content import Block, Cell, Folded, Plot, Section, Table, Text, Tone
-from cpfls_cli.report.numbers import UNKNOWN, change, number, percent
+from cpfls_cli.report.content import (
+    UNKNOWN,
+    Block,
+    Cell,
+    Folded,
+    Plot,
+    Section,
+    Table,
+    Text,
+    Tone,
+    change,
+    number,
+    percent,
+)
 from cpfls_cli.report.source import Source
 
 if TYPE_CHECKING:

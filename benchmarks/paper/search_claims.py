@@ -14,7 +14,7 @@ from benchmarks.paper.claims import Claim, Measurement, Searches, Settings, deci
 from benchmarks.paper.printed import TABLE_5, TYPICAL_MAX_ERROR, TYPICAL_MSE, PrintedColumn
 from benchmarks.paper.replicates import ALL_SAMPLES, Setting
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.report.numbers import number, percent
+from cpfls_cli.report.content import number, percent
 
 _CONFIDENCE = 0.95
 _FLS, _FULL, *_REDUCED, _SMALL = TABLE_5

@@ -20,8 +20,8 @@ import typer
 
 from benchmarks.paper.replicates import ALL_SAMPLES, Setting, Sweep, replicate
 from benchmarks.shared.measure import program
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.job import Job, check_outputs, origin_before, take_inputs
-from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.cli.interrupts import deferred_interrupts
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import Study, generator, settings_of
@@ -34,8 +34,7 @@ from cpfls_cli.inertia import six_parameters
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.reduction.survey import Survey, survey
 from cpfls_cli.reduction.training_set import reduce_streamed
-from cpfls_cli.search.checkpoint import Checkpoint, StoppedSearch
-from cpfls_cli.search.resumable import Resumable, SearchOptions, Watch
+from cpfls_cli.search import Checkpoint, Resumable, SearchOptions, StoppedSearch, Watch
 from cpfls_cli.store import Origin, read, write
 
 

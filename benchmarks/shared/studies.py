@@ -10,10 +10,9 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import Study
-from cpfls_cli.dynamics.rigid_body import inertia_tensor, newton_euler_torque
+from cpfls_cli.dynamics import inertia_tensor, newton_euler_torque
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.trajectory.planning import plan
 from tests.builders.reductions import reduce

@@ -1,4 +1,4 @@
-"""The result of `diagnose`: which physical effect a model misses, judged on flights that the fit did not see."""
+"""Results of the gap workflow: what a model misses, which effect it is, and the model that has it."""
 
 from __future__ import annotations
 
@@ -9,27 +9,33 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.learned import LearnedFlight
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.gate import InputFile
+from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WorstWindows
-from cpfls_cli.gap.naming.results import Conclusion, GapSize
-from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
+from cpfls_cli.gap.before_after import FreeRuns, LeftOut, PlaybackChange, ResidualChange, WorstWindows
+from cpfls_cli.gap.compare import Comparison
+from cpfls_cli.gap.naming.causes import all_numbers
+from cpfls_cli.gap.naming.results import BODY, Conclusion, Estimate, GapChange, GapSize, NamedEffect
+from cpfls_cli.gap.recorded import GIVEN, HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
 from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.inertia import six_parameters
+from cpfls_cli.inertia import more_than_others, six_parameters
 from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.playback.gusts import GustAxis
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
 from cpfls_cli.simulators.results import Corrected
+from cpfls_cli.validation.verdict import capped, trust_by_playback
+from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import Recording
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.before_after import BeforeAfter
     from cpfls_cli.gap.diagnose import DiagnosisRun
-    from cpfls_cli.weak_form.windows import Recording
+    from cpfls_cli.gap.extended import Refit
+
 
 _TAKES_OFF = 0.05
 """Share of a gap from which on refitted numbers of the vehicle are said to take some of it off."""
@@ -229,3 +235,128 @@ class Diagnosis(Conclusion):
         """Notes on the diagnosis itself, without what the sensors say about each other."""
         said = {*self.audit.warnings, *self.audit.notes, *self.contradictions, *self.differences}
         return tuple(note for note in self.notes if note not in said)
+
+
+@result
+class Disagreement(Comparison):
+    """Where a model and flights disagree, with the flights."""
+
+    FORMAT: ClassVar = "cpfls/disagreement"
+    SHOWN: ClassVar = ("flights", "gap", "stretches")
+
+    warnings: tuple[str, ...] = about("what to know about the flights", "flight_note")
+    base: VehicleModel = part(brief=False)
+    recorded: Mapping[str, RecordedFlight] = part(brief=False)
+    learned: tuple[LearnedFlight, ...] = part((), brief=False)
+    """Flights that its base learned from."""
+
+    @classmethod
+    def of(
+        cls, found: Comparison, recordings: Sequence[Recording], warnings: tuple[str, ...], base: VehicleModel
+    ) -> Disagreement:
+        """Put a comparison together with the model and the flights."""
+        return cls(
+            **vars(found),
+            warnings=(*found.audit.filtered, *warnings),
+            base=base,
+            recorded=recorded(recordings, [GIVEN] * len(recordings)),
+        )
+
+    @property
+    def flights(self) -> list[str]:
+        """Names of the flights."""
+        return names_of(self.recorded)
+
+    @property
+    def stretches(self) -> list[dict[str, Any]]:
+        """Stretches of time with the largest gap, for machines."""
+        return [each._asdict() | {"flight": self.flights[each.flight]} for each in self.worst]
+
+    def is_base(self, stated: VehicleSettings) -> bool:
+        """Tell whether it was made with the vehicle of a config and no effects, which `cpfls diagnose` starts from."""
+        # Guesses of the config, once they stand in a model, are numbers like others.
+        own, wanted = ({**vars(each), "unknown": ()} for each in (self.base.vehicle, stated))
+        return self.base.is_rigid_body and own == wanted
+
+
+@result
+class Extended(AnyModel):
+    """A model with the effects that it missed in it, refitted together."""
+
+    FORMAT: ClassVar = "cpfls/extended"
+    MADE_BY: ClassVar = "extend"
+    SHOWN: ClassVar = ("trust", "gap_before", "gap_after", "warnings")
+
+    model: VehicleModel = part()
+    learned_from: tuple[LearnedFlight, ...] = part(default=())
+    """Flights that it was found in, those of its base among them."""
+    inertia: Array = about(
+        "Ixx Iyy Izz Ixy Ixz Iyz: of the rigid body, or what the model gets", "6", unit="kg m^2", frame=BODY
+    )
+    thrust_scale: float = about("thrust over that of the vehicle in the config")
+    effects: tuple[NamedEffect, ...] = part()
+    vehicle_numbers: tuple[Estimate, ...] = part(brief=False)
+    gap: GapChange = part(brief=False)
+    playback: PlaybackChange | None = part(default=None)
+    left_out: tuple[LeftOut, ...] = part(default=(), brief=False)
+    """Effects that no vehicle for other programs holds."""
+
+    @classmethod
+    def of(
+        cls,
+        refit: Refit,
+        stated: VehicleSettings,
+        model: VehicleModel,
+        playback: PlaybackChange,
+        left_out: Sequence[LeftOut],
+    ) -> Extended:
+        """Put a refit together; `stated` is the vehicle that the effects were fitted with."""
+        fitted, unseen, moments = refit.model, refit.unseen, stated.inertia_kg_m2
+        rigid_body = six_parameters(moments) if fitted.base is None else np.zeros(6)
+        correction = np.array([*fitted.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])
+        scale = next((each.value for each in refit.estimates.parameters if each.name == "thrust_scale"), 0.0)
+        return cls(
+            model=model,
+            inertia=rigid_body + correction,
+            thrust_scale=1.0 + scale,
+            effects=refit.effects,
+            vehicle_numbers=all_numbers(refit.estimates),
+            gap=GapChange.of(unseen.size(unseen.before), unseen.size(unseen.after), unseen.floor),
+            playback=playback,
+            left_out=tuple(left_out),
+        )
+
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """Contradictions within the flights that it was found in."""
+        return () if self.model.repairs is None else self.model.repairs.contradictions
+
+    @property
+    def trust(self) -> str:
+        """What playback on flights held out says of it, as far as they do not contradict themselves."""
+        return capped(trust_by_playback(self.playback), self.contradictions)
+
+    @property
+    def impossible(self) -> tuple[str, ...]:
+        """Moments of inertia that are more than the other two together; others are as stated, or as they were found."""
+        return tuple(f"inertia.{name}" for name in more_than_others(self.inertia.tolist()))
+
+    @property
+    def gap_before(self) -> dict[str, Any]:
+        """The gap of the model as given, for machines: lists over x, y, z."""
+        return GapSize(self.gap.before, self.gap.before_floors).as_summary
+
+    @property
+    def gap_after(self) -> dict[str, Any]:
+        """The gap with the effects, for machines: lists over x, y, z."""
+        return GapSize(self.gap.after, self.gap.after_floors).as_summary
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Axes that the extension serves ill, although it serves the whole well."""
+        gap = self.gap
+        return tuple(
+            f"held out, {CHANNELS[index]}: the gap grows, {gap.before_floors[index]:.3g} -> "
+            f"{gap.after_floors[index]:.3g} floors, although the sum over all channels shrinks"
+            for index in gap.worse_axes
+        )

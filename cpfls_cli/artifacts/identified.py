@@ -7,27 +7,23 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.learned import LearnedFlight
-from cpfls_cli.artifacts.model import AnyModel
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
+from cpfls_cli.dynamics import InertiaFunctions
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.engine import History
-from cpfls_cli.identification.cross_validation import RidgeCurve
-from cpfls_cli.identification.excitation import RuleExcitation
-from cpfls_cli.identification.identify import TRAINING, Identification
-from cpfls_cli.identification.scores import MODEL, Judged
+from cpfls_cli.identification.findings import RuleExcitation
+from cpfls_cli.identification.identify import MODEL, TRAINING, Identification, Judged
 from cpfls_cli.identification.search import Front, StopReason, is_end
+from cpfls_cli.identification.solver import RidgeCurve
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
-from cpfls_cli.validation.bootstrap import Draws
-from cpfls_cli.validation.physical import Physics
+from cpfls_cli.validation.bands import Draws, Physics
 from cpfls_cli.validation.replay import StepErrors
 from cpfls_cli.validation.residuals import ResidualAnalysis
 from cpfls_cli.validation.structures import StructureComparison
-from cpfls_cli.validation.trust import Trust
 from cpfls_cli.validation.validate import Curves, RoundTrip, Validation
-from cpfls_cli.validation.verdict import Verdict
+from cpfls_cli.validation.verdict import Trust, Verdict
 
 WELL_CONDITIONED = 100.0
 """Largest condition number of a model whose coefficients are all known."""

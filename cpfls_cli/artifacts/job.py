@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
 
-from cpfls_cli.artifacts.gate import Origin, format_name, read_origin
+from cpfls_cli.artifacts.gate import InputFile, Origin, format_name, read_origin
 from cpfls_cli.artifacts.output import check_output
-from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.config.unknown import needs_numbers, require_known
 from cpfls_cli.errors import InputError

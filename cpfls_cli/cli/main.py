@@ -36,7 +36,7 @@ def run() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     from typer import Exit
 
-    from cpfls_cli.cli.app import app
+    from cpfls_cli.cli.stages import app
     from cpfls_cli.cli.terminal import messages_for_errors
 
     with interruptible():

@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import typer
 
-from cpfls_cli.cli.misplaced import what_it_is
-from cpfls_cli.cli.options import Common
+from cpfls_cli.cli.options import Common, what_it_is
 from cpfls_cli.errors import CpflsError, InputError, NotAnArtifactError, visible
 from cpfls_cli.words import broken
 

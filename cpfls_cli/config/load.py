@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from cpfls_cli.config.check import check_data, gone_lines
-from cpfls_cli.config.study import Study, resolved
-from cpfls_cli.config.yaml_text import parse_yaml
+from cpfls_cli.config.study import Study, parse_yaml, resolved
 from cpfls_cli.errors import ConfigError, SettingError
 
 _LARGEST = 1_000_000

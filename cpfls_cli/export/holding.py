@@ -9,15 +9,12 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia
-from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import vertical
+from cpfls_cli.dynamics import CELLS, InertiaFunctions, InertiaModel, body_inertia, vertical
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.acting import parts_of
-from cpfls_cli.export.numbers import Numbers
-from cpfls_cli.export.polynomials import motion_terms, weights_of, weights_of_model
+from cpfls_cli.export.numbers import Numbers, motion_terms, weights_of, weights_of_model
+from cpfls_cli.export.points import parts_of
 from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel, turning_by_attitude

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
-from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import VERTICAL
-from cpfls_cli.export.acting import traced_wrench, units_of
-from cpfls_cli.export.points import PERIOD
+from cpfls_cli.artifacts.gate import BODY, EULER, WORLD
+from cpfls_cli.dynamics import CELLS, VERTICAL, InertiaFunctions
+from cpfls_cli.export.points import PERIOD, traced_wrench, units_of
 from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, Sheet, base_of, rule_labels
 from cpfls_cli.export.source import (
     attitudes_of,
@@ -21,7 +19,7 @@ from cpfls_cli.export.source import (
     visited_rows,
 )
 from cpfls_cli.export.text import strict_json
-from cpfls_cli.fuzzy.membership import Z_FUNCTION
+from cpfls_cli.fuzzy.basis import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.regressor.structure import Block

@@ -12,11 +12,19 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.config.load import parse_config
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics import InertiaFunctions
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.export.acting import Traced, numbers_of
 from cpfls_cli.export.holding import Missing
-from cpfls_cli.export.points import Expected, ReferencePoints, ReferenceRun, attitude_points, reference_points, runs_of
+from cpfls_cli.export.points import (
+    Expected,
+    ReferencePoints,
+    ReferenceRun,
+    Traced,
+    attitude_points,
+    numbers_of,
+    reference_points,
+    runs_of,
+)
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.structure import Block, ModelStructure

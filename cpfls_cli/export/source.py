@@ -11,10 +11,18 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import VERTICAL, vertical
-from cpfls_cli.export.acting import LEARNED, numbers_of, share_of, traced_wrench, units_of
-from cpfls_cli.export.points import PERIOD, Expected, ReferencePoints, ReferenceRun
+from cpfls_cli.dynamics import CELLS, VERTICAL, InertiaFunctions, vertical
+from cpfls_cli.export.points import (
+    LEARNED,
+    PERIOD,
+    Expected,
+    ReferencePoints,
+    ReferenceRun,
+    numbers_of,
+    share_of,
+    traced_wrench,
+    units_of,
+)
 from cpfls_cli.export.sheet import Sheet, rule_labels
 from cpfls_cli.export.text import c_row, c_rows, comment_lines, comment_text, filled, literal_text, number, python_rows
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric

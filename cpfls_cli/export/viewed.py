@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.diagnosis import Diagnosis
-from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD, DatasetSpec
+from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement
+from cpfls_cli.artifacts.gate import BODY, EULER, WORLD, DatasetSpec
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.tracks import (
+from cpfls_cli.export.mcap_form import (
     ANGLES,
     AXES,
     BODY_FRAME,

@@ -13,8 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.autopilots.allocation import Allocation, Limits, factor_mix, px4_mix
-from cpfls_cli.autopilots.motors import ThrustCurve
+from cpfls_cli.autopilots.motors import Allocation, Limits, ThrustCurve, factor_mix, px4_mix
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flightlog.airframe import stated_airframe, usual_airframe

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import BODY, EULER, WORLD
+from cpfls_cli.artifacts.gate import BODY, EULER, WORLD
 from cpfls_cli.gap.settings import RARE
 from cpfls_cli.result import about, part, result
 
 if TYPE_CHECKING:
-    from cpfls_cli.excitation.optimise import Excitation
+    from cpfls_cli.excitation import Excitation
     from cpfls_cli.simulation.inverse import Flyability
     from cpfls_cli.simulation.room_left import RoomLeft
     from cpfls_cli.trajectory.legs import Leg

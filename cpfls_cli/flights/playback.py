@@ -19,12 +19,12 @@ from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.repair import common_rate, same_rate
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
-from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.recordings import (
     FEWEST,
     ReadFlight,
     all_known,
     doubts_on_voltage,
+    imported,
     known_stretches,
     read_flight,
     read_import,

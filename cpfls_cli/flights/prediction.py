@@ -14,28 +14,30 @@ from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.config.study import Study
 from cpfls_cli.config.unknown import require_known
 from cpfls_cli.consistency.findings import contradictions
-from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient, not_positive_definite, vertical
+from cpfls_cli.dynamics import (
+    InertiaFunctions,
+    coriolis_matrix,
+    inertia_matrix,
+    inertia_matrix_gradient,
+    not_positive_definite,
+    vertical,
+)
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight import MOTION, Flight, require_signals
-from cpfls_cli.flights.flight_source import check_file, torque_source_of
-from cpfls_cli.flights.models import any_model, is_found, read_model
+from cpfls_cli.flights.models import any_model, is_found, model_of_another, other_vehicles, read_model
 from cpfls_cli.flights.recordings import read_alone
-from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
+from cpfls_cli.flights.training import check_file, torque_source_of
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import Score, ScoreSums
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import InertiaValues
+from cpfls_cli.regressor.regressor import InertiaValues, Motion
 from cpfls_cli.rotations import attitude_rate, body_torque, generalised_torque
 from cpfls_cli.store import read
-from cpfls_cli.validation.bands import inertia_band, torque_band
-from cpfls_cli.validation.bootstrap import Draws
-from cpfls_cli.validation.trust import Trust
+from cpfls_cli.validation.bands import Draws, inertia_band, torque_band
+from cpfls_cli.validation.verdict import Trust
 
 _UNJUDGED = "has no verdict and no bands; `cpfls identify` with identification.validation.enabled adds them"
 

@@ -1,9 +1,9 @@
-"""Flights of the gap workflow: artifacts or logs as signals on one clock each, and which of them are held out."""
+"""Flights of the gap workflow: artifacts or logs imported, signals on one clock each, and which are held out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
@@ -12,28 +12,99 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, stretches
-from cpfls_cli.artifacts.gate import Origin
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.gate import InputFile, Origin
+from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.config.load import stored_study
-from cpfls_cli.config.study import Study
+from cpfls_cli.config.study import Study, settings_of
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import Finding, contradictions
 from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.effects.signals import Signals, stretch_of
-from cpfls_cli.errors import ComputationError, ConfigError, InputError
+from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
+from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
-from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster, shown_slowly
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster, shown_slowly, stated_vehicle
 from cpfls_cli.flights.flight import Imported, read_whole
-from cpfls_cli.flights.imported import commanded_speed, imported
-from cpfls_cli.flights.same_vehicle import require_same_vehicle
+from cpfls_cli.flights.models import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.logs.formats import is_log
+from cpfls_cli.logs.formats import LogColumns, is_log, read_log
 from cpfls_cli.units import SPEED_UNITS
-from cpfls_cli.vehicle.rotors import AXES, require_control, rotor_demand
+from cpfls_cli.vehicle.rotors import AXES, body_wrench, require_control, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording, common_windows
+
+
+def imported(log: Path, study: Study) -> ImportedFlight:
+    """Import a log in memory."""
+    read = read_log(log, study.import_)
+    study = study.model_copy(update={"import_": read.settings})
+    with _naming(log), settings_of("import", study):
+        flight = import_log(
+            read.columns,
+            study.import_,
+            rotor_torque=_rotor_torque(study),
+            # The delay is a parameter too: the part of the flight that is held out must not choose it.
+            delay_share=study.identification.training_share,
+            stamped_hz=read.stamped_hz,
+        )
+    report = replace(
+        flight.report,
+        warnings=(*flight.report.warnings, *read.warnings),
+        flown_at=read.flown_at,
+        first_stamp_s=read.begins + flight.report.first_stamp_s,
+        system=read.system,
+        parameters=_parameters(read),
+        stated=stated_vehicle(read.system, read.parameters),
+    )
+    return replace(flight, report=report)
+
+
+def _parameters(read: LogColumns) -> dict[str, float]:
+    """Take the parameters of the control law that flew, if it is a known one."""
+    own = (each for each in AUTOPILOTS.values() if each.firmware.wrote(read.system))
+    return next((found for each in own if (found := each.in_log(read.parameters))), {})
+
+
+@contextmanager
+def _naming(log: Path) -> Iterator[None]:
+    try:
+        yield
+    except CpflsError as error:
+        raise type(error)("\n".join(f"{log}: {line}" for line in str(error).splitlines())) from None
+
+
+def _rotor_torque(study: Study) -> Callable[[ImportedFlight], Array]:
+    """Make the body torque of the rotors from their speeds, or from commands taken for speeds."""
+
+    def torque(signals: ImportedFlight) -> Array:
+        if study.import_.torque_source == "rotor-speed":
+            speed = signals.rotor_speed
+        else:
+            unit = study.import_.signals["rotor_command"].unit
+            speed = commanded_speed(signals.rotor_command, unit, study.vehicle.rotor_speed_max_rad_s)
+        rotors = len(study.vehicle.rotors)
+        if speed is None or speed.shape[1] != rotors:
+            raise InputError(
+                f"import.signals names {0 if speed is None else speed.shape[1]} rotors, vehicle.rotors has {rotors}"
+            )
+        return body_wrench(study.vehicle, speed).body_torque
+
+    return torque
+
+
+def commanded_speed(command: Array | None, unit: str, speed_max: float) -> Array | None:
+    """Take a command in 0..1, shape (time, rotor), as a share of the largest speed, rad/s; speeds stay as they are."""
+    if command is None or unit in SPEED_UNITS:
+        return command
+    if unit != "1":
+        raise InputError(
+            f"import.signals.rotor_command.unit = {unit}: torque_source rotor-command needs commands in 0..1 (unit 1, "
+            "with scale and offset) or rotor speeds (rad/s, rpm)"
+        )
+    return command * speed_max
+
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
 _UNIFORM = 0.01

@@ -1,24 +1,155 @@
-"""Training data of a study: flights, each split, and where given reduced to a selection."""
+"""Training data of a study: flights whole or chunk by chunk, each split, and reduced to a selection where given."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.gate import InputFile, format_name, read_origin
+from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError
+from cpfls_cli.consistency.check import ENOUGH
+from cpfls_cli.consistency.findings import Finding
+from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.files import read_content
-from cpfls_cli.flights.flight_source import flight_source, part_of
-from cpfls_cli.identification.data import Split, TorqueSource, gathered, joined, sample_times, split_flight
+from cpfls_cli.flightlog.settings import SETPOINTS
+from cpfls_cli.flights.flight import MOTION, Flight, require_signals
+from cpfls_cli.flights.recordings import (
+    ReadFlight,
+    check_flight,
+    read_flight,
+    units_of,
+)
+from cpfls_cli.identification.data import (
+    CHUNK,
+    Split,
+    TorqueData,
+    TorqueSource,
+    gathered,
+    joined,
+    sample_times,
+    split_flight,
+)
+from cpfls_cli.identification.identify import TRAINING
+from cpfls_cli.logs.formats import is_log
 from cpfls_cli.reduction.selection import Selection
-from cpfls_cli.regressor.regressor import Regressor, data_ranges, joined_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, joined_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
-from cpfls_cli.store import Origin, read
+from cpfls_cli.store import IN_MEMORY, Origin, check_rows, count_rows, held_rows, read, read_rows
+
+_NEEDED = ("time", *MOTION)
+_TORQUE = "torque"
+_ROTORS = ("rotor-speed", "rotor-command")
+
+
+@dataclass(frozen=True)
+class FlightFile:
+    """Samples, from `start` to before `stop`, that stay in their file.
+
+    The path is absolute, because workers may read it too; `names` are paths of datasets: time, motion and, where it is
+    asked for, torque. Size and rows are those of the file as it was opened; whoever reads it elsewhere, or later, must
+    find the same.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    start: int
+    stop: int
+    size_bytes: int
+    rows: int
+
+    def __len__(self) -> int:
+        """Count the samples."""
+        return self.stop - self.start
+
+    def chunks(self) -> Iterator[TorqueData]:
+        """Yield the samples, `CHUNK` at a time."""
+        self._require_same_file()
+        for rows in read_rows(self.path, self.names, self.start, self.stop, CHUNK):
+            yield _torque_data(rows)
+
+    def _require_same_file(self) -> None:
+        if not self.path.is_file():
+            fault = "no such file"
+        elif (size := self.path.stat().st_size) != self.size_bytes:
+            fault = f"another file, with {size} bytes instead of {self.size_bytes}"
+        elif (rows := count_rows(self.path, Flight, self.names[0])) != self.rows:
+            fault = f"another file, with {rows or 'no'} samples instead of {self.rows}"
+        else:
+            return
+        raise InputError(
+            f"{self.path}: {fault}; the workers of a scheduler also read a flight of more than {IN_MEMORY} samples "
+            "from its file: put the same file there on each of their machines, and leave it unchanged"
+        )
+
+
+def flight_source(path: Path, *, torque: bool = True) -> TorqueSource:
+    """Open a flight."""
+    names = (*_NEEDED, _TORQUE) if torque else _NEEDED
+    samples = count_rows(path, Flight, "time")
+    if samples is None or samples <= IN_MEMORY:
+        flight, _ = read(path, Flight)
+        require_signals(path, flight.signals, *names)
+        asked = {short: flight.signals[name] for name, short in SETPOINTS.items() if name in flight.signals}
+        columns: dict[str, Array] = {name: own.reshape(len(own), -1) for name, own in asked.items()}
+        return replace(_torque_data([getattr(flight, name) for name in names]), setpoints=columns)
+    require_signals(path, held_rows(path, Flight), *names)
+    check_rows(path, Flight, names)
+    return FlightFile(path.resolve(), names, 0, samples, path.stat().st_size, samples)
+
+
+def _torque_data(rows: Sequence[Array]) -> TorqueData:
+    time, attitude, rate, acceleration = rows[: len(_NEEDED)]
+    torque = rows[len(_NEEDED)] if len(rows) > len(_NEEDED) else np.zeros_like(attitude)
+    return TorqueData(time, Motion(attitude, rate, acceleration), torque)
+
+
+def part_of(source: TorqueSource, samples: slice) -> TorqueSource:
+    """Take consecutive samples of a flight, a slice with a start and a stop."""
+    if isinstance(source, FlightFile):
+        return replace(source, start=source.start + samples.start, stop=source.start + samples.stop)
+    assert isinstance(source, TorqueData)
+    return source[samples]
+
+
+def check_file(path: Path, study: Study, *, driven: bool = False) -> tuple[Finding, ...]:
+    """Hold a flight against itself, its middle where it stays in its file; nothing of a flight of another vehicle.
+
+    What drives it is held against the vehicle of the config if `driven`, else where its rotors give its torque.
+    """
+    try:
+        return check_flight(_enough_of(path, study), study, driven=driven or torque_source_of(path, study) in _ROTORS)
+    except InputError:
+        return ()
+
+
+def torque_source_of(path: Path, study: Study) -> str:
+    """Say what gives the torque of a log, or of a flight that was imported; empty for one that was simulated."""
+    if is_log(path):
+        return study.import_.torque_source or ""
+    made = read_origin(path)
+    config = parse_config(made.config, f"{path}: /config")
+    return str(config["import"]["torque_source"] or "") if "log" in made.inputs else ""
+
+
+def _enough_of(path: Path, study: Study) -> ReadFlight:
+    samples = None if is_log(path) else count_rows(path, Flight, "time")
+    if samples is None or samples <= IN_MEMORY:
+        return read_flight(path, study)
+    names, first = held_rows(path, Flight), (samples - ENOUGH) // 2
+    units = units_of(path, read_origin(path), study)
+    return ReadFlight(path.name, _rows_in(path, names, first, first + ENOUGH), units, ())
+
+
+def _rows_in(path: Path, names: Sequence[str], start: int, stop: int) -> Mapping[str, Array]:
+    (read,) = read_rows(path, names, start, stop, max(stop - start, 1))
+    return dict(zip(names, read, strict=True))
+
 
 REST = "held-out rest"
 # Samples whose regressor is written out at a time.
@@ -179,3 +310,92 @@ def uniform_regressor(training: TorqueSource, study: Study) -> Callable[[], Iter
                 yield Regressor(structure, data.motion[start : start + _BLOCK], ranges).matrix(partitions)
 
     return blocks
+
+
+def input_roles(
+    flights: Sequence[Path], selection: Path | None, validate: Sequence[Path], choose_on: Sequence[Path] = ()
+) -> dict[str, Path]:
+    """Give the inputs of an identification their roles."""
+    roles = flight_roles(flights) | ({"selection": selection} if selection else {})
+    return roles | numbered_roles("choose-on", choose_on) | numbered_roles("validate", validate)
+
+
+def numbered_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
+    """Give flights of one role numbers: ``choose-on-1``, ``choose-on-2`` and so on."""
+    return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}
+
+
+def hashes_of(path: Path, file: InputFile) -> tuple[str, ...]:
+    """Give the hashes that a flight is known by: that of its file, and that of the log that it was imported from."""
+    log = None if is_log(path) else read_origin(path).inputs.get("log")
+    return (file.sha256,) if log is None else (file.sha256, log.sha256)
+
+
+def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:
+    """Leave out copies of a flight; one that is of today and of the reference is refused."""
+    known: dict[str, str] = {}
+    kept, warnings = {}, []
+    for role, path in given.items():
+        hashes = hashes_of(path, inputs[role])
+        same = next((known[each] for each in hashes if each in known), None)
+        if same is None:
+            kept[role] = path
+            known.update(dict.fromkeys(hashes, role))
+        elif same.partition("-")[0] != role.partition("-")[0]:
+            also = "" if given[same].name == path.name else f", as {given[same]}"
+            raise InputError(
+                f"{path}: is both a flight of today and one of the reference (--reference){also}; leave it out of one"
+            )
+        else:
+            warnings.append(f"{path.name}: is given twice, also as {given[same].name}; counted once")
+    return kept, warnings
+
+
+def log_formats(paths: Sequence[Path]) -> set[str]:
+    """Gather the endings, in small letters, of the logs among some files, and of those that flights were made from."""
+    known = {path.suffix.lstrip(".").lower() for path in paths if is_log(path)}
+    flights = (path for path in paths if format_name(path) == Flight.FORMAT)
+    made = (read_origin(path).inputs.get("log") for path in flights)
+    return known | {"" if log is None else log.format.lower() for log in made}
+
+
+def known_by(paths: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> list[tuple[str, tuple[str, ...]]]:
+    """List flights once each: file name, and the hashes that it is known by."""
+    return list(dict.fromkeys((inputs[role].name, hashes_of(path, inputs[role])) for role, path in paths.items()))
+
+
+def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> TorqueSource | None:
+    """Open the flights to choose on, None where there are none; a model was fitted to what is another input too."""
+    for role, path in numbered_roles("choose-on", flights).items():
+        others = {other: file for other, file in inputs.items() if other != role}
+        same = next((other for other, file in others.items() if file.sha256 == inputs[role].sha256), None)
+        if same is not None:
+            raise InputError(f"--choose-on {path}: {_USED[same.partition('-')[0]]}; choose on another flight")
+    return joined([flight_source(path) for path in flights]) if flights else None
+
+
+_USED = {
+    "flight": "is a training flight",
+    "selection": "is the selection, not a flight",
+    "validate": "judges (--validate)",
+    "choose": "is given twice",
+}
+
+
+def held_out_parts(
+    study: Study, rests: Mapping[str, TorqueSource], inputs: Mapping[str, InputFile], validate: Sequence[Path]
+) -> dict[str, TorqueSource]:
+    """Gather what is judged but not learned from, under names of their own: rests of flights that train, and others."""
+    if study.identification.training_share < 1 and not rests:
+        raise ConfigError(
+            f"identification.embargo_s = {study.identification.embargo_s:g}: leaves nothing of the flight to be "
+            "held out; lower it, or lower identification.training_share"
+        )
+    parts = dict(rests)
+    learned = {file.sha256 for role, file in inputs.items() if role.startswith("flight")}
+    for role, path in numbered_roles("validate", validate).items():
+        if inputs[role].sha256 in learned:
+            raise InputError(f"--validate {path}: is the training flight; validate on another one")
+        names = chain([path.name], (f"{path.name} ({number})" for number in count(2)))
+        parts[next(name for name in names if name not in {TRAINING, *parts})] = flight_source(path)
+    return parts

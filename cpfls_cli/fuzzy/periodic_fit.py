@@ -14,8 +14,7 @@ from typing_extensions import Doc
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
-from cpfls_cli.fuzzy.basis import Consequents, Products
-from cpfls_cli.fuzzy.membership import breakpoints, uniform_weights
+from cpfls_cli.fuzzy.basis import Consequents, Products, breakpoints, uniform_weights
 from cpfls_cli.fuzzy.periodic_system import FitQuality, PeriodicStructure, PeriodicSystem, as_angles, as_values, blocks
 from cpfls_cli.settings import Settings
 

@@ -12,15 +12,16 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.fuzzy.basis import (
     Basis,
     Consequents,
+    InputRange,
+    Memberships,
     Products,
     antecedent,
     basis,
     feature_count,
     features,
+    map_input,
     row_products,
 )
-from cpfls_cli.fuzzy.inputs import InputRange, map_input
-from cpfls_cli.fuzzy.membership import Memberships
 from cpfls_cli.rotations import wrapped
 
 # The map of the full circle takes no range from the data.

@@ -15,7 +15,7 @@ from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.consistency.audit import Audit, audit
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.numbers import impossible
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import InputError

@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics import InertiaModel
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, system

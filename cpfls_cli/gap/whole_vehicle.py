@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.rigid_body import inertia_tensor, positive_definite
+from cpfls_cli.dynamics import inertia_tensor, positive_definite
 from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.hooks import VehicleParts

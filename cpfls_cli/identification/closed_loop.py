@@ -17,7 +17,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs, stretches
 from cpfls_cli.blocks import ENOUGH_BLOCKS, block_length, half_width, jackknife_error
-from cpfls_cli.dynamics.rigid_body import rigid_columns, vertical, why_unphysical
+from cpfls_cli.dynamics import rigid_columns, vertical, why_unphysical
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.estimation.estimate import Normal, Prior, one_step
 from cpfls_cli.estimation.first_stage import FOLDS, first_stage_fit_by_run
@@ -37,7 +37,7 @@ from cpfls_cli.playback.instruments import InstrumentKind, Instruments, instrume
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
 from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.parameters import INERTIA, PRODUCTS, blocks_of
-from cpfls_cli.regressor.motion import RIGID, Motion
+from cpfls_cli.regressor.regressor import RIGID, Motion
 from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, windows

@@ -9,7 +9,7 @@ from scipy import linalg
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.fuzzy.basis import breakpoints
 from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.identification.least_squares import NormalEquations, quick_solution
 from cpfls_cli.identification.samples import Products, Samples

@@ -9,13 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.dynamics.rigid_body import rigid_columns
-from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.dynamics import rigid_columns
+from cpfls_cli.fuzzy.basis import InputRange
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.kernels import Chunk, Runs, Table, motion_lines
-from cpfls_cli.regressor.motion import RIGID
-from cpfls_cli.regressor.regressor import Breakpoints
+from cpfls_cli.regressor.regressor import RIGID, Breakpoints
 from cpfls_cli.regressor.structure import ModelStructure
 from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 

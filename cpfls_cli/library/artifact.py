@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from cpfls_cli.artifacts.spec import DatasetSpec
+    from cpfls_cli.artifacts.gate import DatasetSpec
     from cpfls_cli.report.source import Source
     from cpfls_cli.store import Origin
 
@@ -280,7 +280,7 @@ class Figures(Mapping[str, "Figure"]):
 
 
 def _labels(about: DatasetSpec, label: str, length: int) -> list[str]:
-    from cpfls_cli.artifacts.spec import EULER
+    from cpfls_cli.artifacts.gate import EULER
 
     if label != "axis":
         return [str(index) for index in range(length)]

@@ -38,7 +38,7 @@ def run(*words: str | os.PathLike[str]) -> None:
     CpflsError
         If the command fails; what it says stands on standard error.
     """
-    from cpfls_cli.cli.app import app
+    from cpfls_cli.cli.stages import app
 
     given = [str(word) for word in words]
     try:

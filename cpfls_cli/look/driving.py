@@ -8,8 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.autopilots.allocation import factor_mix
-from cpfls_cli.autopilots.motors import MixerRule, ThrustCurve
+from cpfls_cli.autopilots.motors import MixerRule, ThrustCurve, factor_mix
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.recognised import Guess

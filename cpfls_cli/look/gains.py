@@ -19,9 +19,8 @@ from cpfls_cli.look.vibration import Change
 from cpfls_cli.result import Estimate, about, part, result
 from cpfls_cli.tuning.gains import USUAL_LEADS, AskedMargins, Tuned, floored, lateness, parameter_of, tuned
 from cpfls_cli.tuning.margins import axis_loops, crossing_margins, disk_of, frequencies, is_stable, moved_by
-from cpfls_cli.tuning.noise import Noise, noise_of
 from cpfls_cli.tuning.plant import AxisPlant as LinearPlant
-from cpfls_cli.tuning.plant import HoverPlant
+from cpfls_cli.tuning.plant import HoverPlant, Noise, noise_of
 
 DRAWS = 40
 """Plants that are tuned one by one: the least and the largest of their gains are the ends of a 95 % interval."""

@@ -12,12 +12,11 @@ from markupsafe import Markup
 
 from cpfls_cli import page
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.artifacts.parameters import FOUND_AS, Parameter
-from cpfls_cli.artifacts.vehicle_model import Vehicle
+from cpfls_cli.artifacts.vehicle_model import FOUND_AS, Parameter, Vehicle
 from cpfls_cli.config.load import flat_keys
-from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING
-from cpfls_cli.pages.trust import trust_words
-from cpfls_cli.report.numbers import ROUNDING, UNKNOWN, count, number, percent, r_squared
+from cpfls_cli.identification.identify import AXES, MODEL, RIGID_BODY, TRAINING
+from cpfls_cli.pages.model import trust_words
+from cpfls_cli.report.content import ROUNDING, UNKNOWN, count, number, percent, r_squared
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.validate import Curves

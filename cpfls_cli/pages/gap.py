@@ -1,25 +1,42 @@
-"""The gap on a page: channels in words, and its size before and after."""
+"""The gap on a page: channels, effects and their numbers in words, its size before and after, what is repeatable."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
+from cpfls_cli.gap.residual.repeated import OPEN, Repeatability
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over, logarithmic, style_of
+from cpfls_cli.pages.playback import ERRORS, contradicted, draw_errors, errors_height
+from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
+from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, in_columns, legend_over, logarithmic, style_of
+from cpfls_cli.report.content import UNKNOWN, number, plain, printed, probability, whole_percent, with_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from cpfls_cli.gap.naming.results import GapChange
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    # Names of effects are given of models that are read without a gap.
+    from cpfls_cli.arrays import Array
+    from cpfls_cli.gap.naming.results import Estimate, NamedEffect
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 AXES = ("x (roll)", "y (pitch)", "z (yaw)")
 
-CHANNELS = {
+_CHANNEL_WORDS = {
     "torque x": "torque about x (roll)",
     "torque y": "torque about y (pitch)",
     "torque z": "torque about z (yaw)",
@@ -43,9 +60,10 @@ _GIVEN: dict[str, Any] = {"color": GREY, **_SQUARE}
 _SHRUNK: dict[str, Any] = {"color": AFTER["color"], "marker": "o", "markersize": 7, "linestyle": "none"}
 
 
-def channel_words(channel: str) -> str:
-    """Say what a channel is."""
-    return CHANNELS.get(channel, channel)
+def channel_words(channel: int | str) -> str:
+    """Say what a channel is, by its index or name."""
+    name = channel if isinstance(channel, str) else CHANNELS[channel]
+    return _CHANNEL_WORDS.get(name, name)
 
 
 def channel_name(channel: str) -> str:
@@ -99,7 +117,7 @@ def sizes_drawn(gap: Callable[[Any], GapChange]) -> Drawn:
 
 
 def _draw_sizes(gap: GapChange, figure: Figure) -> None:
-    channels = [channel_words(tuple(CHANNELS)[index]) for index in gap.known]
+    channels = [channel_words(index) for index in gap.known]
     before, after = gap.before_floors[gap.known], gap.after_floors[gap.known]
     axes = figure.subplots()
     rows = np.arange(len(channels))[::-1]
@@ -117,3 +135,269 @@ def _draw_sizes(gap: GapChange, figure: Figure) -> None:
     logarithmic(axes, _LEAST, 1.6 * largest)
     axes.set_xlabel("gap, noise floors")
     legend_over(figure, axes)
+
+
+_RELATIVE = "_error"
+_SHORT = {"inertia_x": "Ixx", "inertia_y": "Iyy", "inertia_z": "Izz", "thrust_scale": "thrust"}
+_NUMBERS = {
+    "inertia": "moment of inertia about",
+    "coupling": "coupling of rates about",
+    "reference": "offset of the point that the log follows along",
+}
+
+
+def effect_title(name: str) -> str:
+    """Say what people call an effect."""
+    return CATALOGUE[name].title if name in CATALOGUE else name.replace("_", " ")
+
+
+def titles(names: Iterable[str]) -> list[str]:
+    """Say what people call effects."""
+    return [effect_title(name) for name in names]
+
+
+def unit_words(unit: str) -> str:
+    """Write a unit as people do, with raised powers; ``1`` is none."""
+    return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³")
+
+
+def share_words(share: float) -> str:
+    """Write a share in whole per cent; what rounding alone would make nothing or all of it is not called so."""
+    return whole_percent(share).replace("> ", "more than ").replace("< ", "less than ")
+
+
+def number_words(effect: NamedEffect) -> str:
+    """Write the numbers of an effect with their intervals."""
+    relative = effect.name.endswith(_RELATIVE)
+    return "; ".join(_relative(effect.name, each) if relative else _coefficient(each) for each in effect.numbers)
+
+
+def _coefficient(coefficient: Estimate) -> str:
+    """Write a value with its interval and unit; a power of ten that is that of all three stands once."""
+    unit = unit_words(coefficient.unit)
+    words = with_interval(coefficient.value, coefficient.low, coefficient.high)
+    powers = {text.partition("e")[2] for text in words}
+    power = f"e{powers.pop()}" if len(powers) == 1 and "" not in powers else ""
+    value, low, high = (printed(text.removesuffix(power)) for text in words)
+    return f"{coefficient.name} = {value} [{low}, {high}]{printed(power)}{' ' if unit else ''}{unit}"
+
+
+def _relative(effect: str, number: Estimate) -> str:
+    """Write an error of a number of the vehicle as people do, `Izz +24 % [+20, +28]`."""
+    name, value, low, high = _error_words(effect, number)
+    return f"{name} {value} % [{low}, {high}]"
+
+
+def wrong_numbers(effects: Iterable[NamedEffect]) -> dict[str, str]:
+    """Give the numbers of the vehicle that a verdict calls wrong, each with its error, `Izz +24 %`, by identifier."""
+    named = [effect for effect in effects if effect.name == VEHICLE_NUMBERS.name]
+    numbers = [(effect, number) for effect in named for number in effect.numbers]
+    words = ((number.name, _error_words(effect.name, number)) for effect, number in numbers)
+    return {name: f"{short} {value} %" for name, (short, value, *_) in words}
+
+
+def _error_words(effect: str, number: Estimate) -> list[str]:
+    """Name a number of the vehicle as people do, and write its error and the interval in per cent, with signs."""
+    name = _SHORT.get(number.name, effect.removesuffix(_RELATIVE).replace("_", " "))
+    # Flights show no more of it than that.
+    name += " over yaw torque" if number.name == "inertia_z" else ""
+    numbers = with_interval(*(100.0 * each for each in (number.value, number.low, number.high)))
+    signed = (text if text.startswith("-") or text == UNKNOWN or not float(text) else f"+{text}" for text in numbers)
+    return [name, *map(printed, signed)]
+
+
+def measured(number: Any, factor: float = 1.0) -> list[str]:
+    """Write a value, and its interval or ``—``, with the digits that the width of the interval leaves."""
+    ends = (factor * each for each in (number.value, number.low, number.high))
+    first, *interval = (printed(text) for text in with_interval(*ends))
+    known = np.isfinite([number.low, number.high]).any()
+    return [first, " … ".join(interval) if known else UNKNOWN]
+
+
+def _range(low: float, high: float) -> str:
+    return f"{number(low, 3)} … {number(high, 3)}" if np.isfinite([low, high]).any() else UNKNOWN
+
+
+def possible(number: Estimate) -> str:
+    """Write the range that is physically possible."""
+    return _range(*number.plausible)
+
+
+def meaning(effect: str, coefficient: str) -> str:
+    """Name a coefficient of an effect with what it means."""
+    if effect not in CATALOGUE:
+        return coefficient
+    known = CATALOGUE[effect]
+    words = {entry.name: entry.meaning for entry in (known.exact or known).numbers}.get(coefficient)
+    return f"{coefficient}: {words}" if words else coefficient
+
+
+def vehicle_number(name: str) -> str:
+    """Say what a number of the vehicle is."""
+    kind, _, axis = name.rpartition("_")
+    words = f"{_NUMBERS[kind]} {axis}" if kind in _NUMBERS else name.replace("_", " ")
+    return f"{_SHORT[name]}, {words}" if kind == "inertia" else words
+
+
+def intervals_drawn(effects: Callable[[Any], Sequence[NamedEffect]]) -> Drawn:
+    """Make the figure of where each coefficient lies between the least and the largest possible value."""
+
+    def rows(r: Any) -> list[tuple[NamedEffect, Estimate]]:
+        """List numbers whose range is known, from below, as the axis counts."""
+        every = [(effect, number) for effect in effects(r) for number in effect.numbers]
+        return [each for each in every if np.isfinite([*each[1].plausible, each[1].value]).all()][::-1]
+
+    return Drawn(
+        "Coefficients within their possible ranges",
+        lambda r: 0.75 + 0.3 * len(rows(r)),
+        lambda r, figure: _draw_intervals(rows(r), figure),
+        rows,
+    )
+
+
+def _draw_intervals(shown: Sequence[tuple[NamedEffect, Estimate]], figure: Figure) -> None:
+    axes = figure.subplots()
+    for row, (_, own) in enumerate(shown):
+        low, high = own.plausible
+        with np.errstate(divide="ignore", invalid="ignore"):
+            placed = (np.array([own.value, own.low, own.high]) - low) / (high - low)
+        _draw_row(axes, row, placed)
+    axes.set_yticks(range(len(shown)), [f"{effect.name}  {own.name}" for effect, own in shown])
+    right = axes.twinx()
+    axes.set_ylim(-0.6, len(shown) - 0.4)
+    right.set_ylim(axes.get_ylim())
+    right.set_yticks(range(len(shown)), [f"{possible(own)} {unit_words(own.unit)}" for _, own in shown])
+    right.tick_params(length=0)
+    right.grid(visible=False)
+    axes.set_xlim(-0.03, 1.03)
+    axes.set_xticks([0.0, 1.0], ["least possible", "largest possible"])
+    axes.grid(visible=False)
+
+
+def _draw_row(axes: Axes, row: int, placed: Array) -> None:
+    value, low, high = placed
+    axes.hlines(row, 0.0, 1.0, color="#cccccc", linewidth=5, zorder=0)
+    if np.isfinite(low) and np.isfinite(high):
+        axes.hlines(row, np.clip(low, 0, 1), np.clip(high, 0, 1), color="black", linewidth=2.4, zorder=1)
+    axes.plot([np.clip(value, 0.0, 1.0)], [row], "o", color=AFTER["color"], markersize=6, zorder=2)
+
+
+WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4 -o mission.h5"
+"""Plans of flights that separate the vehicle from the loop, and a missing effect from gusts."""
+BY_HAND = "by hand, stick left and right, then forward and back, about twice a second, with pauses"
+"""The same without a mission."""
+FLOWN_BY_HAND = frozenset({"bbl", "bfl"})
+"""Formats of logs whose autopilot flies no mission file."""
+
+NOT_SPLIT = (
+    "No two of these flights repeat a path, so the gap cannot be split into a repeatable part (an effect that the "
+    "model lacks) and the rest (gusts, noise). Logged setpoints of position or velocity do that too. To fly: "
+    f"{WHAT_TO_FLY}"
+)
+_COLUMNS = 3
+_PARTS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("repeatable, explained", {"facecolor": "white"}),
+    ("repeatable, not explained", {"facecolor": "#1b4f8a"}),
+    ("not repeatable", {"facecolor": "#d9d9d9", "hatch": "////"}),
+    ("sensor noise", {"facecolor": "white", "hatch": "...."}),
+)
+
+
+def repeatability_drawn(groups: Callable[[Any], tuple[Repeatability | None, Repeatability | None]]) -> Drawn:
+    """Make the figure of what is repeatable: of the model as given, and with effects or None."""
+
+    def held(r: Any) -> list[Repeatability]:
+        return [each for each in groups(r) if each is not None]
+
+    def height(r: Any) -> float:
+        return 1.0 + 1.9 * -(-len(held(r)[0].known) // _COLUMNS)
+
+    def draw(r: Any, figure: Figure) -> None:
+        _draw(held(r), figure)
+
+    return Drawn("Repeatable part of torque and force, by channel and band", height, draw, held)
+
+
+def _draw(groups: Sequence[Repeatability], figure: Figure) -> None:
+    """Draw by channel and band what is repeatable, explained and not, and the rest."""
+    before = groups[0]
+    channels, bands = before.known, np.arange(1, len(before.low))[::-1]
+    ends = zip(before.low.tolist(), before.high.tolist(), strict=True)
+    names = [f"{plain(low)}–{plain(high)}" if low else f"< {plain(high)}" for low, high in ends]
+    panels = in_columns(figure, len(channels), _COLUMNS, share_y=True)
+    for axes, channel in zip(panels.flat, channels, strict=False):
+        _draw_channel(axes, groups, channel, bands)
+        axes.set_title(channel_words(CHANNELS[channel]))
+        axes.set_xticks(np.arange(len(bands)), [names[band] for band in bands], rotation=30, fontsize=8)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("share, %")
+    figure.supxlabel("Hz", fontsize=9)
+    legend_over(figure, panels.flat[0])
+
+
+def _draw_channel(axes: Axes, groups: Sequence[Repeatability], channel: int, bands: Any) -> None:
+    width = 0.8 / len(groups)
+    for place, found in enumerate(groups):
+        x = np.arange(len(bands)) - 0.4 + width * (place + 0.5)
+        heights, bottom = _heights(found, channel)[:, bands], np.zeros(len(bands))
+        for (label, style), height in zip(_PARTS, heights, strict=True):
+            shown = label if place == 0 else None
+            axes.bar(x, height, 0.92 * width, bottom=bottom, label=shown, edgecolor=GREY, linewidth=0.6, **style)
+            bottom += height
+    axes.set_ylim(0, 100)
+    axes.grid(visible=False, axis="x")
+    axes.set_axisbelow(True)
+
+
+def _heights(found: Repeatability, channel: int) -> Any:
+    """Give the parts of a bar in per cent, shape (part, band)."""
+    gap = np.clip(found.repeatable[channel], 0.0, found.total[channel])
+    noise = np.clip(np.nan_to_num(found.noise[channel]), 0.0, found.total[channel] - gap)
+    explained = np.clip(found.motion[channel] - gap, 0.0, None)
+    parts = np.nan_to_num(np.array([explained, gap, found.total[channel] - gap - noise, noise]))
+    return 100 * parts / np.maximum(parts.sum(axis=0), np.finfo(float).tiny)
+
+
+def by_reason(given: Any) -> dict[str, list[str]]:
+    """Gather names by the reason that they have in common: of a mapping from names, or of rows with both."""
+    pairs = given.items() if isinstance(given, Mapping) else ((each.name, each.reason) for each in given)
+    reasons: dict[str, list[str]] = {}
+    for name, reason in pairs:
+        reasons.setdefault(reason, []).append(name)
+    return reasons
+
+
+def playback_drawn() -> Drawn:
+    """Make the figure of the playback of a result; none of a single horizon, or of flights that show no motion."""
+    return Drawn(
+        ERRORS,
+        lambda r: errors_height(r.playback),
+        lambda r, figure: draw_errors(r.playback, figure),
+        lambda r: r.playback and len(r.playback.horizon_s) > 1 and any(map(r.playback.moves, r.playback.signals)),
+    )
+
+
+GAP_WORDS: Mapping[str, Any] = {
+    **PLAYBACK_WORDS,
+    "again_open": OPEN,
+    "by_reason": by_reason,
+    "channel_name": channel_name,
+    "channel_unit": channel_unit,
+    "channel_words": channel_words,
+    "channels": CHANNELS,
+    "clear": CLEAR,
+    "contradicted": contradicted,
+    "effect_title": effect_title,
+    "meaning": meaning,
+    "measured": measured,
+    "not_split": NOT_SPLIT,
+    "number_words": number_words,
+    "plain": plain,
+    "possible": possible,
+    "probability": probability,
+    "share_words": share_words,
+    "titles": titles,
+    "unit_words": unit_words,
+    "vehicle_number": vehicle_number,
+}
+"""Words, constants and filters, by the name that templates use."""

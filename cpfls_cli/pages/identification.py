@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from cpfls_cli import page
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY, TRAINING, Judged
+from cpfls_cli.identification.identify import AXES, MODEL, RIGID_BODY, TRAINING, Judged
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.comparison import COMPARISON_WORDS
 from cpfls_cli.pages.identified_figures import (
@@ -23,7 +23,7 @@ from cpfls_cli.pages.identified_figures import (
     weight_words,
 )
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
-from cpfls_cli.report.numbers import ROUNDING, count, number, percent, printed, probability, r_squared, with_interval
+from cpfls_cli.report.content import ROUNDING, count, number, percent, printed, probability, r_squared, with_interval
 from cpfls_cli.report.source import Source
 from cpfls_cli.rounding import at_most
 from cpfls_cli.validation.bands import band

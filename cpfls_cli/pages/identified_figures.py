@@ -11,9 +11,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.fuzzy.membership import join_ends, memberships
-from cpfls_cli.identification.cross_validation import RidgeCurve
-from cpfls_cli.identification.scores import AXES, MODEL, RIGID_BODY
+from cpfls_cli.fuzzy.basis import join_ends, memberships
+from cpfls_cli.identification.identify import AXES, MODEL, RIGID_BODY
+from cpfls_cli.identification.solver import RidgeCurve
 from cpfls_cli.pages.comparison import FLOOR_TICK, compared_curves, compared_parts
 from cpfls_cli.report.canvas import (
     BASELINE,
@@ -29,7 +29,7 @@ from cpfls_cli.report.canvas import (
     stacked,
     style_of,
 )
-from cpfls_cli.report.numbers import number, plain
+from cpfls_cli.report.content import number, plain
 from cpfls_cli.report.source import Source
 from cpfls_cli.validation.residuals import ResidualAnalysis
 from cpfls_cli.validation.validate import Curves

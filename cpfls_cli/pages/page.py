@@ -12,9 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from cpfls_cli import page
-from cpfls_cli.artifacts.diagnosis import Diagnosis
-from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.extended import Extended
+from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement, Extended
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.flight import Flight, Imported
 from cpfls_cli.flights.path import PlannedPath
@@ -22,12 +20,12 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.comparison import BEYOND, compared_constants
 from cpfls_cli.pages.identification import WORDS as OF_IDENTIFIED
 from cpfls_cli.pages.identified_figures import COMPARED
-from cpfls_cli.pages.model import cautions_of
-from cpfls_cli.pages.trust import model_words
+from cpfls_cli.pages.model import cautions_of, model_words
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.canvas import figure_html, pictures
 from cpfls_cli.report.content import (
     STRUCK,
+    UNKNOWN,
     Block,
     Box,
     Facts,
@@ -40,9 +38,9 @@ from cpfls_cli.report.content import (
     Table,
     Text,
     Tone,
+    plain,
     unfolded,
 )
-from cpfls_cli.report.numbers import UNKNOWN, plain
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.stage import stage_named
 

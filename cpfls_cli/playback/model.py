@@ -12,9 +12,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.audit import Audit
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel, body_inertia, momentum_form
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import positive_definite
+from cpfls_cli.dynamics import InertiaFunctions, InertiaModel, body_inertia, momentum_form, positive_definite
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import CENTRE_OF_MASS, VEHICLE_NUMBERS, effect

@@ -88,7 +88,7 @@ def _features(angle: Value, order: int, functions: Functions) -> list[Value]:
 
 
 def _blended(by_rule: Sequence[Value], breakpoints: Sequence[float], turn: Value, functions: Functions) -> Value:
-    """Blend the two rules that fire, by the copy of `cpfls_cli.fuzzy.membership.z_function`."""
+    """Blend the two rules that fire, by the copy of `cpfls_cli.fuzzy.basis.z_function`."""
     rules = len(by_rule)
     # Rules between equal peaks never fire.
     wide = [rule for rule in range(rules) if breakpoints[rule + 1] > breakpoints[rule]] if rules > 1 else []

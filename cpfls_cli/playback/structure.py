@@ -12,7 +12,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.evolution.ranking import comparable
+from cpfls_cli.evolution.archive import comparable
 from cpfls_cli.playback.fit import (
     Fits,
     Fitted,

@@ -1,14 +1,165 @@
-"""Rules that choose samples one by one: smallest singular value, A- and D-optimality, and the rule as printed."""
+"""Rules that choose samples one by one, by the factor of the chosen rows, with bounds that spare evaluations."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
+from functools import cached_property
 
-from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.reduction.factor import TriangularFactor
-from cpfls_cli.reduction.lazy_search import TIE_TOLERANCE, eigenvalues_below, first_best, lazy_best
+import numpy as np
+import scipy.linalg
+
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.reduction.settings import CriterionName
 from cpfls_cli.reduction.survey import RowSpace, project
+
+
+class TriangularFactor:
+    """``T`` with ``T^T T = G``, the Gram matrix of the chosen rows, kept by QR as samples are added.
+
+    Singular values below the tolerance, a fraction of the largest, count as zero.
+    """
+
+    def __init__(self, columns: int, rank_tolerance: float) -> None:
+        self._triangle: Array = np.zeros((columns, columns))
+        self._tolerance = rank_tolerance
+
+    def add(self, rows: Array) -> None:
+        """Add the rows of one sample or of several, array of shape (rows, columns)."""
+        stacked = np.vstack([self._triangle, rows])
+        triangle = scipy.linalg.qr(stacked, mode="r", check_finite=False)[0]
+        self._triangle = np.asarray(triangle[: self.columns], dtype=np.float64)
+        for name in ("singular_values", "singular_vectors"):
+            self.__dict__.pop(name, None)
+
+    @cached_property
+    def singular_values(self) -> Array:
+        """Singular values of the chosen rows, descending."""
+        return np.asarray(np.linalg.svd(self._triangle, compute_uv=False), dtype=np.float64)
+
+    @cached_property
+    def singular_vectors(self) -> Array:
+        """Right singular vectors of the chosen rows, in columns."""
+        return np.linalg.svd(self._triangle)[2].T
+
+    def solve(self, rows: Array) -> Array:
+        """Solve ``G X = rows^T``; the rank must be full.
+
+        Parameters
+        ----------
+        rows : array, shape (rows, columns)
+
+        Returns
+        -------
+        array, shape (columns, rows)
+        """
+        half = scipy.linalg.solve_triangular(self._triangle, rows.T, trans="T", check_finite=False)
+        return np.asarray(scipy.linalg.solve_triangular(self._triangle, half, check_finite=False))
+
+    @property
+    def columns(self) -> int:
+        """Length of a row."""
+        return len(self._triangle)
+
+    @property
+    def rank(self) -> int:
+        """Numerical rank of the chosen rows."""
+        return int(np.count_nonzero(self.singular_values > self._tolerance * self.singular_values[0]))
+
+    @property
+    def full_rank(self) -> bool:
+        """Whether the rows span all columns."""
+        return self.rank == self.columns
+
+    @property
+    def singular_value_min(self) -> float:
+        """Smallest singular value, zero below full rank."""
+        return float(self.singular_values[-1]) if self.full_rank else 0.0
+
+    @property
+    def singular_value_max(self) -> float:
+        """Largest singular value."""
+        return float(self.singular_values[0])
+
+    @property
+    def condition_number(self) -> float:
+        """Largest over smallest singular value, infinite below full rank."""
+        return self.singular_value_max / self.singular_value_min if self.full_rank else float("inf")
+
+
+# Equal samples get scores that differ by rounding, depending on where in the array they stand. A hundredth of what
+# `rounding` allows: samples are chosen by what sets their scores apart, and machines agree on these within 3e-12.
+TIE_TOLERANCE = 1e-10
+
+Predicate = Callable[[Array, float], BoolArray]
+# Samples evaluated first, to get a level that most others can be shown not to reach.
+_SCOUTS = 16
+# The level they reach need not be exact: this fraction of the gain over the floor is enough.
+_SCOUT_TOLERANCE = 1e-2
+
+
+def first_best(scores: Array, available: BoolArray) -> int:
+    """Find the lowest available index whose score is the largest one up to rounding."""
+    allowed = np.where(available, scores, -np.inf)
+    best = allowed.max()
+    return int(np.argmax(allowed >= best - TIE_TOLERANCE * abs(best)))
+
+
+def eigenvalues_below(eigenvalues: Array, projections: Array, shift: float) -> IntArray:
+    """Count the eigenvalues of ``diag(eigenvalues) + Z_i^T Z_i`` below a shift, for each sample.
+
+    By Sylvester's law of inertia it is the count of ``eigenvalues`` below the shift less the count of negative
+    eigenvalues of the 3x3 matrix ``I + Z_i (diag(eigenvalues) - shift)^-1 Z_i^T``, Z_i the rows of each sample in the
+    eigenvectors' basis.
+    """
+    distance = eigenvalues - shift
+    # A shift on an eigenvalue moves off it by no more than that eigenvalue's own rounding, so nothing overflows.
+    rounding = np.finfo(float).eps * np.maximum(np.abs(eigenvalues), abs(shift)) + np.finfo(float).tiny
+    distance = np.copysign(np.maximum(np.abs(distance), rounding), distance)
+    schur = np.eye(3) + (projections / distance) @ projections.swapaxes(1, 2)
+    negative = np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0, axis=1)
+    return np.asarray(np.count_nonzero(distance < 0.0) - negative, dtype=np.int64)
+
+
+def lazy_best(
+    rows: Array,
+    vectors: Array,
+    bounds: Array,
+    floor: float,
+    exceeds: Predicate,
+    bound_vectors: tuple[int, ...] = (),
+) -> int:
+    """Find the sample with the largest score, the lowest index among equals.
+
+    The best few by their upper bounds, minus infinity for samples that are excluded, are evaluated; the level they
+    reach (`floor` is one that every score reaches) discards most other samples by their bounds, then by sharper bounds,
+    of so many of the basis `vectors`; only the rest are compared exactly. `exceeds` says of projections, shape
+    (samples, 3, vectors), which samples' scores exceed a level. Given the first few vectors only, it may err in favour
+    of a sample, never against one.
+    """
+    highest = float(bounds.max())
+    count = min(_SCOUTS, int(np.count_nonzero(np.isfinite(bounds))))
+    scouts = np.argpartition(-bounds, count - 1)[:count]
+    _, level = _raise_level(exceeds, project(rows[scouts], vectors), (floor, highest), _SCOUT_TOLERANCE)
+    candidates = np.flatnonzero(bounds >= level)
+    # At the floor itself nothing can be discarded, and it is an eigenvalue, where counting has no accuracy.
+    for count in (*bound_vectors, vectors.shape[1]) if level > floor else ():
+        reached = exceeds(project(rows[candidates], vectors[:, :count]), level)
+        candidates = candidates[reached] if reached.any() else candidates
+    best, _ = _raise_level(exceeds, project(rows[candidates], vectors), (level, highest), 0.0)
+    return int(candidates[best].min())
+
+
+def _raise_level(
+    exceeds: Predicate, projections: Array, interval: tuple[float, float], gain_tolerance: float
+) -> tuple[IntArray, float]:
+    """Bisect for the highest level that a sample still exceeds; return the samples left and that level."""
+    best, (low, high) = np.arange(len(projections)), interval
+    while high - low > max(TIE_TOLERANCE * abs(high), gain_tolerance * (high - interval[0])):
+        middle = 0.5 * (low + high)
+        above = best[exceeds(projections[best], middle)]
+        best, low, high = (above, middle, high) if len(above) else (best, low, middle)
+    return best, low
+
 
 # Lowest eigenvectors of the successive Rayleigh-Ritz bounds for the samples still in doubt.
 _BOUND_VECTORS = (6, 24)

@@ -8,8 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.reduction.criteria import EXCHANGE_INFORMATION, Criterion
-from cpfls_cli.reduction.factor import TriangularFactor
+from cpfls_cli.reduction.criteria import EXCHANGE_INFORMATION, Criterion, TriangularFactor
 from cpfls_cli.reduction.survey import RowSpace
 from cpfls_cli.result import about, result
 

@@ -145,7 +145,7 @@ _BATCH = 128
 
 @part
 def _z_function(u: float) -> tuple[float, float, float]:
-    """Zadeh's z-function with its first and second derivative: the copy of `cpfls_cli.fuzzy.membership.z_function`."""
+    """Zadeh's z-function with its first and second derivative: the copy of `cpfls_cli.fuzzy.basis.z_function`."""
     first, rest = u < 0.5, 1.0 - u
     value = 1.0 - 2.0 * u * u if first else 2.0 * rest * rest
     return value, -4.0 * (u if first else rest), -4.0 if first else 4.0
@@ -175,7 +175,7 @@ def _take(inputs: Array, motion: Array, sample: IntArray, factors: Array, rows: 
 
 @part
 def _fire(partitions: IntArray, breakpoints: Array, at: Array, interval: IntArray) -> None:
-    """Find the two functions of each partition that fire; see `cpfls_cli.fuzzy.membership.memberships`."""
+    """Find the two functions of each partition that fire; see `cpfls_cli.fuzzy.basis.memberships`."""
     for index in range(len(partitions)):
         antecedent, first, left = partitions[index, _ANTECEDENT], partitions[index, _DEGREES], 0
         if first < 0:

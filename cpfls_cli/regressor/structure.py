@@ -13,8 +13,7 @@ from typing_extensions import Doc
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.errors import SettingError
-from cpfls_cli.fuzzy.basis import Consequents, Products, feature_count
-from cpfls_cli.fuzzy.inputs import InputMap
+from cpfls_cli.fuzzy.basis import Consequents, InputMap, Products, feature_count
 from cpfls_cli.result import part
 from cpfls_cli.settings import Settings
 

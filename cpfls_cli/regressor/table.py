@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.fuzzy.inputs import InputRange, map_input
+from cpfls_cli.fuzzy.basis import InputRange, map_input
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.kernels import ONE, STEP, Program, Table
 from cpfls_cli.regressor.regressor import Breakpoints
@@ -227,7 +227,7 @@ def structure_table(structure: ModelStructure, ranges: tuple[InputRange, InputRa
 
 
 def mapped_inputs(table: Table, attitude: Array) -> Array:
-    """Map roll and pitch to antecedent and consequents with their slopes; see `cpfls_cli.fuzzy.inputs.map_input`.
+    """Map roll and pitch to antecedent and consequents with their slopes; see `cpfls_cli.fuzzy.basis.map_input`.
 
     Parameters
     ----------

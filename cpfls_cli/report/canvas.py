@@ -19,8 +19,7 @@ from markupsafe import escape
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Picture, Plot
-from cpfls_cli.report.numbers import number, plain, power_of_ten
+from cpfls_cli.report.content import Picture, Plot, number, plain, power_of_ten
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

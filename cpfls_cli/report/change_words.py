@@ -11,7 +11,7 @@ import yaml
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.changes.results import Found, Shows
-from cpfls_cli.report.numbers import number
+from cpfls_cli.report.content import number
 from cpfls_cli.result import Estimate
 from cpfls_cli.words import joined
 

@@ -9,25 +9,27 @@ from typing import ClassVar
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import turning_law
-from cpfls_cli.dynamics.rigid_body import positive_definite
+from cpfls_cli.dynamics import positive_definite, turning_law
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import Hold
-from cpfls_cli.response.mismatch import (
+from cpfls_cli.response.spectra import (
     NOT_JUDGED,
     ROTATION,
     ROTOR_SPEED,
     THRUST,
+    Channel,
+    FrequencyResponse,
     Mismatch,
+    Stretch,
+    frequency_response,
     judged_band,
     mismatch,
     response_word,
 )
-from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch, frequency_response
 from cpfls_cli.result import about, part, result
 
 # Gives the instruments of each flight, shape (time, column), NaN where there are none, for the inputs of all flights.

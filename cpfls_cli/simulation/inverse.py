@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.rigid_body import body_torque, inertia_tensor
+from cpfls_cli.dynamics import body_torque, inertia_tensor
 from cpfls_cli.errors import SettingError
 from cpfls_cli.simulation.measured import noisy
 from cpfls_cli.simulation.settings import SimulationSettings

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import turning_law
+from cpfls_cli.dynamics import turning_law
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.simulation.model import SimulatedEffect, SimulatedEffects
 from cpfls_cli.vehicle.motion import (

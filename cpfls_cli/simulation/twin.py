@@ -15,8 +15,15 @@ from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.response.flown import estimated
-from cpfls_cli.response.mismatch import NOT_ACCEPTABLE, Mismatch, mismatch, response_word
-from cpfls_cli.response.spectra import Channel, FrequencyResponse, Stretch
+from cpfls_cli.response.spectra import (
+    NOT_ACCEPTABLE,
+    Channel,
+    FrequencyResponse,
+    Mismatch,
+    Stretch,
+    mismatch,
+    response_word,
+)
 from cpfls_cli.result import about, part, result
 from cpfls_cli.rounding import less
 from cpfls_cli.simulation.settings import ClosedLoopSettings

@@ -14,8 +14,8 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError, SettingError, about
+from cpfls_cli.flights.models import read_result_of_vehicle
 from cpfls_cli.flights.path import PathQuestion, PlannedPath
-from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
@@ -35,14 +35,13 @@ from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
 from cpfls_cli.gap.recorded import TRAINING, in_roles
 from cpfls_cli.gap.residual.air import air, known_motion
-from cpfls_cli.pages.effects import unit_words
-from cpfls_cli.report.numbers import number
+from cpfls_cli.pages.gap import unit_words
+from cpfls_cli.report.content import number
 from cpfls_cli.simulation.inverse import flyability
 from cpfls_cli.stage import Run
-from cpfls_cli.stages._demand import demand_sentences
+from cpfls_cli.stages._flight import demand_sentences
 from cpfls_cli.stages._numbers import with_numbers
-from cpfls_cli.trajectory.planning import Trajectory
-from cpfls_cli.trajectory.repeats import repeated
+from cpfls_cli.trajectory.planning import Trajectory, repeated
 from cpfls_cli.weak_form.windows import common_windows
 
 _PERIOD = 0.02

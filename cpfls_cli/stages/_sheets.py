@@ -9,20 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.extended import Extended
-from cpfls_cli.artifacts.gate import Origin, read_origin
+from cpfls_cli.artifacts.diagnosis import Extended
+from cpfls_cli.artifacts.gate import InputFile, Origin, read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.model import AnyModel
-from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.load import stored_study
-from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
+from cpfls_cli.dynamics import CELLS, InertiaFunctions
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.sheet import REFITTED, Sheet
 from cpfls_cli.flights.models import any_model, modelled
 from cpfls_cli.pages.model import against, impossible_in_words, worth_in_words
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.validation.trust import Trust
+from cpfls_cli.validation.verdict import Trust
 
 _SCORE_UNITS = {"mse": "(N m)^2", "max_error": "N m", "relative_error": "1", "r2": "1", "vaf": "1", "r2_body": "1"}
 

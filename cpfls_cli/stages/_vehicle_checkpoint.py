@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cpfls_cli.search.vehicle_search import KeptStructures
+from cpfls_cli.search import KeptStructures
 from cpfls_cli.stage import Run, stage
 
 

@@ -15,14 +15,13 @@ import typer
 
 from cpfls_cli.arguments import OtherVehicleOption
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.changes.judge import changed as compared
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.reference import Reference
 from cpfls_cli.changes.results import Changed
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.inputs import numbered_roles, once
-from cpfls_cli.flights.kept_numbers import FOLDER, kept_numbers, stated_of, with_absent_signals
+from cpfls_cli.flights.training import numbered_roles, once
 from cpfls_cli.logs.formats import formats_in_words
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over
 from cpfls_cli.report.change_words import WORDS
@@ -30,12 +29,16 @@ from cpfls_cli.report.source import unique_labels
 from cpfls_cli.result import column
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages._flight_numbers import (
+    FOLDER,
     contradictions_of,
     exit_code,
     first_of_each,
+    kept_numbers,
     of_other_autopilots,
     of_other_vehicles,
     stated_by,
+    stated_of,
+    with_absent_signals,
 )
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined

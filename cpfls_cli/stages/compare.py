@@ -12,28 +12,25 @@ import numpy as np
 
 from cpfls_cli.arguments import FlightsArgument, ModelOption
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.artifacts.disagreement import Disagreement
+from cpfls_cli.artifacts.diagnosis import Disagreement
 from cpfls_cli.artifacts.job import Job, Progress, go_on
-from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
+from cpfls_cli.artifacts.model import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ConfigError
-from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import is_found, is_identified, learned_by, read_model
 from cpfls_cli.flights.recordings import Recordings, read_flights
+from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import compare as compare_flights
 from cpfls_cli.gap.residual.views import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
-from cpfls_cli.pages.gap import channel_unit, channel_words
-from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
-from cpfls_cli.pages.repeats import repeatability_drawn
-from cpfls_cli.pages.trust import KnownBy, seen_warnings
+from cpfls_cli.pages.gap import GAP_WORDS, channel_unit, channel_words, playback_drawn, repeatability_drawn
+from cpfls_cli.pages.model import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import Drawn, in_columns, line, plain_ticks, stacked
-from cpfls_cli.report.content import Command
-from cpfls_cli.report.numbers import plain
+from cpfls_cli.report.content import Command, plain
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.weak_form.windows import Recording

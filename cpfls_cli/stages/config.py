@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cpfls_cli.config.keys import commented_default
+from cpfls_cli.config.check import commented_default
 from cpfls_cli.config.study import resolved, resolved_yaml
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.result import about, result

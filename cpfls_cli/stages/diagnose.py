@@ -12,41 +12,41 @@ import numpy as np
 
 from cpfls_cli.arguments import DisagreementArgument, HeldOutOption
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.diagnosis import Diagnosis
-from cpfls_cli.artifacts.disagreement import Disagreement
+from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.job import Job, go_on
-from cpfls_cli.artifacts.learned import MODEL_FLIGHT, LearnedFlight, as_inputs
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.model import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.config.unknown import is_of_guesses
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.inputs import numbered_roles
+from cpfls_cli.flights.models import read_result_of_vehicle
 from cpfls_cli.flights.recordings import FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
-from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
+from cpfls_cli.flights.training import numbered_roles
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, before_after
 from cpfls_cli.gap.diagnose import diagnose as diagnose_flights
 from cpfls_cli.gap.naming.causes import of_thrust
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.whole_vehicle import known_already
-from cpfls_cli.pages.disturbance import axis_words
-from cpfls_cli.pages.effects import intervals_drawn, wrong_numbers
 from cpfls_cli.pages.gap import (
     AXES,
     BEFORE,
+    GAP_WORDS,
     MEASURED,
     channel_unit,
     channel_words,
     hidden_gaps,
+    intervals_drawn,
     keep_in_view,
     leaves_view,
     marked,
+    playback_drawn,
+    repeatability_drawn,
     sizes_drawn,
+    wrong_numbers,
 )
-from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
-from cpfls_cli.pages.playback import SIGNALS, WHO, draw_errors, errors_height
-from cpfls_cli.pages.repeats import repeatability_drawn
-from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.pages.model import seen_warnings
+from cpfls_cli.pages.playback import SIGNALS, WHO, axis_words, draw_errors, errors_height
 from cpfls_cli.playback.errors import AFTER
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import GREY, Drawn, legend_over, plain_ticks, stacked

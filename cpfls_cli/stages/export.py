@@ -18,10 +18,9 @@ from cpfls_cli import store
 from cpfls_cli.arguments import ExportAnywayOption
 from cpfls_cli.artifacts.output import check_output
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.mcap_form import mcap_bytes
+from cpfls_cli.export.mcap_form import TIME, View, csv_text, mcap_bytes
 from cpfls_cli.export.registry import FORMS, exported
 from cpfls_cli.export.text import checked_identifier, identifier
-from cpfls_cli.export.tracks import TIME, View, csv_text
 from cpfls_cli.export.viewed import view_of
 from cpfls_cli.result import about, part, plain, result
 from cpfls_cli.stage import Run, kind_of, stage

@@ -10,21 +10,18 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from cpfls_cli.arguments import FlightsArgument, HeldOutOption, ModelOption
-from cpfls_cli.artifacts.diagnosis import Diagnosis
-from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.extended import Extended
-from cpfls_cli.artifacts.gate import format_name, read_origin
+from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement, Extended
+from cpfls_cli.artifacts.gate import InputFile, format_name, read_origin
 from cpfls_cli.artifacts.job import go_on
-from cpfls_cli.artifacts.learned import as_inputs, joined_flights
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.model import as_inputs, joined_flights
 from cpfls_cli.config.load import parse_config, stored_study, validate
 from cpfls_cli.errors import ComputationError, InputError, visible
-from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import is_found, learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
+from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
-from cpfls_cli.pages.repeats import WHAT_TO_FLY
+from cpfls_cli.pages.gap import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result

@@ -23,33 +23,37 @@ from cpfls_cli.arguments import (
 )
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel, identified_model
-from cpfls_cli.artifacts.learned import LearnedFlight
+from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
-from cpfls_cli.flights.flight_source import check_file
-from cpfls_cli.flights.inputs import choosing_source, held_out_parts, input_roles
-from cpfls_cli.flights.same_vehicle import other_vehicles
-from cpfls_cli.flights.training import TrainingData, flight_roles, read_training
+from cpfls_cli.flights.models import other_vehicles
+from cpfls_cli.flights.training import (
+    TrainingData,
+    check_file,
+    choosing_source,
+    flight_roles,
+    held_out_parts,
+    input_roles,
+    read_training,
+)
 from cpfls_cli.identification.data import TorqueSource
-from cpfls_cli.identification.excitation import swings
-from cpfls_cli.identification.findings import short_flight
+from cpfls_cli.identification.findings import short_flight, swings
 from cpfls_cli.identification.identify import Identification
 from cpfls_cli.identification.identify import identify as identified
 from cpfls_cli.identification.search import NothingFoundError, SearchRun, SearchStep, require_flights
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.identification import WORDS
 from cpfls_cli.pages.identified_figures import FIGURES
-from cpfls_cli.pages.sensors import tell_before_search
+from cpfls_cli.pages.playback import tell_before_search
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command, Text
-from cpfls_cli.search.resumable import SearchOptions, Watch, begin_search
+from cpfls_cli.search import SearchOptions, Watch, begin_search
 from cpfls_cli.stage import Run, stage
-from cpfls_cli.stages._stopped import stop_note, without_model
-from cpfls_cli.validation.trust import Trust
+from cpfls_cli.stages._checkpoint import stop_note, without_model
 from cpfls_cli.validation.validate import Validation
 from cpfls_cli.validation.validate import validate as examine
-from cpfls_cli.validation.verdict import contradicted
+from cpfls_cli.validation.verdict import Trust, contradicted
 from cpfls_cli.workers.workforce import WorkerError
 
 SelectionOption = Annotated[

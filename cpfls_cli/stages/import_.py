@@ -8,8 +8,7 @@ from cpfls_cli.arguments import LogArgument
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.numbers import beyond_belief
 from cpfls_cli.flights.flight import Imported
-from cpfls_cli.flights.imported import imported
-from cpfls_cli.flights.recordings import check_flight, doubts_on_voltage, read_import
+from cpfls_cli.flights.recordings import check_flight, doubts_on_voltage, imported, read_import
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import FIGURES, WORDS
 

@@ -25,14 +25,12 @@ from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal, known_log, pr
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
 from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, USUAL, log_faster
-from cpfls_cli.flights.imported import imported
 from cpfls_cli.flights.models import found_vehicle, is_found
-from cpfls_cli.flights.recordings import check_flight, read_import, seen_twice
+from cpfls_cli.flights.recordings import check_flight, imported, read_import, seen_twice
 from cpfls_cli.logs.formats import log_contents, suffixes_in_words
 from cpfls_cli.page import TEMPLATES
-from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.report.content import Command
-from cpfls_cli.report.numbers import number
+from cpfls_cli.pages.playback import contradicted
+from cpfls_cli.report.content import Command, number
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
 from cpfls_cli.simulators.formats import file_of, read_model

@@ -18,7 +18,7 @@ from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.reduction.survey import survey
 from cpfls_cli.reduction.training_set import check_streamed, random_streamed, reduce_streamed
 from cpfls_cli.report.canvas import BASELINE, Drawn, legend_above, style_of
-from cpfls_cli.report.numbers import count
+from cpfls_cli.report.content import count
 from cpfls_cli.rounding import at_most, less
 from cpfls_cli.stage import Run, stage
 

@@ -11,13 +11,13 @@ import numpy as np
 from cpfls_cli.arguments import EveryOption, FlightsArgument, HistoryOption, HoldOption, HorizonOption, PlayedArgument
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_fading, read_model, read_observer
 from cpfls_cli.flights.playback import flights_to_play, model_notes, played
 from cpfls_cli.flights.recordings import seen_twice
+from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
+from cpfls_cli.pages.model import seen_warnings
 from cpfls_cli.pages.playback import ERRORS, WORDS, draw_errors, errors_height
-from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.along_flights import Playback, playback
 from cpfls_cli.playback.errors import NOTHING_MOVES, STATED
 from cpfls_cli.playback.flight import LoggedFlight

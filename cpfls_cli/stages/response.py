@@ -14,13 +14,13 @@ from cpfls_cli.arguments import FlightsArgument, JudgedOption
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import check_outputs
 from cpfls_cli.artifacts.output import refuse_own
-from cpfls_cli.flights.inputs import known_by, numbered_roles
 from cpfls_cli.flights.models import is_found, learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.flights.recordings import seen_twice
+from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.pages.gap import MEASURED
-from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.pages.model import seen_warnings
+from cpfls_cli.pages.playback import contradicted
 from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.settings import VEHICLE
@@ -38,7 +38,7 @@ from cpfls_cli.report.canvas import (
 )
 from cpfls_cli.report.content import Command, Text
 from cpfls_cli.response.flown import Responses, VehicleResponse, vehicle_responses
-from cpfls_cli.response.mismatch import (
+from cpfls_cli.response.spectra import (
     ACCEPTABLE,
     COHERENT,
     GOOD,
@@ -47,8 +47,9 @@ from cpfls_cli.response.mismatch import (
     ROTATION,
     ROTOR_SPEED,
     THRUST,
+    decibels,
+    degrees,
 )
-from cpfls_cli.response.spectra import decibels, degrees
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, with_numbers
 from cpfls_cli.stages.compare import to_correct, to_gap

@@ -9,12 +9,12 @@ import numpy as np
 import typer
 
 from cpfls_cli.arguments import ExportAnywayOption
-from cpfls_cli.artifacts.parameters import name_of
+from cpfls_cli.artifacts.vehicle_model import name_of
 from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.export.samples import Samples, require_ending
 from cpfls_cli.export.text import identifier
 from cpfls_cli.flights.models import any_model, found_vehicle, is_found, is_model
-from cpfls_cli.pages.trust import trust_words
+from cpfls_cli.pages.model import trust_words
 from cpfls_cli.playback.gusts import GUST_AXES
 from cpfls_cli.playback.spread import Estimates, drawn, require_sure
 from cpfls_cli.result import about as described

@@ -17,8 +17,7 @@ import typer
 
 from cpfls_cli.arguments import OtherVehicleOption, SchedulerOption, TimeOrder
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.artifacts.gate import format_name
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.gate import InputFile, format_name
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.changes.results import NumberInTime, Trend
 from cpfls_cli.changes.trend import load_ruptures
@@ -26,8 +25,7 @@ from cpfls_cli.changes.trend import trend as over_flights
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.flights.inputs import numbered_roles, once
-from cpfls_cli.flights.kept_numbers import FOLDER, find_kept, kept_numbers
+from cpfls_cli.flights.training import numbered_roles, once
 from cpfls_cli.logs.formats import formats_in_words, is_log
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, band, in_columns, legend_over
 from cpfls_cli.report.change_words import WORDS, natural_unit
@@ -35,14 +33,17 @@ from cpfls_cli.report.source import unique_labels
 from cpfls_cli.result import column
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages._flight_numbers import (
+    FOLDER,
     contradictions_of,
     exit_code,
+    find_kept,
     first_of_each,
+    kept_numbers,
     of_other_autopilots,
     of_other_vehicles,
     stated_by,
 )
-from cpfls_cli.workers.employ import employ
+from cpfls_cli.workers.processes import employ
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,8 +14,7 @@ import typer
 from cpfls_cli.arguments import AutopilotChoice
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import format_name
-from cpfls_cli.artifacts.parameters import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST
-from cpfls_cli.artifacts.vehicle_model import Vehicle
+from cpfls_cli.artifacts.vehicle_model import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST, Vehicle
 from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
@@ -23,8 +22,8 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.parameter_files import parameter_file
 from cpfls_cli.flights.flight import Flight, Imported, read_whole
-from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_model
+from cpfls_cli.flights.training import numbered_roles
 from cpfls_cli.logs.formats import log_contents, read_log
 from cpfls_cli.look.effectiveness import effectiveness
 from cpfls_cli.look.flight import LogFlight
@@ -32,8 +31,7 @@ from cpfls_cli.look.gains import HOLDS, LogGains, TunedGains, tuned_gains
 from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.reasons import TOO_SLOW
 from cpfls_cli.look.vibration import Change, vibration_of
-from cpfls_cli.pages.model import slow_words
-from cpfls_cli.pages.trust import trust_words
+from cpfls_cli.pages.model import slow_words, trust_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import (
     BASELINE,
@@ -47,15 +45,13 @@ from cpfls_cli.report.canvas import (
     stacked,
     style_of,
 )
-from cpfls_cli.report.content import command_line
-from cpfls_cli.report.numbers import UNKNOWN
+from cpfls_cli.report.content import UNKNOWN, command_line
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, with_numbers
 from cpfls_cli.tuning.gains import AskedMargins
-from cpfls_cli.tuning.noise import LEAST, Noise, noise_of
-from cpfls_cli.tuning.plant import Spread, spread_of
+from cpfls_cli.tuning.plant import LEAST, Noise, Spread, noise_of, spread_of
 from cpfls_cli.tuning.vehicle import PROPOSED, Gains, ParameterRow, gains_for_vehicle
-from cpfls_cli.validation.trust import Trust
+from cpfls_cli.validation.verdict import Trust
 from cpfls_cli.words import joined
 
 if TYPE_CHECKING:

@@ -21,10 +21,11 @@ from cpfls_cli.arguments import (
     WriteConfigOption,
 )
 from cpfls_cli.arrays import Array
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.job import Job
-from cpfls_cli.artifacts.learned import LearnedFlight
+from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.artifacts.output import check_output, refuse_own
-from cpfls_cli.artifacts.parameters import (
+from cpfls_cli.artifacts.vehicle_model import (
     CENTRE,
     DELAY,
     DRAG,
@@ -35,28 +36,33 @@ from cpfls_cli.artifacts.parameters import (
     ON_BOUND,
     THRUST,
     Parameter,
+    Vehicle,
     excess,
     is_learned,
+    mismatches,
     too_heavy,
     vehicle_section,
 )
-from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.artifacts.vehicle_model import Vehicle, mismatches
-from cpfls_cli.config.study import Study, settings_of
-from cpfls_cli.config.yaml_text import to_yaml
+from cpfls_cli.config.study import Study, settings_of, to_yaml
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, shown_slowly
-from cpfls_cli.flights.inputs import numbered_roles
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
-from cpfls_cli.pages.disturbance import gust_words
+from cpfls_cli.flights.training import numbered_roles
+from cpfls_cli.pages.gap import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.model import said_by
-from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height
+from cpfls_cli.pages.playback import (
+    ERRORS,
+    NOTHING_COMES,
+    contradicted,
+    draw_errors,
+    errors_height,
+    gust_words,
+    tell_before_search,
+)
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
-from cpfls_cli.pages.repeats import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
-from cpfls_cli.pages.sensors import NOTHING_COMES, contradicted, tell_before_search
 from cpfls_cli.playback.errors import AlongFlights
 from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.loop import ANY, LoopBounds, shows_loop_anyhow
@@ -66,16 +72,15 @@ from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
 from cpfls_cli.playback.vehicle import FoundVehicle, Share, find_vehicle
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over, line, style_of
-from cpfls_cli.report.numbers import percent
+from cpfls_cli.report.content import percent
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
-from cpfls_cli.response.mismatch import ACCEPTABLE
+from cpfls_cli.response.spectra import ACCEPTABLE
 from cpfls_cli.rounding import levelled
-from cpfls_cli.search.resumable import Watch
-from cpfls_cli.search.vehicle_search import VehicleCheckpoint, begin_vehicle_search
+from cpfls_cli.search import VehicleCheckpoint, Watch, begin_vehicle_search
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._checkpoint import stop_note
 from cpfls_cli.stages._numbers import to_fly
-from cpfls_cli.stages._stopped import stop_note
-from cpfls_cli.validation.trust import Trust
+from cpfls_cli.validation.verdict import Trust
 from cpfls_cli.words import did_you_mean, joined
 
 if TYPE_CHECKING:

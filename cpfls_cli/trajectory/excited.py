@@ -10,8 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import SettingError
-from cpfls_cli.trajectory.attitude import MOTION, along
-from cpfls_cli.trajectory.planning import Trajectory
+from cpfls_cli.trajectory.planning import MOTION, Trajectory, along
 from cpfls_cli.trajectory.profile import Holds, covering
 from cpfls_cli.trajectory.settings import ExciteSettings
 

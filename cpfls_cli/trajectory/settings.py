@@ -14,8 +14,7 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
 from cpfls_cli.trajectory.consistency import check_consistency
 from cpfls_cli.trajectory.legs import MoveInSpace, Timing, move_in_space, unit_of
-from cpfls_cli.trajectory.limits import LimitSettings
-from cpfls_cli.trajectory.profile import BaseProfile, Holds
+from cpfls_cli.trajectory.profile import BaseProfile, Holds, LimitSettings
 
 _Turns = Annotated[int, Ge(-10_000), Le(10_000)]
 _Torque = Annotated[float, Gt(0)]

@@ -14,8 +14,7 @@ from cpfls_cli.autopilots.law import AXES, AxisLaw, Law
 from cpfls_cli.autopilots.parameters import Autopilot, Parameter
 from cpfls_cli.result import about
 from cpfls_cli.tuning.margins import axis_loops, disk_of, frequencies, is_stable, moved_by
-from cpfls_cli.tuning.noise import Noise
-from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
+from cpfls_cli.tuning.plant import AxisPlant, HoverPlant, Noise
 
 _BELOW_CROSSOVER = 5.0
 """The integral takes over so much below what the rate follows: it costs about 11 degrees of phase there."""

@@ -11,8 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, ComplexArray, IntArray, Numbers
 from cpfls_cli.autopilots.law import Controller, Law
 from cpfls_cli.result import about, part, result
-from cpfls_cli.tuning.noise import Noise
-from cpfls_cli.tuning.plant import AxisPlant, HoverPlant
+from cpfls_cli.tuning.plant import AxisPlant, HoverPlant, Noise
 
 _LOWEST_HZ, _POINTS, _OF_NYQUIST = 0.1, 300, 0.98
 _STEP_S = 1.2

@@ -18,8 +18,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
 from cpfls_cli.tuning.gains import AskedMargins, Proposal, Tuned, proposal_of, with_filters
 from cpfls_cli.tuning.margins import Evaluation, evaluate
-from cpfls_cli.tuning.noise import Line, Noise
-from cpfls_cli.tuning.plant import HoverPlant, Spread, hover_plant
+from cpfls_cli.tuning.plant import HoverPlant, Line, Noise, Spread, hover_plant
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 

@@ -13,11 +13,11 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.dynamics.equations_of_motion import Predictor, RotationState, free_runs, turning_law
+from cpfls_cli.dynamics import Predictor, RotationState, free_runs, turning_law
 from cpfls_cli.identification.data import TorqueSource, gathered, sample_times
 from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.result import about
-from cpfls_cli.validation.timeline import sample_period, stretch_numbers
+from cpfls_cli.validation.residuals import sample_period, stretch_numbers
 
 # 40 MB of rotations, rates and torques at a time.
 _SAMPLES_AT_ONCE = 200_000

@@ -11,15 +11,20 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.errors import SettingError
-from cpfls_cli.fuzzy.inputs import InputMap
-from cpfls_cli.identification.cross_validation import SMALLEST_ERROR, RidgeChoice, ridge_curve, with_folds
+from cpfls_cli.fuzzy.basis import InputMap
 from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale, gathered
 from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.samples import Products, Ready, Samples
 from cpfls_cli.identification.settings import Base, IdentificationSettings
-from cpfls_cli.identification.solver import LARGEST_SQUARE, column_size
-from cpfls_cli.regressor.motion import RIGID
-from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
+from cpfls_cli.identification.solver import (
+    LARGEST_SQUARE,
+    SMALLEST_ERROR,
+    RidgeChoice,
+    column_size,
+    ridge_curve,
+    with_folds,
+)
+from cpfls_cli.regressor.regressor import RIGID, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.result import about
 

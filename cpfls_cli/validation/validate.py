@@ -8,9 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics.equations_of_motion import Predictor
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import inertia_matrix
+from cpfls_cli.dynamics import InertiaFunctions, Predictor, inertia_matrix
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.closed_loop import source_of
 from cpfls_cli.identification.data import OtherTorque, TorqueData, TorqueSource
@@ -20,15 +18,18 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import PITCH, ROLL
 from cpfls_cli.result import about
 from cpfls_cli.rotations import wrapped
-from cpfls_cli.validation.bands import definite_share, inertia_band
-from cpfls_cli.validation.bootstrap import Draws, bootstrap
-from cpfls_cli.validation.evidence import MODEL, RIGID_BODY, Evidence
-from cpfls_cli.validation.paired import compare_torque, mean_missing_torque, with_constant
-from cpfls_cli.validation.physical import Physics, physical_sense
+from cpfls_cli.validation.bands import Draws, Physics, bootstrap, definite_share, inertia_band, physical_sense
+from cpfls_cli.validation.evidence import (
+    MODEL,
+    RIGID_BODY,
+    Evidence,
+    compare_torque,
+    mean_missing_torque,
+    with_constant,
+)
 from cpfls_cli.validation.replay import StepErrors, replay_steps
-from cpfls_cli.validation.residuals import ResidualAnalysis, examine_residuals
+from cpfls_cli.validation.residuals import ResidualAnalysis, TimeBlocks, examine_residuals, time_blocks
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
-from cpfls_cli.validation.timeline import TimeBlocks, time_blocks
 from cpfls_cli.validation.verdict import Verdict, beside_loop, verdict
 
 Tell = Callable[[str], None]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cpfls_cli import rotations
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
+from cpfls_cli.dynamics import inertia_matrix, inertia_matrix_gradient
 
 
 def torque(attitude, attitude_rate, attitude_acceleration, inertia):

@@ -8,7 +8,7 @@ import numpy as np
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
-from cpfls_cli.trajectory.attitude import flat_attitude
+from cpfls_cli.trajectory.planning import flat_attitude
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 HUBS = (((0.3, 0.0, 0.05), 1), ((0.0, -0.3, 0.05), -1), ((-0.3, 0.0, 0.05), 1), ((0.0, 0.3, 0.05), -1))

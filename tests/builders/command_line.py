@@ -10,9 +10,9 @@ from functools import cache
 import pytest
 from typer import testing
 
-from cpfls_cli.cli.app import app
+from cpfls_cli.cli.stages import app
 from cpfls_cli.report import canvas
-from cpfls_cli.workers.employ import employ
+from cpfls_cli.workers.processes import employ
 
 # Every call would build all commands anew, which takes longer than most of them run.
 testing._get_command = cache(testing._get_command)
@@ -84,7 +84,7 @@ def act_at_evaluation(monkeypatch, number, action):
 
         return employ(evaluate_and_count, **options)
 
-    monkeypatch.setattr("cpfls_cli.search.resumable.employ", counting)
+    monkeypatch.setattr("cpfls_cli.search.employ", counting)
 
 
 def interrupt_this_process():

@@ -16,8 +16,7 @@ def regressor():
     """Add up one sample of a model."""
     from cpfls_cli.identification.data import TorqueData
     from cpfls_cli.identification.samples import Ready, Samples
-    from cpfls_cli.regressor.motion import Motion
-    from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
+    from cpfls_cli.regressor.regressor import Motion, data_ranges, uniform_breakpoints
     from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
     zeros, structure = np.zeros((1, 3)), model_structure(StructureSettings())

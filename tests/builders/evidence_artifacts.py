@@ -5,7 +5,7 @@ from scipy.stats import norm
 
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.store import read, write
-from cpfls_cli.validation.reasons import Reason
+from cpfls_cli.validation.verdict import Reason
 from tests.builders.identified_models import value_of, with_parts
 
 LAGS, INPUTS, POINTS, DRAWS, STEPS = 40, 7, 91, 60, 50

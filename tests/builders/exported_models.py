@@ -9,21 +9,18 @@ import numpy as np
 import pytest
 import yaml
 
-from cpfls_cli.artifacts.gate import Origin
+from cpfls_cli.artifacts.gate import InputFile, Origin
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.artifacts.spec import InputFile
-from cpfls_cli.dynamics.inertia_functions import CELLS, InertiaFunctions
+from cpfls_cli.dynamics import CELLS, InertiaFunctions
 from cpfls_cli.export.points import expected, reference_run
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.fuzzy.membership import breakpoints
-from cpfls_cli.identification.scores import Judged
+from cpfls_cli.fuzzy.basis import InputRange, breakpoints
+from cpfls_cli.identification.identify import Judged
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.stages._sheets import bare_sheet
-from cpfls_cli.validation.reasons import Reason
-from cpfls_cli.validation.verdict import Verdict
+from cpfls_cli.validation.verdict import Reason, Verdict
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")

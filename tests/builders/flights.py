@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
+from cpfls_cli.dynamics import newton_euler_torque
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.trajectory.rotation import full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
 

@@ -17,7 +17,7 @@ import yaml
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import runge_kutta_step
+from cpfls_cli.dynamics import runge_kutta_step
 from cpfls_cli.export.registry import Exported
 from cpfls_cli.export.simulators.ardupilot import STEP_S, fly_ardupilot
 from cpfls_cli.export.simulators.sdf import ENTRIES, SHORTEST_S, apart

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from cpfls_cli import page
-from cpfls_cli.artifacts.diagnosis import Diagnosis
-from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.extended import Extended
+from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement, Extended
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WorstWindows

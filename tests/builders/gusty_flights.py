@@ -12,7 +12,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.motion import MeasuredMotion
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.rotations import attitude_acceleration, attitude_rate, euler_angles, generalised_torque
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 

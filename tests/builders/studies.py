@@ -2,7 +2,7 @@
 
 import json
 
-from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
+from cpfls_cli.config.study import parse_yaml, to_yaml
 
 VEHICLE = f"""\
 vehicle: {

@@ -9,7 +9,7 @@ from cpfls_cli import store
 from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.export.polynomials import weights_of
+from cpfls_cli.export.numbers import weights_of
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.remainder import Remainder

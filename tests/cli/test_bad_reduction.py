@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from cpfls_cli.report.numbers import number
+from cpfls_cli.report.content import number
 
 
 @pytest.mark.parametrize("dry", [(), ("--dry-run",)], ids=["run", "dry-run"])

@@ -86,12 +86,12 @@ def test_the_flight_that_it_began_with_is_told(changed, folder):
 def test_numbers_of_flights_are_kept(changed, folder, monkeypatch):
     changed("same.csv")
     kept = {path: path.read_bytes() for path in (folder / "out" / "flights").iterdir()}
-    monkeypatch.setattr("cpfls_cli.flights.kept_numbers.read_alone", None)
+    monkeypatch.setattr("cpfls_cli.stages._flight_numbers.read_alone", None)
     assert changed("same.csv").exit_code == 0
     monkeypatch.undo()
     # By other code they are others, and of another vehicle.
-    monkeypatch.setattr("cpfls_cli.flights.kept_numbers.read_alone", None)
-    monkeypatch.setattr("cpfls_cli.flights.kept_numbers.code_fingerprint", lambda: "other")
+    monkeypatch.setattr("cpfls_cli.stages._flight_numbers.read_alone", None)
+    monkeypatch.setattr("cpfls_cli.stages._flight_numbers.code_fingerprint", lambda: "other")
     with pytest.raises(TypeError):
         changed("same.csv")
     monkeypatch.undo()

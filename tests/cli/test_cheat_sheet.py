@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from cpfls_cli.cli.app import app
 from cpfls_cli.cli.options import WORKFLOWS, sheet
+from cpfls_cli.cli.stages import app
 
 ROOT = Path(__file__).parents[2]
 COMMANDS = [command for _, commands in WORKFLOWS for command in commands]

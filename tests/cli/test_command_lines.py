@@ -8,16 +8,15 @@ from typing import get_args
 
 import pytest
 
-from cpfls_cli.cli.command_lines import command_line
-from cpfls_cli.cli.stages import PARTS, STAGES
+from cpfls_cli.cli.stages import PARTS, STAGES, command_line
 from cpfls_cli.stage import loaded
 
 FILES = [file for file in sorted(STAGES.glob("[a-z]*.py")) if file.stem not in PARTS]
 LOADS = """
 import json, sys
 from pathlib import Path
-import cpfls_cli.cli.app
-from cpfls_cli.cli.command_lines import command_line
+import cpfls_cli.cli.stages
+from cpfls_cli.cli.stages import command_line
 print(json.dumps({name: sorted({module.partition(".")[0] for module in set(sys.modules)})
     for name in json.loads(sys.argv[1]) if command_line(Path(name))}))
 """

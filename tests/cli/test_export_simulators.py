@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.export.registry import FORMS
 from cpfls_cli.playback.model import ModelEffect

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cpfls_cli.artifacts.spec import SCHEMA_VERSION
+from cpfls_cli.artifacts.gate import SCHEMA_VERSION
 from cpfls_cli.result import datasets
 from cpfls_cli.stages.info import formats
 

@@ -7,7 +7,7 @@ import pytest
 import typer
 
 from cpfls_cli import __version__
-from cpfls_cli.cli.app import app
+from cpfls_cli.cli.stages import app
 
 COMMANDS = (
     "look",

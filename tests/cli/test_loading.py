@@ -18,7 +18,7 @@ for code in json.loads(sys.argv[1]):
 """
 COMMAND = """
 from typer.testing import CliRunner
-from cpfls_cli.cli.app import app
+from cpfls_cli.cli.stages import app
 result = CliRunner().invoke(app, {words!r})
 assert result.exit_code == 0, result.output
 """

@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.config.load import load_study
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.imported import imported
+from cpfls_cli.flights.recordings import imported
 from tests.builders.command_line import run
 from tests.builders.thinned_logs import Flown, write_px4
 

@@ -12,7 +12,7 @@ import typer
 import yaml
 
 from cpfls_cli.cli import terminal
-from cpfls_cli.cli.app import app
+from cpfls_cli.cli.stages import app
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import VehicleModel

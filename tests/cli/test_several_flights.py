@@ -6,7 +6,7 @@ import pytest
 
 from cpfls_cli.artifacts import job
 from cpfls_cli.files import read_content
-from cpfls_cli.flights import flight_source, training
+from cpfls_cli.flights import training
 from tests.builders.artifacts import edited
 
 
@@ -100,7 +100,7 @@ def test_a_flight_read_chunk_by_chunk_gives_the_same_bytes(cpfls, study, pipelin
     words = (study, pipeline.flight, second, "--set", "identification.training_share=0.8")
     for name, limit in (("held", None), ("streamed", 100)):
         if limit:
-            monkeypatch.setattr(flight_source, "IN_MEMORY", limit)
+            monkeypatch.setattr(training, "IN_MEMORY", limit)
         cpfls.done("reduce", *words, "-o", tmp_path / f"{name}-selection.h5")
         cpfls.done("identify", *words, "-o", tmp_path / f"{name}-model.h5")
     for kind in ("selection", "model"):
@@ -115,7 +115,7 @@ def test_a_flight_read_chunk_by_chunk_gives_the_same_bytes(cpfls, study, pipelin
     ],
 )
 def test_a_long_flight_is_checked_too(refuse, study, pipeline, tmp_path, monkeypatch, dataset, value, said):
-    monkeypatch.setattr(flight_source, "IN_MEMORY", 100)
+    monkeypatch.setattr(training, "IN_MEMORY", 100)
     broken = tmp_path / "broken.h5"
     broken.write_bytes(pipeline.flight.read_bytes())
     with edited(broken) as file:
@@ -127,7 +127,7 @@ def test_a_long_flight_is_checked_too(refuse, study, pipeline, tmp_path, monkeyp
 def test_a_long_flight_without_torque_is_refused_where_it_is_needed(
     cpfls, refuse, study, pipeline, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(flight_source, "IN_MEMORY", 100)
+    monkeypatch.setattr(training, "IN_MEMORY", 100)
     lacking = tmp_path / "lacking.h5"
     lacking.write_bytes(pipeline.flight.read_bytes())
     with edited(lacking) as file:

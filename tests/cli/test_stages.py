@@ -11,8 +11,7 @@ import pytest
 import typer
 
 import cpfls_cli.stages
-from cpfls_cli.cli.app import AllCommands
-from cpfls_cli.cli.stages import stage_commands
+from cpfls_cli.cli.stages import AllCommands, stage_commands
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.result import about, result
@@ -146,7 +145,7 @@ def test_what_a_user_can_cause_ends_in_one_sentence(house, capsys, tmp_path):
 
 
 def test_look_stands_first_and_help_loads_no_stage(cpfls):
-    commands = typer.main.get_command(importlib.import_module("cpfls_cli.cli.app").app)
+    commands = typer.main.get_command(importlib.import_module("cpfls_cli.cli.stages").app)
     assert isinstance(commands, AllCommands)
     assert next(iter(commands.commands)) == "look"
     assert "\nCommands:\n  look  " in cpfls("--help").stdout

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from cpfls_cli.cli.app import app
-from cpfls_cli.cli.stages import ORDER
-from cpfls_cli.config.keys import commented_default
+from cpfls_cli.cli.stages import ORDER, app
+from cpfls_cli.config.check import commented_default
 from cpfls_cli.config.load import parse_config, validate
 
 ROOT = Path(__file__).parents[2]

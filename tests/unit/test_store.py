@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 from cpfls_cli.errors import ComputationError, InputError

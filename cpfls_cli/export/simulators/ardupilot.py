@@ -24,8 +24,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.scales import arm
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
-from cpfls_cli.export.numbers import Numbers, cross_order, numbers_of, places, spins
-from cpfls_cli.export.polynomials import weights_of_model
+from cpfls_cli.export.numbers import Numbers, cross_order, numbers_of, places, spins, weights_of_model
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines, in_json
 from cpfls_cli.playback.course import Course, fly_body

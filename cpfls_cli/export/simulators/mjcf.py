@@ -15,7 +15,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
-from cpfls_cli.export.polynomials import TERMS
+from cpfls_cli.export.numbers import TERMS
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.text import number, xml_text

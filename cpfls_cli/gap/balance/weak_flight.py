@@ -13,8 +13,7 @@ from scipy.linalg import toeplitz
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.consistency.audit import Audit
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel, momentum_form
-from cpfls_cli.dynamics.rigid_body import inertia_tensor
+from cpfls_cli.dynamics import InertiaModel, inertia_tensor, momentum_form
 from cpfls_cli.effects.catalogue.parameter_error import shown, with_thrust
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS

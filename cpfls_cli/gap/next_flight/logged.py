@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics.equations_of_motion import InertiaModel
+from cpfls_cli.dynamics import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import floors, system

@@ -12,9 +12,8 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.rounding import ROUNDING, at_most
 from cpfls_cli.simulation.room_left import ROTOR_SHARE, hover_squared, rotor_load
-from cpfls_cli.trajectory.attitude import along
-from cpfls_cli.trajectory.limits import LIMIT_NAMES
-from cpfls_cli.trajectory.planning import Trajectory, sample_times
+from cpfls_cli.trajectory.planning import Trajectory, along, sample_times
+from cpfls_cli.trajectory.profile import LIMIT_NAMES
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS, block_length, half_width, jackknife_error
-from cpfls_cli.dynamics.rigid_body import inertia_tensor
+from cpfls_cli.dynamics import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.gap.balance.balance_system import System, negligible, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight

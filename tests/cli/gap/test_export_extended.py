@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.extended import Extended
+from cpfls_cli.artifacts.diagnosis import Extended
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.gap.before_after import LeftOut

@@ -10,7 +10,7 @@ import pytest
 
 import cpfls_cli
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.report.numbers import sentence
+from cpfls_cli.report.content import sentence
 from cpfls_cli.result import datasets
 from cpfls_cli.validation import validate
 from tests.builders.identified_models import write_changed

@@ -124,7 +124,7 @@ def test_handlers_are_as_they_were(cpfls, words, tmp_path, interrupt_at):
 def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_path, at_evaluation, monkeypatch):
     output = tmp_path / "model.h5"
     clock = [100.0]
-    monkeypatch.setattr("cpfls_cli.search.resumable.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("cpfls_cli.search.time.monotonic", lambda: clock[0])
     at_evaluation(40, lambda: clock.__setitem__(0, 700.0))
     result = cpfls.done(*words, "-o", output, "--time-limit", "10m")
     assert stored(output, "stop_reason") == b"time-limit"

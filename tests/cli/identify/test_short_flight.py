@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.excitation import swings
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.identification.findings import swings
+from cpfls_cli.regressor.regressor import Motion
 from tests.builders.studies import VEHICLE
 
 STUDY = """\

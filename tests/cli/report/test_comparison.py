@@ -10,8 +10,8 @@ import pytest
 
 import cpfls_cli
 from cpfls_cli import store
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.pages.comparison import differences
 from cpfls_cli.report.source import unique_labels
 from cpfls_cli.store import read

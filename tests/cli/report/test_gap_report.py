@@ -9,9 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.diagnosis import Diagnosis
-from cpfls_cli.artifacts.disagreement import Disagreement
-from cpfls_cli.artifacts.extended import Extended
+from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement, Extended
 from cpfls_cli.artifacts.job import input_file
 from cpfls_cli.store import Origin
 from tests.builders import gap_artifacts as made

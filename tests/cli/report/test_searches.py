@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.paper import searches
 from benchmarks.paper.replicates import Sweep
-from cpfls_cli.search.resumable import Watch
+from cpfls_cli.search import Watch
 from cpfls_cli.store import read
 from tests.builders.studies import VEHICLE
 

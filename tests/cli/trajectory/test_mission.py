@@ -6,10 +6,10 @@ import shlex
 import numpy as np
 import pytest
 
-from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
+from cpfls_cli.config.study import parse_yaml, to_yaml
 from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.path import PlannedPath
-from cpfls_cli.pages.repeats import WHAT_TO_FLY
+from cpfls_cli.pages.gap import WHAT_TO_FLY
 from cpfls_cli.store import read
 from tests.builders.studies import VEHICLE
 

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.fuzzy.basis import antecedent, basis, features
-from cpfls_cli.fuzzy.inputs import input_range, map_input, seesaw
-from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.fuzzy.basis import antecedent, basis, breakpoints, features, input_range, map_input, seesaw
 
 WEIGHTS = np.array([3157.0, 31387, 59087, 34526]), np.array([61856.0, 23999, 31983, 5100])
 TRIPLETS = np.random.default_rng(4).standard_normal((17, 3))

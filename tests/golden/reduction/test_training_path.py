@@ -10,8 +10,7 @@ import pytest
 
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.reduction.training_set import choose
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 PAPER = {"consequents": "seesaw", "products": "additive"}

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli import store
-from cpfls_cli.artifacts.spec import SCHEMA_VERSION, InputFile
+from cpfls_cli.artifacts.gate import SCHEMA_VERSION, InputFile
 from cpfls_cli.stages.info import formats
 from tests.builders.results import drawn
 

@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cpfls_cli.config.load import parse_config, validate
-from cpfls_cli.config.study import resolved_yaml
-from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
+from cpfls_cli.config.study import parse_yaml, resolved_yaml, to_yaml
 from tests.builders.studies import VEHICLE
 
 printable = st.text(st.characters(exclude_categories=["Cs", "Cc", "Cn", "Co"]))

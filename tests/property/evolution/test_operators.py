@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from cpfls_cli.evolution.operators import (
+from cpfls_cli.evolution.engine import (
     gray_decode,
     gray_encode,
     linear_ranking_fitness,

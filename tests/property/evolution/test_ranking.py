@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cpfls_cli.evolution.ranking import pareto_front, rank
+from cpfls_cli.evolution.archive import pareto_front, rank
 
 # Few distinct values, so that ties, dominance and equal vectors are common.
 VALUES = st.sampled_from([-1.0, 0.0, 0.5, 2.0, np.inf, -np.inf, np.nan])

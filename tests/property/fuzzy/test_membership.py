@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.fuzzy.membership import breakpoints, join_ends, memberships, uniform_weights
+from cpfls_cli.fuzzy.basis import breakpoints, join_ends, memberships, uniform_weights
 
 genes = st.lists(st.integers(0, 2**16 - 1) | st.just(0), max_size=8).filter(lambda a: not a or sum(a) > 0)
 positive_genes = st.lists(st.integers(300, 2**16 - 1), min_size=1, max_size=8)

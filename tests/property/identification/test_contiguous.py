@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.identification.cross_validation import contiguous_blocks
 from cpfls_cli.identification.data import split_flight
+from cpfls_cli.identification.solver import contiguous_blocks
 
 times = st.lists(st.floats(1e-3, 0.5), min_size=1, max_size=60).map(np.cumsum)
 embargoes = st.floats(0, 2)

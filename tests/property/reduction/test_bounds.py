@@ -4,8 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.reduction.criteria import largest_eigenvalue_bound, smallest_eigenvalue_bound
-from cpfls_cli.reduction.lazy_search import eigenvalues_below
+from cpfls_cli.reduction.criteria import eigenvalues_below, largest_eigenvalue_bound, smallest_eigenvalue_bound
 
 seeds = st.integers(0, 2**32 - 1)
 columns = st.integers(1, 7)

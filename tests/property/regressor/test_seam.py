@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.fuzzy.membership import breakpoints
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges
+from cpfls_cli.fuzzy.basis import breakpoints
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 SEESAW = model_structure(StructureSettings(consequents="seesaw", products="additive", membership_functions=5))

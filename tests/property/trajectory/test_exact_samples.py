@@ -9,9 +9,8 @@ from math import factorial
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import plan_moves
-from cpfls_cli.trajectory.profile import BaseProfile
+from cpfls_cli.trajectory.legs import plan_moves
+from cpfls_cli.trajectory.profile import LIMIT_NAMES, BaseProfile, Limits
 
 _TURN = 2 * Decimal("3.14159265358979323846264338327950288419716939937510582097494459230781640629")
 # Sine and cosine after a quarter, a half, three quarters and the whole of a wave.

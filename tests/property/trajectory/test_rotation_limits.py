@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpfls_cli import rotations
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
+from cpfls_cli.dynamics import newton_euler_torque
 from cpfls_cli.trajectory.rotation import RotationLimits, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
 

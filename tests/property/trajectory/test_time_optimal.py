@@ -5,8 +5,8 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
-from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import MoveOutcome, plan_moves
+from cpfls_cli.trajectory.legs import MoveOutcome, plan_moves
+from cpfls_cli.trajectory.profile import LIMIT_NAMES, Limits
 
 CASES = 50_000
 

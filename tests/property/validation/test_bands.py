@@ -8,14 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics import InertiaFunctions
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.validation import bands
-from cpfls_cli.validation.bands import band, inertia_band, torque_band
-from cpfls_cli.validation.bootstrap import bootstrap
+from cpfls_cli.validation.bands import band, bootstrap, inertia_band, torque_band
 from tests.builders.flights import random_motion
 
 SAMPLES = 240

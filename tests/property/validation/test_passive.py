@@ -5,11 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.fuzzy.inputs import InputRange
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import uniform_breakpoints
+from cpfls_cli.dynamics import InertiaFunctions, coriolis_matrix
+from cpfls_cli.fuzzy.basis import InputRange
+from cpfls_cli.regressor.regressor import Motion, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 SEESAW = {"consequents": "seesaw", "products": "additive", "membership_functions": 5}

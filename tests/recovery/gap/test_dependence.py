@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from cpfls_cli.dynamics.rigid_body import inertia_tensor
+from cpfls_cli.dynamics import inertia_tensor
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation

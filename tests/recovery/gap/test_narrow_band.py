@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.dynamics.rigid_body import inertia_tensor
+from cpfls_cli.dynamics import inertia_tensor
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.residual.narrow_band import narrow_band

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.excitation.optimise import optimised_rotation
+from cpfls_cli.dynamics import newton_euler_torque
+from cpfls_cli.excitation import optimised_rotation
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.regressor.structure import StructureSettings
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.rotation import full_rotation

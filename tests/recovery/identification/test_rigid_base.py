@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import rigid_columns
+from cpfls_cli.dynamics import rigid_columns
 from cpfls_cli.identification.data import TorqueData, axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines

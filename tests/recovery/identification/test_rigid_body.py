@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli import rotations
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
+from cpfls_cli.dynamics import newton_euler_torque
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 
 INERTIA = np.diag([0.6, 0.65, 1.2])
 TRAINING = {"turns": (3.0, -4.0, 1.0), "seed": 24}

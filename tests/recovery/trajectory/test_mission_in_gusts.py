@@ -7,8 +7,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from cpfls_cli.simulation.room_left import room_left
 from cpfls_cli.trajectory.excited import added_motion
-from cpfls_cli.trajectory.planning import plan
-from cpfls_cli.trajectory.repeats import repeated
+from cpfls_cli.trajectory.planning import plan, repeated
 from cpfls_cli.trajectory.settings import ExciteSettings, TrajectorySettings
 from tests.builders import gusty_flights
 from tests.builders.gusty_flights import EVERY, GRAVITY, GUSTS, LARGE, MEMORY_S, SMALL, STEP_S, Flight

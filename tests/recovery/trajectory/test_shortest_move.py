@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import minimize
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import MoveOutcome, plan_moves
+from cpfls_cli.trajectory.legs import MoveOutcome, plan_moves
+from cpfls_cli.trajectory.profile import LIMIT_NAMES, Limits
 
 _DOUBLING = np.log([1.0, 1.0, 2.0, 4.0, 8.0])
 

@@ -3,17 +3,14 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque, rigid_columns
+from cpfls_cli.dynamics import InertiaFunctions, newton_euler_torque, rigid_columns
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
-from cpfls_cli.validation.bands import band, inertia_band
-from cpfls_cli.validation.bootstrap import BlockScores, bootstrap
+from cpfls_cli.validation.bands import BlockScores, band, bootstrap, inertia_band
 from tests.builders.flights import coloured_noise
 
 RUNS, SAMPLES, BLOCKS, DRAWS = 200, 2000, 40, 200

@@ -8,13 +8,11 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
-from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.dynamics import InertiaFunctions, coriolis_matrix
+from cpfls_cli.fuzzy.basis import InputRange
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import uniform_breakpoints
+from cpfls_cli.regressor.regressor import Motion, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.validation.replay import replay_steps
 from tests.builders.flights import rigid_torque, rotating_motion

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions, visited_cells
+from cpfls_cli.dynamics import InertiaFunctions, visited_cells
 from cpfls_cli.identification import data
 from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.regressor.regressor import uniform_breakpoints
-from cpfls_cli.validation.bootstrap import bootstrap, missed_torque
-from cpfls_cli.validation.timeline import time_blocks
+from cpfls_cli.validation.bands import bootstrap, missed_torque
+from cpfls_cli.validation.residuals import time_blocks
 from cpfls_cli.validation.validate import curves, round_trip, simulated_torque
 from tests.builders.flights import bent_torque, random_flight
 

@@ -3,15 +3,13 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics import InertiaFunctions
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import uniform_breakpoints
-from cpfls_cli.validation.bands import inertia_band
-from cpfls_cli.validation.bootstrap import bootstrap
+from cpfls_cli.regressor.regressor import Motion, uniform_breakpoints
+from cpfls_cli.validation.bands import bootstrap, inertia_band
 from tests.builders.flights import bent_torque, coloured_noise
 
 RUNS, SAMPLES, NOISE = 40, 1200, 0.05

@@ -10,9 +10,8 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.validation.evidence import Evidence
-from cpfls_cli.validation.paired import Comparison, compare_torque
-from cpfls_cli.validation.physical import physical_sense
+from cpfls_cli.validation.bands import physical_sense
+from cpfls_cli.validation.evidence import Comparison, Evidence, compare_torque
 from cpfls_cli.validation.replay import replay_steps
 from cpfls_cli.validation.residuals import examine_residuals
 from cpfls_cli.validation.verdict import good_axes, verdict

@@ -9,9 +9,9 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings, ValidationSettings
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.rotations import generalised_torque
-from cpfls_cli.validation.paired import compare_torque
+from cpfls_cli.validation.evidence import compare_torque
 from cpfls_cli.validation.validate import validate
 from tests.builders.flights import bent_torque, coloured_noise, rigid_torque
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
+from cpfls_cli.dynamics import InertiaFunctions
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 ALL_ROUND = np.eye(72, dtype=bool)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.output import write_text
-from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.reduction.selection import Selection
 from tests.builders.results import drawn

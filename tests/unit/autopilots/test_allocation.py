@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.autopilots.allocation import Allocation, Limits, factor_mix, px4_mix
-from cpfls_cli.autopilots.motors import ThrustCurve, mixing
+from cpfls_cli.autopilots.motors import Allocation, Limits, ThrustCurve, factor_mix, mixing, px4_mix
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from tests.builders.autopilots import CROSS
 from tests.builders.thinned_logs import CA, FRD, mixed_by_ardupilot, mixed_by_px4

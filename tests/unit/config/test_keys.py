@@ -4,7 +4,7 @@ from typing import get_args
 
 import pytest
 
-from cpfls_cli.config.keys import commented_default, keys_of, known_keys
+from cpfls_cli.config.check import commented_default, keys_of, known_keys
 from cpfls_cli.config.load import load_study, parse_config, validate
 from cpfls_cli.config.study import SECTIONS, Study, resolved
 from cpfls_cli.errors import ConfigError

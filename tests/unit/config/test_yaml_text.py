@@ -2,7 +2,7 @@
 
 import pytest
 
-from cpfls_cli.config.yaml_text import parse_yaml, to_yaml
+from cpfls_cli.config.study import parse_yaml, to_yaml
 from cpfls_cli.errors import ConfigError
 
 

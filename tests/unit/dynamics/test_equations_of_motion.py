@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cpfls_cli import rotations
-from cpfls_cli.dynamics.equations_of_motion import turning_law
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
+from cpfls_cli.dynamics import inertia_matrix, inertia_matrix_gradient, turning_law
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.regressor import InertiaValues
 

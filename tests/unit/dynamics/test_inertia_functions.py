@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.equations_of_motion import coriolis_matrix
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions, visited_cells
+from cpfls_cli.dynamics import InertiaFunctions, coriolis_matrix, visited_cells
 from cpfls_cli.identification.evaluator import decode
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import data_ranges
+from cpfls_cli.regressor.regressor import Motion, data_ranges
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 STRUCTURES = {

@@ -5,14 +5,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from cpfls_cli import rotations
-from cpfls_cli.dynamics.equations_of_motion import (
+from cpfls_cli.dynamics import (
     RotationState,
     free_runs,
+    inertia_matrix,
+    inertia_matrix_gradient,
     momentum_form,
     runge_kutta_step,
     turning_law,
 )
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
 from cpfls_cli.effects.catalogue.payload import integrate
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.regressor import InertiaValues

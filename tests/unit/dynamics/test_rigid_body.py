@@ -1,6 +1,6 @@
 import numpy as np
 
-from cpfls_cli.dynamics.rigid_body import inertia_matrix
+from cpfls_cli.dynamics import inertia_matrix
 from tests.builders.christoffel import torque
 
 MOMENTS = 0.6, 0.7, 1.2

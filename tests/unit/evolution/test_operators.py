@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.evolution.operators import (
+from cpfls_cli.evolution.engine import (
     gray_decode,
     gray_encode,
     intermediate_recombination,

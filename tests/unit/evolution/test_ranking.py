@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from cpfls_cli.evolution.ranking import positions, rank
+from cpfls_cli.evolution.archive import positions, rank
 
 # a, b and c do not dominate one another; d is dominated by b; e by all four.
 HAND_WORKED = np.array([[1.0, 4.0], [2.0, 2.0], [4.0, 1.0], [3.0, 3.0], [4.0, 4.0]])

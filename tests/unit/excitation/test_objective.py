@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.excitation.objective import (
+from cpfls_cli.excitation import (
+    adam,
     condition_number,
     conditioning,
     conditioning_gradient,
@@ -11,7 +12,6 @@ from cpfls_cli.excitation.objective import (
     regressor_of,
     variables_of,
 )
-from cpfls_cli.excitation.optimise import adam
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationLimits, RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.excitation.objective import condition_number
-from cpfls_cli.excitation.optimise import optimised_rotation
+from cpfls_cli.excitation import condition_number, optimised_rotation
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationLimits, full_rotation
 from cpfls_cli.trajectory.settings import RotationSettings
@@ -46,7 +45,7 @@ def test_limits_hold():
 
 
 def test_limits_hold_where_the_search_left_them(monkeypatch):
-    monkeypatch.setattr("cpfls_cli.excitation.objective._COSTS", (1e-9, 1e-9))
+    monkeypatch.setattr("cpfls_cli.excitation._COSTS", (1e-9, 1e-9))
     limits, seen = RotationLimits(RotationSettings()), []
     enforced = RotationLimits.enforced
     monkeypatch.setattr(RotationLimits, "enforced", lambda own, path: seen.append(path) or enforced(own, path))
@@ -70,7 +69,7 @@ def test_progress_counts_every_evaluation():
 
 
 def test_never_worse_than_the_random_path_it_began_with(monkeypatch):
-    monkeypatch.setattr("cpfls_cli.excitation.optimise._STEP", 10.0)
+    monkeypatch.setattr("cpfls_cli.excitation._STEP", 10.0)
     found = optimised(iterations=2)
     assert found.condition_number == pytest.approx(found.random.min(), rel=0.1)
 

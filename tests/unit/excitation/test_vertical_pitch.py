@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.excitation.objective import regressor_of
+from cpfls_cli.dynamics import newton_euler_torque
+from cpfls_cli.excitation import regressor_of
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.rotation import RotationPath
 from tests.builders.christoffel import torque

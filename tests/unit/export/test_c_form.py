@@ -5,9 +5,9 @@ import subprocess
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import vertical
+from cpfls_cli.dynamics import vertical
 from cpfls_cli.export.source import c_source
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from tests.builders.compiled_c import CHECKS, build, drive, driver, require_gcc, written
 from tests.builders.exported_models import CASES, Case, errors, model_of, sheet_of, short_runs, states, wanted_of
 

@@ -1,4 +1,4 @@
-"""The membership function and its copies, which `cpfls_cli.fuzzy.membership` lists, at the same points.
+"""The membership function and its copies, which `cpfls_cli.fuzzy.basis` lists, at the same points.
 
 A model of one function of roll whose rules have the coefficients 0, 1, 0, 1 ... gives the memberships themselves:
 with the Euler rates (0, 2, 0) and the accelerations (0, 1, 0) its torque is minus twice their slope about roll, and
@@ -14,17 +14,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cpfls_cli.export.acting import wrench_along
 from cpfls_cli.export.json_form import HOW_TO_EVALUATE_INERTIA
+from cpfls_cli.export.points import wrench_along
 from cpfls_cli.export.source import c_source, python_source
-from cpfls_cli.fuzzy.membership import Z_FUNCTION, memberships, z_function
+from cpfls_cli.fuzzy.basis import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.remainder import Remainder, learned_wrench
 from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from cpfls_cli.regressor import kernels
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor
+from cpfls_cli.regressor.regressor import Motion, Regressor
 from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 from cpfls_cli.vehicle.motion import Instant, Numbers
 from cpfls_cli.vehicle.settings import VehicleSettings

@@ -14,8 +14,7 @@ from cpfls_cli.gap.next_flight.room import harmonic_trajectory, random_path
 from cpfls_cli.simulation.inverse import flyability
 from cpfls_cli.simulation.room_left import room_left
 from cpfls_cli.trajectory.excited import added_motion
-from cpfls_cli.trajectory.planning import plan
-from cpfls_cli.trajectory.repeats import repeated
+from cpfls_cli.trajectory.planning import plan, repeated
 from cpfls_cli.trajectory.settings import ExciteSettings, TrajectorySettings, WaypointSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 

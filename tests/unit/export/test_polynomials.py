@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.export.acting import parts_along
-from cpfls_cli.export.points import reference_points
-from cpfls_cli.export.polynomials import NoPolynomialError, Polynomial, motion_terms, weights_of
+from cpfls_cli.export.numbers import NoPolynomialError, Polynomial, motion_terms, weights_of
+from cpfls_cli.export.points import parts_along, reference_points
 from tests.builders.vehicle_models import HEXA, QUAD, whole
 
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.export.acting import parts_along
-from cpfls_cli.export.points import reference_points
+from cpfls_cli.export.points import parts_along, reference_points
 from cpfls_cli.export.registry import exported
 from cpfls_cli.export.source import jax_parameters, jax_parts, python_source
 from cpfls_cli.playback.player import free_runs, player_of

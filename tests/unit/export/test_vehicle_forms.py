@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.equations_of_motion import turning_law
-from cpfls_cli.export.acting import parts_along, wrench_along
+from cpfls_cli.dynamics import turning_law
 from cpfls_cli.export.json_form import json_text
-from cpfls_cli.export.points import part_sizes, reference_points, reference_run
+from cpfls_cli.export.points import part_sizes, parts_along, reference_points, reference_run, wrench_along
 from cpfls_cli.export.source import c_source
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import MeasuredMotion, State

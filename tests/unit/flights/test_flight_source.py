@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cpfls_cli.artifacts.spec import InputFile
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
-from cpfls_cli.flights import flight_source as sources
 from cpfls_cli.flights import playback, recordings
+from cpfls_cli.flights import training as sources
 from cpfls_cli.flights.flight import MOTION, Imported, Simulated
 from cpfls_cli.store import Origin, write
 

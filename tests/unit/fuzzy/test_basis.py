@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.fuzzy.basis import antecedent, basis, features
-from cpfls_cli.fuzzy.inputs import input_range, map_input
-from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.fuzzy.basis import antecedent, basis, breakpoints, features, input_range, map_input
 
 WEIGHTS = {1: [], 2: [1.0], 3: [2.0, 3.0], 5: [2.0, 1.0, 3.0, 1.5], 7: [1.0, 2.0, 0.7, 1.5, 3.0, 1.2]}
 KINDS = [

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.fuzzy.basis import antecedent, basis, features
-from cpfls_cli.fuzzy.inputs import input_range, map_input, seesaw
-from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.fuzzy.basis import antecedent, basis, breakpoints, features, input_range, map_input, seesaw
 
 CONSEQUENTS = [("seesaw", 1, "additive"), ("harmonic", 1, "additive"), ("harmonic", 2, "tensor")]
 PARTITIONS = [breakpoints(np.array([2.0, 1.0, 3.0, 1.5])), breakpoints(np.array([1.0, 4.0, 2.0]))]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.fuzzy.membership import breakpoints, memberships
+from cpfls_cli.fuzzy.basis import breakpoints, memberships
 
 
 @pytest.mark.parametrize("functions", [2, 3, 5])

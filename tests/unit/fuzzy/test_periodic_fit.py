@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.fuzzy.basis import antecedent, basis, features
-from cpfls_cli.fuzzy.inputs import InputRange, map_input
-from cpfls_cli.fuzzy.membership import breakpoints
+from cpfls_cli.fuzzy.basis import InputRange, antecedent, basis, breakpoints, features, map_input
 from cpfls_cli.fuzzy.periodic_fit import PeriodicSettings, fit_periodic
 
 STRUCTURES = [

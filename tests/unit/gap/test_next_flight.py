@@ -31,7 +31,7 @@ from cpfls_cli.gap.settings import NOISE, RARE, GapSettings
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.simulation.room_left import squared_speeds
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
-from cpfls_cli.trajectory.limits import LimitSettings
+from cpfls_cli.trajectory.profile import LimitSettings
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.gap_artifacts import named_effect

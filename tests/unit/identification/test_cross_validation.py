@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.cross_validation import SMALLEST_ERROR, contiguous_blocks, ridge_curve
 from cpfls_cli.identification.samples import Products
+from cpfls_cli.identification.solver import SMALLEST_ERROR, contiguous_blocks, ridge_curve
 
 RIGID = 6
 WEIGHTS = np.geomspace(1e-6, 1e2, 5)

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import rigid_columns
+from cpfls_cli.dynamics import rigid_columns
 from cpfls_cli.identification.evaluator import LARGEST_GENE, Problem, decode, encode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor.motion import RIGID
-from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import RIGID, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders.flights import random_flight, rigid_torque
 

@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from cpfls_cli.dynamics.inertia_functions import outside_visited, visited_cells
+from cpfls_cli.dynamics import outside_visited, visited_cells
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.excitation import rule_excitation
+from cpfls_cli.identification.findings import rule_excitation
 from cpfls_cli.identification.samples import Ready, Samples
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import Motion, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 DEGREE = np.pi / 180

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, newton_euler_torque, not_positive_definite, why_unphysical
+from cpfls_cli.dynamics import inertia_matrix, newton_euler_torque, not_positive_definite, why_unphysical
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.excitation import axis_evidence
+from cpfls_cli.identification.findings import axis_evidence
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.settings import IdentificationSettings
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.rotations import body_rate, generalised_torque
 
 INERTIA = np.array([0.6, 0.7, 1.2, 0.0, 0.0, 0.0])

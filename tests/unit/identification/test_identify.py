@@ -8,7 +8,7 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.identify import identify
 from cpfls_cli.identification.search import SearchRun
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings, RidgeSettings
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from tests.builders.flights import random_flight, rigid_torque
 
 SMALL = {"population": 10, "generations": 2, "local_search": LocalSearchSettings(evaluations=2)}

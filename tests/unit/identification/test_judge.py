@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
+from cpfls_cli.dynamics import newton_euler_torque
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.judge import constant_inertia_columns, fit_baselines, score_of
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from tests.builders.flights import random_motion, still_flight
 
 

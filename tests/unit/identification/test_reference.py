@@ -5,14 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
+from cpfls_cli.dynamics import newton_euler_torque
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import LARGEST_GENE, Problem, decode, encode, refine, stepped
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings

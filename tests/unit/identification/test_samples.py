@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 
 from cpfls_cli.compiling import compiled
-from cpfls_cli.dynamics.rigid_body import rigid_columns
+from cpfls_cli.dynamics import rigid_columns
 from cpfls_cli.identification import data
-from cpfls_cli.identification.cross_validation import contiguous_blocks, with_folds
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import decode
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, RidgeSettings
+from cpfls_cli.identification.solver import contiguous_blocks, with_folds
 from cpfls_cli.regressor import kernels
-from cpfls_cli.regressor.motion import RIGID, Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import RIGID, Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from tests.builders.flights import no_torque, random_flight
 

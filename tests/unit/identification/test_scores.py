@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.identification.scores import Judged
+from cpfls_cli.identification.identify import Judged
 
 
 def scores(model, rigid, zero=(1.0, 1.0, 1.0)):

@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import rigid_columns
+from cpfls_cli.dynamics import rigid_columns
 from cpfls_cli.identification import data, samples, solver
 from cpfls_cli.identification.data import Flights, TorqueData, gathered, joined, sample_times
 from cpfls_cli.identification.evaluator import decode
-from cpfls_cli.identification.excitation import axis_evidence
+from cpfls_cli.identification.findings import axis_evidence
 from cpfls_cli.identification.identify import identify, model_evaluator
 from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges
 from tests.builders.flights import random_flight, rigid_torque
 
 SETTINGS = {

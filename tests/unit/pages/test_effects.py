@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.pages.effects import effect_title
+from cpfls_cli.pages.gap import effect_title
 from cpfls_cli.report.content import Table, unfolded
 from tests.builders import gap_artifacts as made
 

@@ -7,8 +7,7 @@ from cpfls_cli import page
 from cpfls_cli.report.canvas import picture_of
 from cpfls_cli.report.content import Box, Folded
 from cpfls_cli.response.flown import Responses, VehicleResponse
-from cpfls_cli.response.mismatch import ROTOR_SPEED, mismatch
-from cpfls_cli.response.spectra import FrequencyResponse
+from cpfls_cli.response.spectra import ROTOR_SPEED, FrequencyResponse, mismatch
 from cpfls_cli.result import plain
 from cpfls_cli.stage import loaded
 from cpfls_cli.store import findings

@@ -7,8 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.dynamics.equations_of_motion import turning_law
-from cpfls_cli.dynamics.rigid_body import inertia_matrix, inertia_matrix_gradient
+from cpfls_cli.dynamics import inertia_matrix, inertia_matrix_gradient, turning_law
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.errors import MODEL, NOTHING_MOVES, RATE_FADES, RATE_STAYS, STATED
 from cpfls_cli.playback.model import ModelEffect, VehicleModel

@@ -17,7 +17,7 @@ from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, tried_blocks
 from cpfls_cli.playback.windows import Loss
-from cpfls_cli.search.vehicle_search import KeptStructure
+from cpfls_cli.search import KeptStructure
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
 TRIED = ("linear_damping", "rotor_drag", "flapping_moment", "quadratic_damping", "inertia")

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.rigid_body import newton_euler_torque
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.dynamics import newton_euler_torque
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification.evaluator import decode
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import Regressor, data_ranges
+from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 ROLL, PITCH = 0, 1

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.report.numbers import (
+from cpfls_cli.report.content import (
     change,
     number,
     percent,

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.response.mismatch import clearness, judged_band, mismatch
-from cpfls_cli.response.spectra import FrequencyResponse
+from cpfls_cli.response.spectra import FrequencyResponse, clearness, judged_band, mismatch
 
 FREQUENCY = 10.0 ** (np.arange(-24, 25) / 24)
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.job import origin_before
-from cpfls_cli.artifacts.spec import InputFile
 from cpfls_cli.config.load import validate
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.evolution.engine import start, step
 from cpfls_cli.files import seal_of
 from cpfls_cli.identification.search import Unfinished
-from cpfls_cli.search.checkpoint import Checkpoint, SearchState
+from cpfls_cli.search import Checkpoint, SearchState
 
 INPUTS = {"flight": InputFile("f.h5", "a" * 64, "cpfls/flight"), "validate-1": InputFile("v.h5", "b" * 64, "csv")}
 

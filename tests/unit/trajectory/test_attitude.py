@@ -3,7 +3,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.rotations import rotation_matrix
-from cpfls_cli.trajectory.attitude import flat_attitude
+from cpfls_cli.trajectory.planning import flat_attitude
 
 GRAVITY = 9.81
 FREQUENCIES = np.array([1.3, 0.9, 1.7])

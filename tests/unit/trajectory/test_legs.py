@@ -3,9 +3,8 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
-from cpfls_cli.trajectory.legs import synchronised
-from cpfls_cli.trajectory.limits import Limits
-from cpfls_cli.trajectory.moves import MoveOutcome, plan_moves
+from cpfls_cli.trajectory.legs import MoveOutcome, plan_moves, synchronised
+from cpfls_cli.trajectory.profile import Limits
 
 DISPLACEMENTS = np.array([10.0, -4.0, 0.0, 0.5])
 LIMITS = Limits(

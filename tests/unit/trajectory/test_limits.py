@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import plan_move, plan_moves
+from cpfls_cli.trajectory.legs import plan_move, plan_moves
+from cpfls_cli.trajectory.profile import LIMIT_NAMES, Limits
 
 
 @pytest.mark.parametrize("key", LIMIT_NAMES)

@@ -8,8 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from cpfls_cli.errors import SettingError
 from cpfls_cli.trajectory.excited import added_motion
-from cpfls_cli.trajectory.planning import plan
-from cpfls_cli.trajectory.repeats import repeated
+from cpfls_cli.trajectory.planning import plan, repeated
 from cpfls_cli.trajectory.settings import ExciteSettings, TrajectorySettings, WaypointSettings
 
 GRAVITY = 9.81

@@ -1,7 +1,7 @@
 import pytest
 
 from cpfls_cli.errors import SettingError
-from cpfls_cli.trajectory.limits import LimitSettings
+from cpfls_cli.trajectory.profile import LimitSettings
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
 
 

@@ -3,9 +3,8 @@ from dataclasses import asdict, astuple
 import numpy as np
 import pytest
 
-from cpfls_cli.trajectory.limits import LIMIT_NAMES, Limits
-from cpfls_cli.trajectory.moves import MoveOutcome, plan_move, plan_moves
-from cpfls_cli.trajectory.profile import covering
+from cpfls_cli.trajectory.legs import MoveOutcome, plan_move, plan_moves
+from cpfls_cli.trajectory.profile import LIMIT_NAMES, Limits, covering
 
 PAPER = {"velocity": 8.0, "acceleration": 2.0, "jerk": 1.0, "snap": 1.0, "crackle": 2.0, "pop": 2 * np.pi}
 

@@ -8,8 +8,7 @@ import pytest
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.tuning.gains import AskedMargins, proposal_of, with_filters
 from cpfls_cli.tuning.margins import evaluate
-from cpfls_cli.tuning.noise import noise_of
-from cpfls_cli.tuning.plant import Spread, hover_plant
+from cpfls_cli.tuning.plant import Spread, hover_plant, noise_of
 from tests.builders.autopilots import CROSS
 
 CERTAIN = Spread()

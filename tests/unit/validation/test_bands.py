@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.dynamics import InertiaFunctions
+from cpfls_cli.fuzzy.basis import InputRange
 from cpfls_cli.regressor.regressor import uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
-from cpfls_cli.validation.bands import definite_share
-from cpfls_cli.validation.bootstrap import Draws
-from cpfls_cli.validation.physical import cell_centres
+from cpfls_cli.validation.bands import Draws, cell_centres, definite_share
 
 RANGE = InputRange(-1.0, 1.0)
 BODY = np.array([0.6, 0.8, 1.2, 0.05, 0.0, -0.03])

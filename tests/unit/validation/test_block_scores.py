@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from cpfls_cli.validation.bootstrap import BlockScores
+from cpfls_cli.validation.bands import BlockScores
 
 BLOCKS, ROWS, PARAMETERS = 6, 9, 5
 TOLERANCE = 1e-10

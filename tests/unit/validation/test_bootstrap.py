@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import rigid_columns
+from cpfls_cli.dynamics import InertiaFunctions, rigid_columns
 from cpfls_cli.identification import data
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.evaluator import decode, uniform_chromosome
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
-from cpfls_cli.regressor.motion import RIGID
-from cpfls_cli.regressor.regressor import Regressor
-from cpfls_cli.validation.bootstrap import bootstrap
+from cpfls_cli.regressor.regressor import RIGID, Regressor
+from cpfls_cli.validation.bands import bootstrap
 from tests.builders.flights import bent_torque, random_flight
 
 DRAWS = 30

@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions, visited_cells
-from cpfls_cli.dynamics.rigid_body import inertia_matrix
+from cpfls_cli.dynamics import InertiaFunctions, inertia_matrix, visited_cells
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.regressor.motion import Motion
-from cpfls_cli.regressor.regressor import data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import Motion, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
-from cpfls_cli.validation.bands import inertia_band
-from cpfls_cli.validation.bootstrap import Draws
+from cpfls_cli.validation.bands import Draws, inertia_band
 from cpfls_cli.validation.validate import curves
 
 BEST = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])

@@ -7,9 +7,9 @@ from scipy.stats import binom
 
 from cpfls_cli.blocks import MOST_COMPARED
 from cpfls_cli.identification.data import Flights, TorqueData
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.rotations import generalised_torque
-from cpfls_cli.validation.paired import (
+from cpfls_cli.validation.evidence import (
     block_count,
     compare_errors,
     compare_torque,

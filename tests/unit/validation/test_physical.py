@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics.inertia_functions import InertiaFunctions
-from cpfls_cli.dynamics.rigid_body import inertia_matrix
-from cpfls_cli.fuzzy.inputs import InputRange
+from cpfls_cli.dynamics import InertiaFunctions, inertia_matrix
+from cpfls_cli.fuzzy.basis import InputRange
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.regressor import uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
-from cpfls_cli.validation.physical import physical_sense
+from cpfls_cli.validation.bands import physical_sense
 
 RANGE = InputRange(-1.0, 1.0)
 BODY = np.array([0.6, 0.8, 1.2, 0.05, 0.0, -0.03])

@@ -8,7 +8,7 @@ from scipy import signal
 from scipy.stats import binom, chi2, kstest
 
 from cpfls_cli.identification.data import TorqueData, joined
-from cpfls_cli.regressor.motion import Motion
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.validation import residuals
 from cpfls_cli.validation.residuals import examine_residuals
 

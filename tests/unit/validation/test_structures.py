@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from cpfls_cli.dynamics.rigid_body import rigid_columns
-from cpfls_cli.identification.cross_validation import contiguous_blocks
+from cpfls_cli.dynamics import rigid_columns
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.identify import model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
+from cpfls_cli.identification.solver import contiguous_blocks
 from cpfls_cli.regressor.regressor import Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.validation.structures import RIGID_BODY_NAME, candidate_structures, compare_structures, structure_name

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.identification.data import Flights
-from cpfls_cli.validation.timeline import (
+from cpfls_cli.validation.residuals import (
     lagged_pairs,
     sample_numbers,
     sample_period,

@@ -1,11 +1,13 @@
-"""What a stopped search leaves next to its output, and whether a command may go on from it."""
+"""Searches that go on: what a stopped one leaves next to its output, and whether a command may go on from it."""
 
 from __future__ import annotations
 
 import json
+import os
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
@@ -13,18 +15,26 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.artifacts.job import Interrupted, Job, check_outputs, origin_before, take_inputs
+from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.config.load import flat_keys, parse_config
 from cpfls_cli.errors import ComputationError, InputError, OutputError
-from cpfls_cli.evolution.archive import Archive, Evaluation
+from cpfls_cli.errors import about as about_option
+from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
 from cpfls_cli.evolution.engine import EvolutionState, History
 from cpfls_cli.files import is_hdf5
-from cpfls_cli.identification.search import Unfinished
+from cpfls_cli.identification.search import SearchRun, SearchStep, Stop, StopReason, Unfinished, is_end
+from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structure
 from cpfls_cli.result import about, part, result
 from cpfls_cli.store import Origin, format_name, read, write
+from cpfls_cli.workers.processes import employ, require_address
+from cpfls_cli.workers.workforce import WorkerError, Workforce
 
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.vehicle_model import Vehicle
+
 
 T = TypeVar("T")
 Genes = np.ndarray[Any, np.dtype[np.uint16]]
@@ -314,3 +324,233 @@ def differences(
 def _short(value: Any) -> str:
     text = json.dumps(value, ensure_ascii=False) if isinstance(value, Mapping | list) else str(value)
     return textwrap.shorten(text, _LONGEST, placeholder=" ...")
+
+
+_OF_A_PROCESSOR = 8
+"""Processes that a processor may get, of which more than one only share it."""
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How a command runs its search; nothing of it changes what a search that comes to its end finds.
+
+    Attributes
+    ----------
+    resume : bool
+        Go on from the checkpoint.
+    time_limit_s : float or None
+        Stop the search after so much time, and keep what it has.
+    workers : int
+        Processes that evaluate.
+    scheduler : str or None
+        Address of a Dask scheduler whose workers evaluate.
+    """
+
+    resume: bool = False
+    time_limit_s: float | None = None
+    workers: int = 1
+    scheduler: str | None = None
+
+    @property
+    def workers_option(self) -> str:
+        """The option that names the workers, as it is typed."""
+        return f"--workers {self.workers}" if self.scheduler is None else f"--scheduler {self.scheduler}"
+
+    def employed(self, evaluate: Evaluate) -> AbstractContextManager[Workforce]:
+        """Employ the workers that evaluate."""
+        return employ(evaluate, count=self.workers, scheduler=self.scheduler)
+
+    def require_workers(self) -> None:
+        """Refuse more processes than this machine can run, and a scheduler beside them or without an address."""
+        if self.scheduler is not None and self.workers > 1:
+            raise InputError("--scheduler: brings its own workers; leave out --workers")
+        if self.scheduler is not None:
+            require_address(self.scheduler)
+        processors = os.cpu_count() or 1
+        if self.workers > _OF_A_PROCESSOR * processors:
+            raise InputError(f"--workers {self.workers}: this machine has {processors} processors; give that many")
+
+
+class Watch:
+    """Decides when a search has to stop: at an interrupt, or at its time limit.
+
+    Parameters
+    ----------
+    time_limit_s : float or None
+        From now on.
+    """
+
+    def __init__(self, job: Job, time_limit_s: float | None) -> None:
+        self._job = job
+        self._end = None if time_limit_s is None else time.monotonic() + time_limit_s
+        self._interrupted: Interrupted = lambda: None
+
+    @property
+    def signal(self) -> int | None:
+        """Number of the signal that asked to stop, or None."""
+        return self._interrupted()
+
+    @contextmanager
+    def deferring(self) -> Iterator[None]:
+        """Turn an interrupt into a request to stop, for work inside that asks this watch."""
+        with self._job.deferred_interrupts() as self._interrupted:
+            yield
+
+    def should_stop(self) -> Stop | None:
+        """Give the reason to stop now, or None."""
+        if self.signal is not None:
+            return "interrupted"
+        return "time-limit" if self._end is not None and time.monotonic() >= self._end else None
+
+
+@dataclass(frozen=True)
+class Resumable:
+    """One search, its checkpoint, and where to go on; None to start."""
+
+    checkpoint: Checkpoint
+    stopped: StoppedSearch | None
+
+    def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
+        """Arrange how the search is run; from here on a checkpoint that is not resumed is given up.
+
+        Interrupts are deferred as long as its workers are employed, which is as long as it searches.
+        """
+        if self.stopped is None:
+            self.checkpoint.remove()
+
+        @contextmanager
+        def workers(evaluate: Evaluate) -> Iterator[Workforce]:
+            with (
+                about_option(options.workers_option, WorkerError),
+                watch.deferring(),
+                options.employed(evaluate) as workforce,
+            ):
+                yield workforce
+
+        return SearchRun(
+            resumed=self.stopped.state if self.stopped else None,
+            unfinished=self.stopped.unfinished if self.stopped else None,
+            workers=workers,
+            progress=progress,
+            on_generation=self.checkpoint.write,
+            on_stop=self.checkpoint.add,
+            should_stop=watch.should_stop,
+        )
+
+    def kept(self) -> AbstractContextManager[None]:
+        """Add to whatever fails inside that the search can go on nevertheless."""
+        return self.checkpoint.kept()
+
+    def end(self, reason: StopReason) -> None:
+        """Remove the checkpoint of a search that came to its end, after what it found is written."""
+        if is_end(reason):
+            self.checkpoint.remove()
+
+
+def begin_search(
+    job: Job, inputs: Mapping[str, Path], options: SearchOptions
+) -> tuple[dict[str, InputFile], Resumable]:
+    """Check inputs, checkpoint and output of a search before anything is computed."""
+    options.require_workers()
+    files = take_inputs(job, inputs)
+    header = origin_before(job.study, files)
+    search = resumable(job.output, header, resume=options.resume, force=job.force)
+    check_outputs(job, job.output, replaceable=options.resume and search.checkpoint.output_may_be_replaced())
+    return files, search
+
+
+def resumable(output: Path, header: Origin, *, resume: bool, force: bool) -> Resumable:
+    """Find the checkpoint beside the output of a search, and read it where the search is to go on.
+
+    `force` allows a checkpoint to be given up.
+    """
+    checkpoint = Checkpoint.beside(output, header)
+    if resume:
+        return Resumable(checkpoint, checkpoint.read())
+    checkpoint.require_permission(force=force)
+    return Resumable(checkpoint, None)
+
+
+_OF_VEHICLE = ("vehicle", "import", "playback")
+"""Sections of the config that the search depends on."""
+
+
+@result
+class KeptStructure:
+    """A structure that was judged: its fits to all parts of the flights first, then without each of them."""
+
+    blocks: tuple[str, ...] = about("its blocks", "block")
+    rules: int = about("rules of its remainder")
+    order: int = about("order of the harmonics of its remainder")
+    loss: Array = about("of each fit", "fit")
+    values: Array = about("numbers of all fits, one fit after another", "value", unit="SI", ragged=True)
+    hessian: Array = about("curvatures of the fit to all parts by rows", "curvature", ragged=True)
+
+    @classmethod
+    def of(cls, judged: Judged) -> KeptStructure:
+        """Take the fits of a structure."""
+        fits, rules = (judged.fit, *judged.without), judged.structure.rules
+        return cls(
+            blocks=judged.structure.blocks,
+            rules=rules[0],
+            order=rules[1],
+            loss=np.array([each.loss for each in fits]),
+            values=np.concatenate([each.values for each in fits]),
+            hessian=judged.fit.hessian.ravel(),
+        )
+
+    @property
+    def pair(self) -> tuple[Structure, Solution]:
+        """The structure and its fits, equal to what was stored down to the last bit."""
+        values = self.values.reshape(len(self.loss), -1)
+        hessian = self.hessian.reshape(2 * values.shape[1:])
+        return Structure(self.blocks, Rules(self.rules, self.order)), Solution(
+            tuple(values), tuple(self.loss.tolist()), hessian
+        )
+
+
+@result
+class KeptStructures:
+    """An unfinished search for the structure of a vehicle: what was fitted so far, in the order of the search."""
+
+    FORMAT: ClassVar = "cpfls/vehicle-checkpoint"
+    MADE_BY: ClassVar = "vehicle"
+
+    structures: tuple[KeptStructure, ...] = part(brief=False)
+
+
+@dataclass(frozen=True)
+class VehicleCheckpoint(KeptFile):
+    """Where a search for the structure of a vehicle leaves what it has judged."""
+
+    WORK: ClassVar = "search"
+    SUFFIX: ClassVar = ".checkpoint"
+    OUTPUT: ClassVar = Vehicle
+
+    def write(self, judged: Sequence[Judged]) -> None:
+        """Replace what was there by these structures, or leave it as it was."""
+        write(self.path, KeptStructures(structures=tuple(map(KeptStructure.of, judged))), self.header)
+
+    def read(self) -> Kept:
+        """Take up what was left."""
+        left, origin = self._read(KeptStructures)
+        with self._damaged():
+            kept = dict(each.pair for each in left.structures)
+        old, new = (keys_of(header, _OF_VEHICLE) for header in (origin, self.header))
+        self._require_same(differences(origin, self.header, old, new, unimportant="held-out"))
+        return kept
+
+
+def begin_vehicle_search(
+    job: Job, files: Mapping[str, InputFile], *, resume: bool
+) -> tuple[VehicleCheckpoint, Kept | None]:
+    """Check checkpoint and output of a search for the structure of a vehicle before anything is computed.
+
+    The solutions that are kept tell where to go on; None to start.
+    """
+    checkpoint = VehicleCheckpoint.beside(job.output, origin_before(job.study, files, "vehicle-checkpoint"))
+    kept = checkpoint.read() if resume else None
+    if kept is None:
+        checkpoint.require_permission(force=job.force)
+    check_outputs(job, job.output, replaceable=resume and checkpoint.output_may_be_replaced())
+    return checkpoint, kept

@@ -1,1 +1,0 @@
-"""Paths that excite all parameters of a model, by optimal design of the experiment."""

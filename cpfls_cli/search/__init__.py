@@ -1,1 +1,0 @@
-"""Searches that leave checkpoints and go on from them."""
