@@ -1,4 +1,9 @@
-"""Rotation in Euler coordinates (intrinsic ZYX): rigid body, learned inertia, equations of motion, integration."""
+"""Rotation in Euler coordinates (intrinsic ZYX): rigid body, learned inertia, equations of motion, integration.
+
+Models in Euler coordinates turn by ``J(q) qdd + C(q, qd) qd = tau``. What turns, whether flown with effects or
+replayed, turns by one law (`turning_law`), which keeps inertia and torque apart; a noisy flight is balanced without
+differentiating its rates (`momentum_form`).
+"""
 
 from __future__ import annotations
 
@@ -14,7 +19,7 @@ from cpfls_cli.fuzzy.basis import InputRange
 from cpfls_cli.inertia import INERTIA_ENTRIES, MEASURED, body_torque_columns, symmetric
 from cpfls_cli.regressor.regressor import InertiaValues, Motion, Regressor
 from cpfls_cli.regressor.structure import ModelStructure
-from cpfls_cli.result import about, part
+from cpfls_cli.result import BODY, EULER, about, part
 from cpfls_cli.rotations import wrapped
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -452,18 +457,14 @@ class InertiaFunctions:
         "of the rule consequents, by inertia function, rule and feature",
         "rule_coefficient",
         unit="kg m^2",
-        frame="Euler angles (intrinsic ZYX)",
+        frame=EULER,
         brief=False,
     )
     rigid_body: Array = about(
-        "Ixx Iyy Izz Ixy Ixz Iyz under the fuzzy part; zero for none", "6", unit="kg m^2", frame="body (FLU)"
+        "Ixx Iyy Izz Ixy Ixz Iyz under the fuzzy part; zero for none", "6", unit="kg m^2", frame=BODY
     )
     visited: BoolArray = about(
-        "cells of roll and pitch that training visited",
-        "cell",
-        "cell",
-        frame="Euler angles (intrinsic ZYX)",
-        brief=False,
+        "cells of roll and pitch that training visited", "cell", "cell", frame=EULER, brief=False
     )
 
     def torque(self, motion: Motion) -> Array:

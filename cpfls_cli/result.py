@@ -30,6 +30,9 @@ from cpfls_cli.settings import Settings
 T = TypeVar("T")
 _UNIONS = (Union, UnionType)
 
+EULER, BODY, WORLD = "Euler angles (intrinsic ZYX)", "body (FLU)", "world (z up)"
+"""Frames of reference."""
+
 AXES = {"axis": 3}
 """Axes of arrays whose name says their length."""
 

@@ -29,8 +29,7 @@ from cpfls_cli.identification.search import SearchRun, SearchStep, Stop, StopRea
 from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structure
 from cpfls_cli.result import about, part, result
 from cpfls_cli.store import Origin, format_name, read, write
-from cpfls_cli.workers.processes import employ, require_address
-from cpfls_cli.workers.workforce import WorkerError, Workforce
+from cpfls_cli.workers.workforce import WorkerError, Workforce, employ, require_address
 
 if TYPE_CHECKING:
     from cpfls_cli.artifacts.vehicle_model import Vehicle

@@ -28,10 +28,6 @@ CONFIG = "config"
 INPUTS = "inputs"
 """Path of the group with one group for each input file, by role."""
 
-EULER = "Euler angles (intrinsic ZYX)"
-BODY = "body (FLU)"
-WORLD = "world (z up)"
-
 PART = 8192
 """Samples of a compressed artifact that are written at a time, each such part compressed on its own."""
 

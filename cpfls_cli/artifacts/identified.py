@@ -17,7 +17,7 @@ from cpfls_cli.identification.search import Front, StopReason, is_end
 from cpfls_cli.identification.solver import RidgeCurve
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.result import about, part, result
+from cpfls_cli.result import BODY, EULER, about, part, result
 from cpfls_cli.validation.bands import Draws, Physics
 from cpfls_cli.validation.replay import StepErrors
 from cpfls_cli.validation.residuals import ResidualAnalysis
@@ -60,12 +60,8 @@ class IdentifiedModel(AnyModel):
     history: History = part()
     stop_reason: StopReason = about("why the search ended: generations, converged, time-limit or interrupted")
     judged: Judged = part()
-    rigid_body: Array = about(
-        "six inertia parameters of the rigid body that fits best", "6", unit="kg m^2", frame="body (FLU)"
-    )
-    constant_inertia: Array = about(
-        "J11 J22 J33 J12 J13 J23, constant", "6", unit="kg m^2", frame="Euler angles (intrinsic ZYX)"
-    )
+    rigid_body: Array = about("six inertia parameters of the rigid body that fits best", "6", unit="kg m^2", frame=BODY)
+    constant_inertia: Array = about("J11 J22 J33 J12 J13 J23, constant", "6", unit="kg m^2", frame=EULER)
     ridge: RidgeCurve | None = part(default=None)
     """How the ridge weight was chosen, over a rigid body."""
     training_indices: IntArray = about("samples of the flights that trained", "sample", brief=False)

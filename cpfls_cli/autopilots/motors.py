@@ -1,4 +1,10 @@
-"""From asked thrust and turning to the speeds of motors: mixer, limits, thrust curve."""
+"""From asked thrust and turning to the speeds of motors: mixer, limits, thrust curve.
+
+Commands are allocated to rotors, for many samples at once, as autopilots do. Body axes are forward, right, down: roll
+to the right, pitch nose up and yaw clockwise are positive. Written from the public descriptions and sources of PX4
+(control allocation with sequential desaturation) and ArduPilot (AP_MotorsMatrix); where all fits between no and full
+thrust, both are one product of matrices.
+"""
 
 from __future__ import annotations
 

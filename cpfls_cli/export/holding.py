@@ -13,7 +13,7 @@ from cpfls_cli.dynamics import CELLS, InertiaFunctions, InertiaModel, body_inert
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.numbers import Numbers, motion_terms, weights_of, weights_of_model
+from cpfls_cli.export.numbers import Numbers, motion_terms, spins, weights_of, weights_of_model
 from cpfls_cli.export.points import parts_of
 from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -46,6 +46,8 @@ _NO_BODY = "inertia with a moment larger than the sum of the others, which no bo
 _PRODUCTS = "products of inertia"
 _WIND = "wind of its flights, {:.3g} and {:.3g} m/s along x and y of the world, which the simulated world must provide"
 FUZZY = "inertia that depends on the attitude"
+FOUR = 4
+"""Rotors that most simulators know."""
 
 Holds = Callable[[Array], Array]
 """From a table of weights, shape (6, terms, 1 + 4 rotors), to the part of it that a target holds; linear."""
@@ -203,16 +205,31 @@ class _Flown(Flown):
 def held_by(
     model: VehicleModel,
     holds: Holds,
-    response: RotorResponse,
     body: Body | None = None,
     numbers: Numbers | None = None,
     *,
+    lags: bool = False,
     squares: bool = False,
 ) -> Held:
-    """Take what a target of these rotors, this body, or the model's, and numbers of its own holds of a vehicle."""
-    weights = weights_of_model(model)
+    """Take what a target of this body, or the model's, numbers of its own, and rotors with a lag or none holds."""
+    weights, response = weights_of_model(model), RotorResponse(lag_s=model.response.lag_s if lags else 0.0)
     found = {} if numbers is None else numbers.of(weights)
     return Held(model.vehicle, holds(weights), response, body or model.body, squares, numbers=found)
+
+
+ANY_ROTORS = "--format mjcf, sdf, jax and casadi take any"
+
+
+def require_four(model: VehicleModel, pushes: str) -> None:
+    """Refuse a vehicle without four rotors for a target that `pushes` at, or mixes, no other number of them."""
+    if model.rotors != FOUR:
+        raise InputError(f"{pushes} four rotors, but this vehicle has {model.rotors}; {ANY_ROTORS} number")
+
+
+def require_two_each_way(model: VehicleModel, target: str) -> None:
+    """Refuse a vehicle for a target that turns four rotors, two each way, where it has others."""
+    if model.rotors != FOUR or spins(model.vehicle).sum():
+        raise InputError(f"{target} turns four rotors, two each way, which this vehicle has not; {ANY_ROTORS}")
 
 
 def constant_body(model: VehicleModel) -> Body:

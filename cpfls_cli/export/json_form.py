@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.artifacts.gate import BODY, EULER, WORLD
 from cpfls_cli.dynamics import CELLS, VERTICAL, InertiaFunctions
 from cpfls_cli.export.points import PERIOD, traced_wrench, units_of
 from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, Sheet, base_of, rule_labels
@@ -23,6 +22,7 @@ from cpfls_cli.fuzzy.basis import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.regressor.structure import Block
+from cpfls_cli.result import BODY, EULER, WORLD
 from cpfls_cli.vehicle.tracing import PYTHON
 
 _WHITE = ("torque_white_n_m_sqrt_s", "force_white_n_sqrt_s")

@@ -1,4 +1,8 @@
-"""Simulators with numbers of their own: their equations as weights, the numbers that come nearest, as polynomials."""
+"""Simulators with numbers of their own: their equations as weights, the numbers that come nearest, as polynomials.
+
+What acts on a vehicle is weights of terms, each of the motion times one of the rotors. Polynomials are numbers that the
+vehicle is evaluated with (`cpfls_cli.vehicle.values`).
+"""
 
 from __future__ import annotations
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement
-from cpfls_cli.artifacts.gate import BODY, EULER, WORLD, DatasetSpec
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
@@ -33,7 +32,7 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.recorded import HELD_OUT, RecordedFlight
 from cpfls_cli.playback.along_flights import Playback
 from cpfls_cli.response.flown import Responses
-from cpfls_cli.result import described_fields
+from cpfls_cli.result import BODY, EULER, WORLD, About, described_fields
 from cpfls_cli.simulation.twin import Twin
 from cpfls_cli.simulation.twin_flight import FRAMES, UNITS
 from cpfls_cli.units import known_unit
@@ -73,38 +72,38 @@ def _log_time(time: Array, begins: float) -> Array:
     return np.asarray(time + begins if np.isfinite(begins) else time)
 
 
-def _axes(spec: DatasetSpec, values: Array) -> tuple[str, ...]:
+def _axes(about: About, values: Array) -> tuple[str, ...]:
     if values.ndim == 1:
         return ()
-    if values.shape[1] == len(AXES) and spec.dimensions[1:] == ("axis",):
-        return ANGLES if spec.frame == EULER else AXES
+    if values.shape[1] == len(AXES) and about.axes[1:] == ("axis",):
+        return ANGLES if about.frame == EULER else AXES
     return tuple(str(number + 1) for number in range(values.shape[1]))
 
 
 def _signals(
-    flight: str, time: Array, signals: Mapping[str, Array], specs: Mapping[str, DatasetSpec], units: Mapping[str, str]
+    flight: str, time: Array, signals: Mapping[str, Array], abouts: Mapping[str, About], units: Mapping[str, str]
 ) -> Iterator[Track]:
     """Put each setpoint beside what it is a setpoint of, where both have one unit."""
     for name, values in signals.items():
         own = name.removeprefix(_ASKED)
-        unit = units.get(name, specs[name].units)
-        if own != name and own in signals and units.get(own, specs[own].units) == unit:
+        unit = units.get(name, abouts[name].unit)
+        if own != name and own in signals and units.get(own, abouts[own].unit) == unit:
             continue
         asked = signals.get(_ASKED + own)
-        beside = own == name and asked is not None and units.get(_ASKED + own, specs[_ASKED + own].units) == unit
+        beside = own == name and asked is not None and units.get(_ASKED + own, abouts[_ASKED + own].unit) == unit
         held = {SETPOINT if own != name else MEASURED: values}
         if beside and asked is not None:
             held[SETPOINT] = asked.reshape(values.shape)
-        spec = specs[name]
+        about = abouts[name]
         yield Track(
             name=own,
             time=time,
             values=held,
             unit=unit,
-            frame=spec.frame,
-            description=spec.description,
+            frame=about.frame,
+            description=about.text,
             flight=flight,
-            axes=_axes(spec, values),
+            axes=_axes(about, values),
         )
 
 
@@ -123,14 +122,11 @@ def _pose(child: str, time: Array, attitude: Array | None, position: Array | Non
 
 def _of_flight(title: str, given: Flight, study: Study) -> View:
     time = _log_time(given.time, given.begins)
-    specs = {
-        name: DatasetSpec(name, own.axes, own.unit, own.frame, own.text) for name, own in Flight.about_signals().items()
-    }
     signals = {name: values for name, values in given.signals.items() if name != "time"}
     units = _units_of(study, imported=isinstance(given, Imported))
     return View(
         title,
-        tuple(_signals("", time, signals, specs, units)),
+        tuple(_signals("", time, signals, Flight.about_signals(), units)),
         poses=_pose(BODY_FRAME, time, given.attitude, given.position),
         stamps=_stamps(study),
         on_log_clock=bool(np.isfinite(given.begins)),
@@ -202,11 +198,7 @@ def _short(name: str) -> str:
     return Path(stem).stem + (f"_{part.rstrip(')').replace(' ', '_')}" if part else "")
 
 
-_SPECS = {
-    each.name: DatasetSpec(each.name, each.about.axes, each.about.unit, each.about.frame, each.about.text)
-    for each in described_fields(RecordedFlight)
-    if each.about
-}
+_ABOUT = {each.name: each.about for each in described_fields(RecordedFlight) if each.about}
 
 
 def _flown(flights: Mapping[str, RecordedFlight]) -> Iterator[tuple[str, RecordedFlight]]:
@@ -229,7 +221,7 @@ def _of_disagreement(title: str, given: Disagreement, study: Study) -> View:
     tracks: list[Track] = []
     floor, residual = given.sizes.floor, given.residual
     for index, (name, flight) in enumerate(_flown(given.recorded)):
-        tracks += _signals(name, _log_time(flight.time, flight.begins), flight.signals, _SPECS, {})
+        tracks += _signals(name, _log_time(flight.time, flight.begins), flight.signals, _ABOUT, {})
         at = np.flatnonzero(residual.flight == index)
         values = {DIFFERENCE: residual.value[at], "floor": np.broadcast_to(floor, (len(at), len(CHANNELS)))}
         about = "what inertia and rotors leave of the motion, mean over a window; measured less model"
@@ -247,7 +239,7 @@ def _of_diagnosis(title: str, given: Diagnosis, study: Study) -> View:
     held, residual = 0, given.residual
     for name, flight in _flown(given.recorded):
         places[flight.name] = name, flight.begins
-        tracks += _signals(name, _log_time(flight.time, flight.begins), flight.signals, _SPECS, {})
+        tracks += _signals(name, _log_time(flight.time, flight.begins), flight.signals, _ABOUT, {})
         if flight.role != HELD_OUT:
             continue
         at = np.flatnonzero(residual.flight == held)

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.gate import BODY, EULER, WORLD, Origin, read_origin
+from cpfls_cli.artifacts.gate import Origin, read_origin
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.results import ImportedFlight, ImportReport
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.regressor.regressor import Motion
-from cpfls_cli.result import About, about, described_fields, part, result
+from cpfls_cli.result import BODY, EULER, WORLD, About, about, described_fields, part, result
 from cpfls_cli.store import read
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.gate import BODY, EULER, WORLD
 from cpfls_cli.gap.settings import RARE
-from cpfls_cli.result import about, part, result
+from cpfls_cli.result import BODY, EULER, WORLD, about, part, result
 
 if TYPE_CHECKING:
     from cpfls_cli.excitation import Excitation

@@ -1,4 +1,20 @@
-"""Memberships, inputs and basis functions of a fuzzy system: firing times features, with gradients by the angles."""
+"""Memberships, inputs and basis functions of a fuzzy system: firing times features, with gradients by the angles.
+
+The formula is that of `z_function`: the falling edge of a function over the position u between its own peak (0) and
+the next one (1). All else of a partition follows from it, whatever its shape: the next function rises as 1 minus it,
+and the slopes follow by the chain rule. It has to fall from 1 to 0, with slope 0 at both ends: else the torque jumps.
+
+Another formula is written here, and in the copies that stand where this one cannot be called:
+
+- `cpfls_cli.regressor.kernels`, `_z_function`: the compiled loops of the search. numba caches compiled code by its
+  file, and would not notice that a function which it compiled in from another file has changed.
+- `cpfls_cli.playback.remainder`, `_blended`: the vehicle in any kind of numbers, which simulation and exports trace.
+- `cpfls_cli/export/templates/model.c.j2`, `rules_of`, and `model.py.j2`, `_firing`, this in NumPy, CasADi and JAX: over
+  the attitude. They run without this package; `tests/unit/export/test_simulators.py` flies them.
+- `Z_FUNCTION` here, the words that the JSON of a model carries, and docs/method.md section 4.
+
+`tests/unit/export/test_membership.py` evaluates all of them at the same points.
+"""
 
 from __future__ import annotations
 

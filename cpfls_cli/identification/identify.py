@@ -24,7 +24,7 @@ from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import Fit, RidgeCurve, Solver, with_folds
 from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
 from cpfls_cli.regressor.structure import model_structure
-from cpfls_cli.result import about, result
+from cpfls_cli.result import BODY, EULER, about, result
 
 TRAINING = "training"
 UNIFORM = "uniform-partitions"
@@ -218,7 +218,6 @@ Winner = Literal["model", "rigid-body", "tie"]
 # A mean squared error that is smaller by less than a hundredth, or beside that of no torque at all, decides nothing.
 _TIE, _ROUNDING = 0.01, 1e-12
 _MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")
-_EULER = "Euler angles (intrinsic ZYX)"
 
 
 @result
@@ -230,16 +229,16 @@ class Judged:
     samples: IntArray = about("samples judged", "part")
     outside: IntArray = about("of them outside the attitudes that training visited", "part")
     mse: Array = about(
-        "mean squared torque error", "judged_model", "part", "axis", unit="(N m)^2", frame=_EULER, brief=False
+        "mean squared torque error", "judged_model", "part", "axis", unit="(N m)^2", frame=EULER, brief=False
     )
     max_error: Array = about(
-        "largest torque error", "judged_model", "part", "axis", unit="N m", frame=_EULER, brief=False
+        "largest torque error", "judged_model", "part", "axis", unit="N m", frame=EULER, brief=False
     )
     relative_error: Array = about(
-        "largest error over largest torque", "judged_model", "part", "axis", gaps=True, frame=_EULER, brief=False
+        "largest error over largest torque", "judged_model", "part", "axis", gaps=True, frame=EULER, brief=False
     )
     r2: Array = about(
-        "share of the torque's variance explained", "judged_model", "part", "axis", gaps=True, frame=_EULER, brief=False
+        "share of the torque's variance explained", "judged_model", "part", "axis", gaps=True, frame=EULER, brief=False
     )
     vaf: Array = about(
         "the same without the mean of the error: variance accounted for",
@@ -247,7 +246,7 @@ class Judged:
         "part",
         "axis",
         gaps=True,
-        frame=_EULER,
+        frame=EULER,
         brief=False,
     )
     r2_body: Array = about(
@@ -256,7 +255,7 @@ class Judged:
         "part",
         "axis",
         gaps=True,
-        frame="body (FLU)",
+        frame=BODY,
         brief=False,
     )
 

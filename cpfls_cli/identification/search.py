@@ -19,8 +19,7 @@ from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import Choice, IdentificationSettings
 from cpfls_cli.result import about
 from cpfls_cli.rounding import at_most, levelled
-from cpfls_cli.workers.processes import employ
-from cpfls_cli.workers.workforce import Workforce, gathered
+from cpfls_cli.workers.workforce import Workforce, employ, gathered
 
 Stop = Literal["time-limit", "interrupted"]
 StopReason = End | Stop

@@ -280,7 +280,7 @@ class Figures(Mapping[str, "Figure"]):
 
 
 def _labels(about: DatasetSpec, label: str, length: int) -> list[str]:
-    from cpfls_cli.artifacts.gate import EULER
+    from cpfls_cli.result import EULER
 
     if label != "axis":
         return [str(index) for index in range(length)]

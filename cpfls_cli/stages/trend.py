@@ -43,7 +43,7 @@ from cpfls_cli.stages._flight_numbers import (
     of_other_vehicles,
     stated_by,
 )
-from cpfls_cli.workers.processes import employ
+from cpfls_cli.workers.workforce import employ
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

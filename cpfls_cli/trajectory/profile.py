@@ -1,4 +1,14 @@
-"""The base move: rest to rest along a line, whose sixth derivative is a sequence of single sine waves; its limits."""
+"""The base move: rest to rest along a line, whose sixth derivative is a sequence of single sine waves; its limits.
+
+Every derivative is the ramp of the one below. With ``T1 = P``, ``T2 = T1 + Ts``, ``T3 = T1 + T2 + Tj``,
+``T4 = T1 + T2 + T3 + Ta`` and ``T5 = T1 + T2 + T3 + T4 + Tv`` the peaks are ``s = A T1``, ``j = s T2``, ``a = j T3``,
+``v = a T4``, ``D = v T5``, and the whole move lasts ``T1 + T2 + T3 + T4 + T5``. These are called spans here.
+
+A move is sampled piece by piece, each half from its own end. A piece is a wave of the pop or a hold. Inside it every
+derivative is a polynomial of the fraction tau of the piece, and in a wave a sine or a cosine besides. The second half
+is the mirror image of the first, so that rounding errors are small against the peak of every derivative, and the end
+is exact.
+"""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.identification.solver import Fit
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor.regressor import RIGID, Motion, Regressor
-from cpfls_cli.result import about
+from cpfls_cli.result import BODY, EULER, about
 from cpfls_cli.validation.replay import CLEAR
 from cpfls_cli.validation.residuals import time_blocks
 
@@ -116,19 +116,10 @@ class Draws:
     """
 
     coefficients: Array = about(
-        "of the rule consequents, each draw",
-        "draw",
-        "rule_coefficient",
-        unit="kg m^2",
-        frame="Euler angles (intrinsic ZYX)",
-        brief=False,
+        "of the rule consequents, each draw", "draw", "rule_coefficient", unit="kg m^2", frame=EULER, brief=False
     )
-    rigid_body: Array = about(
-        "under the fuzzy part, each draw", "draw", "6", unit="kg m^2", frame="body (FLU)", brief=False
-    )
-    best_rigid_body: Array = about(
-        "that fits best, each draw", "draw", "6", unit="kg m^2", frame="body (FLU)", brief=False
-    )
+    rigid_body: Array = about("under the fuzzy part, each draw", "draw", "6", unit="kg m^2", frame=BODY, brief=False)
+    best_rigid_body: Array = about("that fits best, each draw", "draw", "6", unit="kg m^2", frame=BODY, brief=False)
     blocks: int = about("contiguous blocks of samples that were drawn")
     block_duration: float = about("duration of a block", unit="s")
 
@@ -235,11 +226,9 @@ class Physics:
     cells: int = about("cells of roll and pitch that training visited, those near a pitch of +-90 deg left out")
     indefinite: int = about("of them where D(q) is not positive definite")
     smallest_eigenvalue: float = about(
-        "smallest eigenvalue of D(q) over these cells", unit="kg m^2", frame="Euler angles (intrinsic ZYX)", gaps=True
+        "smallest eigenvalue of D(q) over these cells", unit="kg m^2", frame=EULER, gaps=True
     )
-    worst_attitude: Array = about(
-        "roll and pitch where it is smallest", "2", unit="rad", frame="Euler angles (intrinsic ZYX)", gaps=True
-    )
+    worst_attitude: Array = about("roll and pitch where it is smallest", "2", unit="rad", frame=EULER, gaps=True)
     indefinite_anywhere: int = about("cells of all roll and pitch where D(q) is not positive definite")
     every_cell: int = about("all cells but those near a pitch of +-90 deg")
 

@@ -16,7 +16,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics import Predictor, RotationState, free_runs, turning_law
 from cpfls_cli.identification.data import TorqueSource, gathered, sample_times
 from cpfls_cli.playback.player import rotation_vectors
-from cpfls_cli.result import about
+from cpfls_cli.result import BODY, about
 from cpfls_cli.validation.residuals import sample_period, stretch_numbers
 
 # 40 MB of rotations, rates and torques at a time.
@@ -120,19 +120,12 @@ class StepErrors:
         "horizon",
         "axis",
         unit="rad",
-        frame="body (FLU)",
+        frame=BODY,
         gaps=True,
         brief=False,
     )
     body_rate: Array = about(
-        "root mean square error",
-        "predictor",
-        "horizon",
-        "axis",
-        unit="rad/s",
-        frame="body (FLU)",
-        gaps=True,
-        brief=False,
+        "root mean square error", "predictor", "horizon", "axis", unit="rad/s", frame=BODY, gaps=True, brief=False
     )
     lost: IntArray = about("windows in which a predictor ran away", "predictor", "horizon", brief=False)
     window_error: Array = about(
@@ -141,7 +134,7 @@ class StepErrors:
         "window",
         "axis",
         unit="(rad/s)^2",
-        frame="body (FLU)",
+        frame=BODY,
         gaps=True,
         brief=False,
     )

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import FEWEST_BLOCKS, MOST_COMPARED, mean_error
 from cpfls_cli.identification.data import TorqueData, TorqueSource, gathered, sample_times
 from cpfls_cli.regressor.regressor import Motion
-from cpfls_cli.result import about
+from cpfls_cli.result import EULER, about
 from cpfls_cli.rotations import wrapped
 
 # Flights of several sample rates may follow each other, and samples may be missing: as many steps around each tell
@@ -126,43 +126,22 @@ class ResidualAnalysis:
     part: str = about("part whose residuals are examined")
     samples: int = about("residuals examined")
     available: int = about("residuals of the whole part")
-    mean: Array = about(
-        "constant torque that the model lacks", "axis", unit="N m", frame="Euler angles (intrinsic ZYX)", gaps=True
-    )
-    mean_p: Array = about(
-        "p-value of a mean of 0: small where it is not", "axis", frame="Euler angles (intrinsic ZYX)", gaps=True
-    )
+    mean: Array = about("constant torque that the model lacks", "axis", unit="N m", frame=EULER, gaps=True)
+    mean_p: Array = about("p-value of a mean of 0: small where it is not", "axis", frame=EULER, gaps=True)
     lag: Array = about("lags of the autocorrelation, from one sample on", "lag", unit="s", brief=False)
-    autocorrelation: Array = about(
-        "of the torque error", "lag", "axis", frame="Euler angles (intrinsic ZYX)", gaps=True, brief=False
-    )
+    autocorrelation: Array = about("of the torque error", "lag", "axis", frame=EULER, gaps=True, brief=False)
     band: float = about("1.96 / sqrt(samples): holds 95 % of the lags of white noise")
-    ljung_box: Array = about(
-        "p-value of Ljung and Box: small where not white", "axis", frame="Euler angles (intrinsic ZYX)", gaps=True
-    )
+    ljung_box: Array = about("p-value of Ljung and Box: small where not white", "axis", frame=EULER, gaps=True)
     input: tuple[str, ...] = about("signals that errors are correlated with", "input", brief=False)
     input_lag: Array = about("positive: the error follows the input", "input_lag", unit="s", brief=False)
-    correlation: Array = about(
-        "of error and input", "input", "input_lag", "axis", frame="Euler angles (intrinsic ZYX)", gaps=True, brief=False
-    )
-    histogram_edge: Array = about(
-        "edges of the bins", "edge", "axis", unit="N m", frame="Euler angles (intrinsic ZYX)", brief=False
-    )
-    histogram_count: IntArray = about(
-        "errors in each bin", "bin", "axis", frame="Euler angles (intrinsic ZYX)", brief=False
-    )
+    correlation: Array = about("of error and input", "input", "input_lag", "axis", frame=EULER, gaps=True, brief=False)
+    histogram_edge: Array = about("edges of the bins", "edge", "axis", unit="N m", frame=EULER, brief=False)
+    histogram_count: IntArray = about("errors in each bin", "bin", "axis", frame=EULER, brief=False)
     normal_quantile: Array = about("quantiles of the standard normal distribution", "quantile", brief=False)
     quantile: Array = about(
-        "the same quantiles of the errors",
-        "quantile",
-        "axis",
-        unit="N m",
-        frame="Euler angles (intrinsic ZYX)",
-        brief=False,
+        "the same quantiles of the errors", "quantile", "axis", unit="N m", frame=EULER, brief=False
     )
-    exact: BoolArray = about(
-        "1 where errors are rounding, which is never white", "axis", frame="Euler angles (intrinsic ZYX)"
-    )
+    exact: BoolArray = about("1 where errors are rounding, which is never white", "axis", frame=EULER)
 
 
 def examine_residuals(

@@ -16,7 +16,7 @@ from cpfls_cli.identification.identify import TRAINING, Identification, model_ev
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import PITCH, ROLL
-from cpfls_cli.result import about
+from cpfls_cli.result import EULER, about
 from cpfls_cli.rotations import wrapped
 from cpfls_cli.validation.bands import Draws, Physics, bootstrap, definite_share, inertia_band, physical_sense
 from cpfls_cli.validation.evidence import (
@@ -152,43 +152,16 @@ class Curves:
 
     name: tuple[str, ...] = about("over roll, over pitch", "curve", brief=False)
     attitude: Array = about(
-        "attitudes along each curve",
-        "curve",
-        "point",
-        "axis",
-        unit="rad",
-        frame="Euler angles (intrinsic ZYX)",
-        brief=False,
+        "attitudes along each curve", "curve", "point", "axis", unit="rad", frame=EULER, brief=False
     )
     inertia: Array = about(
-        "D_ij(q) of the model",
-        "curve",
-        "point",
-        "axis",
-        "axis",
-        unit="kg m^2",
-        frame="Euler angles (intrinsic ZYX)",
-        brief=False,
+        "D_ij(q) of the model", "curve", "point", "axis", "axis", unit="kg m^2", frame=EULER, brief=False
     )
     low: Array = about(
-        "lower end of its 95 % band",
-        "curve",
-        "point",
-        "axis",
-        "axis",
-        unit="kg m^2",
-        frame="Euler angles (intrinsic ZYX)",
-        brief=False,
+        "lower end of its 95 % band", "curve", "point", "axis", "axis", unit="kg m^2", frame=EULER, brief=False
     )
     high: Array = about(
-        "upper end of its 95 % band",
-        "curve",
-        "point",
-        "axis",
-        "axis",
-        unit="kg m^2",
-        frame="Euler angles (intrinsic ZYX)",
-        brief=False,
+        "upper end of its 95 % band", "curve", "point", "axis", "axis", unit="kg m^2", frame=EULER, brief=False
     )
     rigid_body: Array = about(
         "D_ij(q) of the rigid body that fits best",
@@ -197,7 +170,7 @@ class Curves:
         "axis",
         "axis",
         unit="kg m^2",
-        frame="Euler angles (intrinsic ZYX)",
+        frame=EULER,
         brief=False,
     )
     outside: BoolArray = about("1 outside the attitudes that training visited", "curve", "point", brief=False)
@@ -270,14 +243,14 @@ class RoundTrip:
         "axis",
         "axis",
         unit="kg m^2",
-        frame="Euler angles (intrinsic ZYX)",
+        frame=EULER,
         brief=False,
     )
     inside: Array = about(
         "share of visited points within the band; not known of an entry that is zero",
         "axis",
         "axis",
-        frame="Euler angles (intrinsic ZYX)",
+        frame=EULER,
         gaps=True,
     )
 

@@ -12,7 +12,7 @@ from typer import testing
 
 from cpfls_cli.cli.stages import app
 from cpfls_cli.report import canvas
-from cpfls_cli.workers.processes import employ
+from cpfls_cli.workers.workforce import employ
 
 # Every call would build all commands anew, which takes longer than most of them run.
 testing._get_command = cache(testing._get_command)

@@ -14,7 +14,7 @@ import pytest
 from cpfls_cli import store
 from cpfls_cli.changes.numbers import FlightNumbers
 from cpfls_cli.stages import trend as command
-from cpfls_cli.workers.processes import Serial
+from cpfls_cli.workers.workforce import Serial
 from tests.builders.studies import VEHICLE
 
 CONFIG = """

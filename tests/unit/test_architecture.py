@@ -43,7 +43,7 @@ def own_imports_in_functions(path):
 
 
 # These load what they are asked for: a command, what an object of the Python interface does, Dask, what is drawn.
-BY_NEED = {"cli", "library", "workers/processes.py", "report/canvas.py"}
+BY_NEED = {"cli", "library", "workers/workforce.py", "report/canvas.py"}
 
 
 def test_layers_hold_as_imported():

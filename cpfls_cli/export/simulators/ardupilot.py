@@ -30,7 +30,6 @@ from cpfls_cli.export.text import comment_lines, in_json
 from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
-from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.values import scaled, times
 
@@ -83,7 +82,7 @@ def ardupilot_held(model: VehicleModel) -> tuple[Held, Holds]:
     def holds(weights: Array) -> Array:
         return numbers.holds(turned(weights))
 
-    return replace(held_by(model, holds, RotorResponse(), body), numbers=found), holds
+    return replace(held_by(model, holds, body), numbers=found), holds
 
 
 def _without(numbers: Numbers, names: Sequence[str]) -> Numbers:

@@ -26,7 +26,6 @@ from cpfls_cli.export.numbers import numbers_of
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines, number
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 
 LACKS = "It states how motors share thrust and torques: no mass, inertia, size of thrust, lag or drag."
 _MOST_MOTORS, _LEAST = 8, 1e-6
@@ -41,7 +40,7 @@ _USE = (
 def betaflight_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what a mixer knows of a vehicle: thrust and torques of each rotor."""
     numbers = numbers_of(model, lambda _see: {}, alike=False)
-    held = held_by(model, numbers.holds, RotorResponse(), None, numbers)
+    held = held_by(model, numbers.holds, None, numbers)
     _mixer(held)
     return held, numbers.holds
 

@@ -14,12 +14,11 @@ import numpy as np
 
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import Held, Holds, held_by
+from cpfls_cli.export.holding import ANY_ROTORS, Held, Holds, held_by
 from cpfls_cli.export.numbers import Numbers, cross_order, numbers_of, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines, number
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 
 LACKS = (
     "It states no inertia, and no thrust by speed: VMOTOR2THRUST0 to 3 go by the volts of a motor, which no model "
@@ -37,7 +36,7 @@ def crazyflie_held(model: VehicleModel) -> tuple[Held, Holds]:
     if order is None or [-turn for *_, turn in cross] != spins(model.vehicle)[order].tolist():
         raise InputError(
             "the Crazyflie has four rotors on diagonals, that in front on the right counter-clockwise, which this "
-            "vehicle has not; --format mjcf, sdf, jax and casadi take any"
+            f"vehicle has not; {ANY_ROTORS}"
         )
     each = numbers_of(model, lambda _see: {}, alike=True)
     tables = dict(zip(each.names, each.tables, strict=True))
@@ -47,7 +46,7 @@ def crazyflie_held(model: VehicleModel) -> tuple[Held, Holds]:
         for rotor, (forward, left, _) in zip(order.tolist(), cross, strict=True)
     )
     numbers = Numbers(("thrust", "yaw", "side"), np.array([tables["thrust"], tables["yaw"], side]), each.size)
-    return held_by(model, numbers.holds, RotorResponse(), None, numbers), numbers.holds
+    return held_by(model, numbers.holds, None, numbers), numbers.holds
 
 
 def crazyflie_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:

@@ -17,21 +17,18 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.scales import arm, hover_speed
-from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
+from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, require_four
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines, in_json
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.motion import Instant, Wrench
 
-STEP_S = 2.5e-3
 FORCE_OF_VELOCITY = slice(3, 6), slice(1, 4)
 DRAG = (*FORCE_OF_VELOCITY, 0)
 """Places in a table of weights."""
 
-_ROTORS, _RPM = 4, 30 / np.pi
+_RPM = 30 / np.pi
 _USE = (
     "For crazyflow put the section into crazyflow/dynamics/first_principles/params.toml under the name of one of its "
     "drones, for drone-models into drone_models/data/params.toml; or give it to the function itself, with "
@@ -42,11 +39,7 @@ _USE = (
 
 def crazyflow_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what these dynamics fly of a vehicle."""
-    if model.rotors != _ROTORS:
-        raise InputError(
-            f"crazyflow and drone-models mix four rotors, but this vehicle has {model.rotors}; --format mjcf, sdf, jax "
-            "and casadi take any number"
-        )
+    require_four(model, "crazyflow and drone-models mix")
     numbers, hover = numbers_of(model, _wrenches, alike=True), hover_speed(model.vehicle)
 
     def holds(weights: Array) -> Array:
@@ -54,7 +47,7 @@ def crazyflow_held(model: VehicleModel) -> tuple[Held, Holds]:
         held[DRAG] = in_hover(weights[FORCE_OF_VELOCITY], hover)
         return held
 
-    return held_by(model, holds, RotorResponse(lag_s=model.response.lag_s), constant_body(model), numbers), holds
+    return held_by(model, holds, constant_body(model), numbers, lags=True), holds
 
 
 def in_hover(weights: Array, hover: float) -> Array:

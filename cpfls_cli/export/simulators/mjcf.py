@@ -20,7 +20,6 @@ from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 
 STEP_S = 0.001
 """Step of the file; verification takes a whole number of steps of at most this."""
@@ -60,8 +59,7 @@ def _holds(table: Array) -> Array:
 
 def mjcf_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what MuJoCo flies of a vehicle; its filter acts on each control by itself."""
-    response = RotorResponse(lag_s=model.response.lag_s)
-    return held_by(model, _holds, response, of_a_body(constant_body(model)), squares=True), _holds
+    return held_by(model, _holds, of_a_body(constant_body(model)), lags=True, squares=True), _holds
 
 
 def mjcf_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> str:

@@ -13,26 +13,18 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
+from cpfls_cli.export.holding import FOUR, Held, Holds, constant_body, held_by, of_a_body, require_four
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.crazyflow import DRAG, FORCE_OF_VELOCITY, in_hover
 from cpfls_cli.export.source import fill_template
 from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
-
-_ROTORS = 4
 
 
 def pegasus_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what Pegasus flies of a vehicle."""
-    if model.rotors != _ROTORS:
-        raise InputError(
-            f"Pegasus pushes at four rotors, but this vehicle has {model.rotors}; --format mjcf, sdf, jax and casadi "
-            "take any number"
-        )
+    require_four(model, "Pegasus pushes at")
     numbers, hover = numbers_of(model, lambda _see: {}, alike=False), hover_speed(model.vehicle)
 
     def holds(weights: Array) -> Array:
@@ -40,7 +32,7 @@ def pegasus_held(model: VehicleModel) -> tuple[Held, Holds]:
         held[DRAG] = np.diag(np.diag(in_hover(weights[FORCE_OF_VELOCITY], hover)))
         return held
 
-    return held_by(model, holds, RotorResponse(), of_a_body(constant_body(model)), numbers), holds
+    return held_by(model, holds, of_a_body(constant_body(model)), numbers), holds
 
 
 def pegasus_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:
@@ -48,17 +40,17 @@ def pegasus_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) ->
     found, vehicle = held.numbers, sheet.model.vehicle
 
     def of_rotors(name: str) -> str:
-        return python_rows(np.array([found[f"{name}_{rotor + 1}"] for rotor in range(_ROTORS)]), 0)
+        return python_rows(np.array([found[f"{name}_{rotor + 1}"] for rotor in range(FOUR)]), 0)
 
     moments, axes = np.linalg.eigh(held.body.inertia)
     axes = axes * np.sign(np.linalg.det(axes))
     curve = {
-        "num_rotors": str(_ROTORS),
+        "num_rotors": str(FOUR),
         "rotor_constant": of_rotors("thrust"),
         "rolling_moment_coefficient": of_rotors("yaw"),
         "rot_dir": str([int(each) for each in spins(vehicle)]),
-        "min_rotor_velocity": python_rows(np.zeros(_ROTORS), 0),
-        "max_rotor_velocity": python_rows(np.full(_ROTORS, vehicle.rotor_speed_max_rad_s), 0),
+        "min_rotor_velocity": python_rows(np.zeros(FOUR), 0),
+        "max_rotor_velocity": python_rows(np.full(FOUR, vehicle.rotor_speed_max_rad_s), 0),
     }
     words = {
         "source": comment_text(file),

@@ -21,7 +21,6 @@ from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import sdf_root, written
 from cpfls_cli.export.text import comment_lines, number
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 
 AIRFRAME = ".airframe"
 _SENSORS = (
@@ -77,7 +76,7 @@ def px4_held(model: VehicleModel) -> tuple[Held, Holds]:
     if model.rotors > _MOST_ROTORS:
         raise InputError(f"PX4 allocates to at most {_MOST_ROTORS} rotors, and this vehicle has {model.rotors}")
     numbers = numbers_of(model, lambda _see: {}, alike=False)
-    return held_by(model, numbers.holds, RotorResponse(), None, numbers), numbers.holds
+    return held_by(model, numbers.holds, None, numbers), numbers.holds
 
 
 def _geometry(sheet: Sheet, held: Held) -> dict[str, int | float]:

@@ -17,21 +17,19 @@ import numpy as np
 
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.effects.scales import arm
-from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
+from cpfls_cli.export.holding import FOUR, Held, Holds, constant_body, held_by, of_a_body, require_two_each_way
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.simulators.urdf import add_body, add_point
 from cpfls_cli.export.text import xml_text, yaml_text
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 NUMBERS = ".yaml"
 STEP_S = 1 / 240
-_ROTORS, _RPM = 4, 30 / np.pi
+_RPM = 30 / np.pi
 _X = ((1, -1), (-1, 1), (1, 1), (-1, -1))
 """Sides, forward and left, that PyFlyt's own controllers have motors 0 to 3 at."""
 _SAME = ("ang_vel", "ang_pos", "lin_vel", "lin_pos", "z_pos", "z_vel")
@@ -40,14 +38,9 @@ _AXES = {"ang_vel": 3, "ang_pos": 3, "lin_vel": 2, "lin_pos": 2}
 
 def pyflyt_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what PyFlyt flies of a vehicle."""
-    if model.rotors != _ROTORS or spins(model.vehicle).sum():
-        raise InputError(
-            "PyFlyt's QuadX turns four rotors, two each way, which this vehicle has not; --format mjcf, sdf, jax and "
-            "casadi take any"
-        )
+    require_two_each_way(model, "PyFlyt's QuadX")
     numbers = numbers_of(model, _wrenches, alike=True)
-    response = RotorResponse(lag_s=model.response.lag_s)
-    return held_by(model, numbers.holds, response, of_a_body(constant_body(model)), numbers), numbers.holds
+    return held_by(model, numbers.holds, of_a_body(constant_body(model)), numbers, lags=True), numbers.holds
 
 
 def _wrenches(see: Instant) -> Mapping[str, Wrench]:
@@ -77,7 +70,7 @@ def pyflyt_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> 
     most = sheet.model.vehicle.rotor_speed_max_rad_s
     numbers: dict[str, Any] = {
         "motor_params": {
-            "total_thrust": _ROTORS * found["thrust"] * most**2,
+            "total_thrust": FOUR * found["thrust"] * most**2,
             "thrust_coef": found["thrust"] / _RPM**2,
             "torque_coef": found["yaw"] / _RPM**2,
             "noise_ratio": 0.0,

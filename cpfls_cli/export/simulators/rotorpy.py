@@ -4,35 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
+from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, require_four
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.source import fill_template
 from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.values import dot
 
-# What RotorPy's `Multirotor` allocates to, and has in its code.
-_ROTORS, _GRAVITY = 4, 9.81
+_GRAVITY = 9.81
+"""RotorPy's `Multirotor` has it in its code."""
 _FASTEST_S = 1e-3
 """RotorPy divides by the time constant of its motors."""
-
-# So exact that what its step leaves is below what it is compared by.
 
 
 def rotorpy_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what RotorPy flies of a vehicle."""
-    if model.rotors != _ROTORS:
-        raise InputError(
-            f"RotorPy allocates thrust and torque to four rotors, but this vehicle has {model.rotors}; --format mjcf, "
-            "sdf, jax and casadi take any number"
-        )
+    require_four(model, "RotorPy allocates thrust and torque to")
     numbers = numbers_of(model, _wrenches, alike=True)
     body = constant_body(model)._replace(gravity=_GRAVITY)
-    return held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body, numbers), numbers.holds
+    return held_by(model, numbers.holds, body, numbers, lags=True), numbers.holds
 
 
 def _wrenches(see: Instant) -> Mapping[str, Wrench]:

@@ -22,7 +22,6 @@ from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.model import ENTRIES
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.values import Each, scaled
@@ -48,7 +47,7 @@ def sdf_held(model: VehicleModel) -> tuple[Held, Holds]:
     heights = np.array([rotor.position_m[2] for rotor in model.vehicle.rotors])
     margin = 2.0 * _MARGIN * _ROTOR_SHARE * model.body.mass * float((heights**2).sum())
     body = of_a_body(constant_body(model), margin)
-    return held_by(model, numbers.holds, RotorResponse(lag_s=model.response.lag_s), body, numbers), numbers.holds
+    return held_by(model, numbers.holds, body, numbers, lags=True), numbers.holds
 
 
 def _wrenches(see: Instant) -> Mapping[str, Wrench]:

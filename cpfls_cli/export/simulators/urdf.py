@@ -15,8 +15,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.scales import arm
-from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, of_a_body
+from cpfls_cli.export.holding import FOUR, Held, Holds, constant_body, held_by, of_a_body, require_two_each_way
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
@@ -25,14 +24,13 @@ from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.motion import State
-from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.model import ENTRIES
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import scaled
 
 OTHERWISE = "drag along the axes of the world, where the vehicle has it along those of its body"
-_ROTORS, _RPM, _GRAVITY = 4, 30 / np.pi, 9.8
+_RPM, _GRAVITY = 30 / np.pi, 9.8
 """Of gym-pybullet-drones, which has its gravity in its code."""
 _TURNS = np.array([-1.0, 1.0, -1.0, 1.0])
 _HEIGHT_SHARE, _RADIUS_M, _KMH = 0.2, 0.05, 30.0
@@ -41,14 +39,10 @@ _HEIGHT_SHARE, _RADIUS_M, _KMH = 0.2, 0.05, 30.0
 
 def urdf_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what gym-pybullet-drones flies of a vehicle."""
-    if model.rotors != _ROTORS or spins(model.vehicle).sum():
-        raise InputError(
-            "gym-pybullet-drones turns four rotors, two each way, which this vehicle has not; --format mjcf, sdf, jax "
-            "and casadi take any"
-        )
+    require_two_each_way(model, "gym-pybullet-drones")
     numbers = numbers_of(model, _wrenches, alike=True)
     body = of_a_body(constant_body(model))._replace(gravity=_GRAVITY)
-    return held_by(model, numbers.holds, RotorResponse(), body, numbers), numbers.holds
+    return held_by(model, numbers.holds, body, numbers), numbers.holds
 
 
 def _wrenches(see: Instant) -> Mapping[str, Wrench]:
@@ -60,7 +54,7 @@ def _wrenches(see: Instant) -> Mapping[str, Wrench]:
 def order_of(vehicle: VehicleSettings) -> IntArray:
     """Give the rotor of the config that is each propeller: the ways they turn alternate."""
     turns = spins(vehicle)
-    order = np.empty(_ROTORS, dtype=np.int64)
+    order = np.empty(FOUR, dtype=np.int64)
     order[0::2], order[1::2] = np.flatnonzero(turns < 0), np.flatnonzero(turns > 0)
     return order
 
@@ -104,7 +98,7 @@ def _properties(sheet: Sheet, held: Held) -> dict[str, str]:
     """Give what gym-pybullet-drones reads beside the links."""
     found, vehicle = held.numbers, sheet.model.vehicle
     radii = [rotor.radius_m or _RADIUS_M for rotor in vehicle.rotors]
-    most = _ROTORS * found["thrust"] * vehicle.rotor_speed_max_rad_s**2 / (held.body.mass * _GRAVITY)
+    most = FOUR * found["thrust"] * vehicle.rotor_speed_max_rad_s**2 / (held.body.mass * _GRAVITY)
     numbers = {
         "arm": arm(vehicle),
         "kf": found["thrust"] / _RPM**2,
@@ -150,7 +144,7 @@ def fly_urdf(text: str, course: Course, *, own: bool = True) -> State:
     links = {link.get("name"): link for link in root.iter("link")}
     body = {each.tag: each.attrib for each in links["base_link"].iter()}
     mass, inertia = float(body["mass"]["value"]), symmetric([float(body["inertia"][name]) for name in ENTRIES])
-    origins = [next(links[f"prop{place}_link"].iter("origin")).get("xyz", "") for place in range(_ROTORS)]
+    origins = [next(links[f"prop{place}_link"].iter("origin")).get("xyz", "") for place in range(FOUR)]
     hubs = np.array([[float(word) for word in origin.split()] for origin in origins])
     drag = np.array([across, across, along])
 

@@ -26,7 +26,6 @@ from cpfls_cli.export.source import fill_template
 from cpfls_cli.export.text import checked_identifier, comment_lines, number
 from cpfls_cli.inertia import INERTIA_ENTRIES
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.rotors import RotorResponse
 
 _HEIGHT_SHARE, _SPARE = 0.2, 2.0
 """Height of the box that collides, in arms; and what motors may turn by, in torques of their largest speed."""
@@ -35,7 +34,7 @@ _HEIGHT_SHARE, _SPARE = 0.2, 2.0
 def webots_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what Webots flies of a vehicle."""
     numbers = numbers_of(model, lambda _see: {}, alike=False)
-    return held_by(model, numbers.holds, RotorResponse(), constant_body(model), numbers), numbers.holds
+    return held_by(model, numbers.holds, constant_body(model), numbers), numbers.holds
 
 
 def webots_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.workers.processes import employ
+from cpfls_cli.workers.workforce import employ
 from tests.builders.dask_cluster import dask_cluster
 from tests.builders.evaluators import POISON, Failing, Loading, Logging, Reporting, Uneven
 

@@ -9,7 +9,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.workers.compatibility import Processor, processor, require_same_processor, require_same_versions
-from cpfls_cli.workers.processes import employ, require_address
+from cpfls_cli.workers.workforce import employ, require_address
 
 
 class Client:
@@ -83,6 +83,6 @@ def test_other_texts_are_refused(address):
 
 def test_dask_is_loaded_only_for_a_scheduler():
     program = (
-        "import sys, cpfls_cli.workers.processes; sys.exit(not {'distributed', 'llvmlite'}.isdisjoint(sys.modules))"
+        "import sys, cpfls_cli.workers.workforce; sys.exit(not {'distributed', 'llvmlite'}.isdisjoint(sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

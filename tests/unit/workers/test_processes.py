@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.workers.processes import employ
+from cpfls_cli.workers.workforce import employ
 from tests.builders.evaluators import (
     DEADLY_POISON,
     POISON,
@@ -122,7 +122,7 @@ from cpfls_cli.cli.main import use_one_thread
 if __name__ == "__main__":
     use_one_thread()
     import numpy as np
-    from cpfls_cli.workers.processes import employ
+    from cpfls_cli.workers.workforce import employ
     from tests.builders.evaluators import Reporting
     with employ(Reporting(), count=2) as workers:
         seen = workers(np.ones((40, 2), dtype=int)).objectives
