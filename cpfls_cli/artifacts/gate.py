@@ -152,8 +152,8 @@ def dataset_of(file: h5py.File, path: str) -> h5py.Dataset | None:
 
 def held_format(path: Path, file: h5py.File) -> str:
     """Name the format of an open file; one that cpfls did not make is refused."""
-    name = _text_attribute(file, "format")
-    if name is None or not name.startswith("cpfls/"):
+    name = file.attrs.get("format")
+    if not isinstance(name, str) or not name.startswith("cpfls/"):
         raise InputError(f"{path}: an HDF5 file, but not made by cpfls (no root attribute 'format')")
     return name
 
@@ -290,8 +290,3 @@ def read_origin(path: Path) -> Origin:
 def one_line(error: Exception) -> str:
     """Word an error of a library in one line."""
     return " ".join(str(error.args[0] if error.args else error).split())
-
-
-def _text_attribute(file: h5py.File, name: str) -> str | None:
-    value = file.attrs.get(name)
-    return value if isinstance(value, str) else None

@@ -271,13 +271,13 @@ def _format(path: Path) -> str | None:
     return format_name(path)
 
 
-def refuse_misplaced_log(path: Path, order: str = "first the config, then the log") -> None:
+def refuse_misplaced_log(path: Path) -> None:
     """Refuse an artifact or a config in the place of a log."""
     kind = _kind(path)
     if kind == "artifact":
         raise InputError(f"{path}: is a {_format(path)}, not a log: it needs no import; `cpfls info {path}` shows it")
     if kind == "config":
-        raise InputError(f"{path}: is a config, not a log; {order}")
+        raise InputError(f"{path}: is a config, not a log; first the config, then the log")
 
 
 def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | None) -> None:

@@ -98,7 +98,8 @@ def _guesses(vehicle: dict[str, Any], rotors: list[dict[str, Any]]) -> dict[Unkn
     fastest = float(vehicle.get("rotor_speed_max_rad_s", usual.rotor_speed_max_rad_s))
     stated = [rotor.get(KEYS["thrust_factor"]) for rotor in rotors]
     thrust = next((float(value) for value in stated if value is not None), None)
-    thrust = thrust or _thrust_factor(mass, gravity, len(positions), fastest)
+    # By the speed at which such vehicles hover.
+    thrust = thrust or mass * gravity / (len(positions) * (_HOVER * fastest) ** 2)
     return {
         "thrust_factor": thrust,
         "drag_factor": _drag_factor(thrust, positions),
@@ -147,11 +148,6 @@ def _inertia(mass: float, positions: Sequence[Sequence[float]]) -> tuple[float, 
     """Guess moments of inertia, kg m^2, of a mass in kg and hubs at these positions in m."""
     x, y, z = (mass * (share * _arm(positions)) ** 2 for share in _GYRATION)
     return x, y, z
-
-
-def _thrust_factor(mass: float, gravity: float, rotors: int, speed_max: float) -> float:
-    """Guess the thrust factor of each rotor, N s^2, from the speed at which such vehicles hover."""
-    return mass * gravity / (rotors * (_HOVER * speed_max) ** 2)
 
 
 def _drag_factor(thrust_factor: float, positions: Sequence[Sequence[float]]) -> float:

@@ -196,20 +196,18 @@ def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> Rea
         _require_speeds(name, part, study)
     first = parts[0]
     updated = min((part.report.updated_hz for part in parts), key=lambda each: min(each.values(), default=np.inf))
-    done = tuple(f"{what} ({count})" for what, count in first.report.findings.items())
-    signals = [Imported.of(part).signals for part in parts]
+    signals, begins = [Imported.of(part).signals for part in parts], first.report.first_stamp_s
+    notes: tuple[str, ...] = ()
     if len(parts) == 1:
-        notes = (*done, *first.report.warnings)
-        begins = first.report.first_stamp_s + first.report.span_s[0]
-        known = (first.report.stated, first.report.system)
-        return ReadFlight(name, signals[0], _units(study), notes, first.report.flown_at, updated, begins, *known)
-    shared = [each for each in signals[0] if all(each in own for own in signals)]
-    for own, part in zip(signals, parts, strict=True):
-        own["time"] = own["time"] + part.report.span_s[0]
-    joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
-    begins = first.report.first_stamp_s
+        done = (f"{what} ({count})" for what, count in first.report.findings.items())
+        joined, begins, notes = signals[0], begins + first.report.span_s[0], (*done, *first.report.warnings)
+    else:
+        shared = [each for each in signals[0] if all(each in own for own in signals)]
+        for own, part in zip(signals, parts, strict=True):
+            own["time"] = own["time"] + part.report.span_s[0]
+        joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
     known = (first.report.stated, first.report.system)
-    return ReadFlight(name, joined, _units(study), (), first.report.flown_at, updated, begins, *known)
+    return ReadFlight(name, joined, _units(study), notes, first.report.flown_at, updated, begins, *known)
 
 
 def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:
@@ -398,7 +396,8 @@ def with_voltage(
     if not any(full):
         return list(recordings), ()
     scaled = [_share(r, max(full)) if volts else r for r, volts in zip(recordings, full, strict=True)]
-    return scaled, (full_battery(max(full)),)
+    note = f"voltage: the largest of these flights, {max(full):.3g} V, is taken as that of a full battery"
+    return scaled, (note,)
 
 
 def doubts_on_voltage(signals: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, ...]:
@@ -430,11 +429,6 @@ def check_flight(flight: ReadFlight, study: Study, *, driven: bool = True) -> tu
         with suppress(InputError):
             signals = _actuated(signals, flight, known, study)[0]
     return check([signals], study.gap)
-
-
-def full_battery(volts: float) -> str:
-    """Say which voltage is taken for that of a full battery."""
-    return f"voltage: the largest of these flights, {volts:.3g} V, is taken as that of a full battery"
 
 
 def in_volts(units: Mapping[str, str]) -> bool:

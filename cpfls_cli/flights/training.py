@@ -117,13 +117,13 @@ def part_of(source: TorqueSource, samples: slice) -> TorqueSource:
     return source[samples]
 
 
-def check_file(path: Path, study: Study, *, driven: bool = False) -> tuple[Finding, ...]:
+def check_file(path: Path, study: Study) -> tuple[Finding, ...]:
     """Hold a flight against itself, its middle where it stays in its file; nothing of a flight of another vehicle.
 
-    What drives it is held against the vehicle of the config if `driven`, else where its rotors give its torque.
+    What drives it is held against the vehicle of the config where its rotors give its torque.
     """
     try:
-        return check_flight(_enough_of(path, study), study, driven=driven or torque_source_of(path, study) in _ROTORS)
+        return check_flight(_enough_of(path, study), study, driven=torque_source_of(path, study) in _ROTORS)
     except InputError:
         return ()
 
@@ -285,8 +285,7 @@ def _require_made_from(flights: Mapping[Path, str], selection: Path, origin: Ori
     if len(sources) != len(roles):
         raise InputError(
             f"{selection}: was made from {len(sources)} {_FLIGHTS[len(sources) > 1]}, and {len(roles)} "
-            f"{_ARE[len(roles) > 1]} given; "
-            f"run `cpfls reduce` on {names}"
+            f"{_ARE[len(roles) > 1]} given; run `cpfls reduce` on {names}"
         )
     for role, path in roles.items():
         source = sources.get(role)

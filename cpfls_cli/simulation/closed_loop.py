@@ -74,7 +74,7 @@ class Clock:
 
 def clock_of(time: Array, settings: ClosedLoopSettings) -> Clock:
     """Divide the samples of a plan, shape (time,), s, into steps of the integration and of the autopilot's law."""
-    period = sample_interval(time, "a flight in closed loop")
+    period = sample_interval(time)
     rate = integration_rate(settings.law, settings.integration_rate_hz)
     parts = ceil(period * rate - _ROUNDING)
     steps, step = (len(time) - 1) * parts, period / parts

@@ -342,8 +342,8 @@ def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
     return PlannedRotation(duration=path.duration, **rotation_samples(time, motion, heading))
 
 
-def sample_interval(time: Array, what: str) -> float:
-    """Find the time between the samples of a plan, s; words say what needs them to be uniform.
+def sample_interval(time: Array) -> float:
+    """Find the time between the samples of a plan that is flown in closed loop, s.
 
     Raises
     ------
@@ -351,7 +351,7 @@ def sample_interval(time: Array, what: str) -> float:
         If there are fewer than two samples, or they are not uniform.
     """
     if len(time) < 2 or np.ptp(np.diff(time)) > _UNIFORM * (time[1] - time[0]):
-        raise ComputationError(f"{what} needs a trajectory with at least two samples at one rate")
+        raise ComputationError("a flight in closed loop needs a trajectory with at least two samples at one rate")
     return float(time[-1] - time[0]) / (len(time) - 1)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.fuzzy.periodic_fit import PeriodicSettings, fit_periodic
+from cpfls_cli.fuzzy.periodic import PeriodicSettings, fit_periodic
 
 STRUCTURES = st.builds(
     PeriodicSettings,

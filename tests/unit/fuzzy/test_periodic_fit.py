@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.fuzzy.basis import InputRange, antecedent, basis, breakpoints, features, map_input
-from cpfls_cli.fuzzy.periodic_fit import PeriodicSettings, fit_periodic
+from cpfls_cli.fuzzy.periodic import PeriodicSettings, fit_periodic
 
 STRUCTURES = [
     PeriodicSettings(),
@@ -79,7 +79,7 @@ def test_weight_shrinks_as_rows_below_the_columns_do():
 def test_columns_that_are_not_kept_give_the_same(monkeypatch):
     angles = samples(6000)
     kept = fit_periodic(angles, surface(angles))
-    monkeypatch.setattr("cpfls_cli.fuzzy.periodic_fit._MOST_KEPT", 0)
+    monkeypatch.setattr("cpfls_cli.fuzzy.periodic._MOST_KEPT", 0)
     np.testing.assert_array_equal(fit_periodic(angles, surface(angles)).coefficients, kept.coefficients)
 
 
