@@ -21,7 +21,8 @@ from benchmarks.paper.printed import (
     PrintedColumn,
 )
 from benchmarks.paper.replicates import Setting, Spread, Sweep, joined_sweeps
-from cpfls_cli.identification.identify import MODEL, TRAINING, Judged
+from cpfls_cli.identification.data import TRAINING
+from cpfls_cli.identification.identify import MODEL, Judged
 from cpfls_cli.report.content import UNKNOWN, Block, Cell, Folded, Plot, Section, Table, Text, change, number, percent
 from cpfls_cli.report.source import Source
 

@@ -22,7 +22,8 @@ from benchmarks.paper.replicates import ALL_SAMPLES, Setting, Sweep, joined_swee
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.path import PlannedPath
-from cpfls_cli.identification.identify import MODEL, TRAINING
+from cpfls_cli.identification.data import TRAINING
+from cpfls_cli.identification.identify import MODEL
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.content import UNKNOWN, change, number, percent
 from cpfls_cli.report.source import Source, Sources

@@ -44,7 +44,8 @@ from benchmarks.paper.search_claims import (
 from cpfls_cli.flights.flight import MOTION
 from cpfls_cli.flights.prediction import AlongFlight
 from cpfls_cli.fuzzy.basis import breakpoints, seesaw
-from cpfls_cli.identification.identify import AXES, MODEL, TRAINING
+from cpfls_cli.identification.data import TRAINING
+from cpfls_cli.identification.identify import AXES, MODEL
 from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
 from cpfls_cli.report.content import (

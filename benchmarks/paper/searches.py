@@ -27,8 +27,8 @@ from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.training import SplitFlights, flight_roles, split_training, uniform_regressor
-from cpfls_cli.identification.data import TorqueSource, gathered
-from cpfls_cli.identification.identify import TRAINING, Identification, identify
+from cpfls_cli.identification.data import TRAINING, TorqueSource, gathered
+from cpfls_cli.identification.identify import Identification, identify
 from cpfls_cli.identification.search import NothingFoundError, is_end
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.reduction.selection import Selection

@@ -27,7 +27,7 @@ from cpfls_cli.playback.gusts import GustAxis
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
 from cpfls_cli.simulators.results import Corrected
-from cpfls_cli.validation.verdict import capped, trust_by_playback
+from cpfls_cli.validation.trust import capped, trust_by_playback
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import Recording
 

@@ -11,8 +11,9 @@ from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
 from cpfls_cli.dynamics import InertiaFunctions
 from cpfls_cli.errors import InputError
 from cpfls_cli.evolution.engine import History
+from cpfls_cli.identification.data import TRAINING
 from cpfls_cli.identification.findings import RuleExcitation
-from cpfls_cli.identification.identify import MODEL, TRAINING, Identification, Judged
+from cpfls_cli.identification.identify import MODEL, Identification, Judged
 from cpfls_cli.identification.search import Front, StopReason, is_end
 from cpfls_cli.identification.solver import RidgeCurve
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
@@ -22,8 +23,9 @@ from cpfls_cli.validation.bands import Draws, Physics
 from cpfls_cli.validation.replay import StepErrors
 from cpfls_cli.validation.residuals import ResidualAnalysis
 from cpfls_cli.validation.structures import StructureComparison
+from cpfls_cli.validation.trust import Trust
 from cpfls_cli.validation.validate import Curves, RoundTrip, Validation
-from cpfls_cli.validation.verdict import Trust, Verdict
+from cpfls_cli.validation.verdict import Verdict
 
 WELL_CONDITIONED = 100.0
 """Largest condition number of a model whose coefficients are all known."""

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body, more_than_others
 from cpfls_cli.result import About
-from cpfls_cli.validation.verdict import Trust
+from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.model import VehicleModel

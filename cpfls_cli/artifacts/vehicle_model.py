@@ -19,7 +19,7 @@ from cpfls_cli.response import spectra
 from cpfls_cli.response.flown import VehicleResponse
 from cpfls_cli.response.spectra import NOT_ACCEPTABLE, NOT_JUDGED, ROTATION, response_word
 from cpfls_cli.result import About, about, part, result
-from cpfls_cli.validation.verdict import GOOD, Trust, capped, trust_by_playback
+from cpfls_cli.validation.trust import GOOD, Trust, capped, trust_by_playback
 
 _DIGITS = 6
 THRUST, DRAG = "rotors.thrust_factor_n_s2", "rotors.drag_factor_n_m_s2"

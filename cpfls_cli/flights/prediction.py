@@ -25,8 +25,9 @@ from cpfls_cli.dynamics import (
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.flight import MOTION, Flight, require_signals
-from cpfls_cli.flights.models import any_model, is_found, model_of_another, other_vehicles, read_model
+from cpfls_cli.flights.models import any_model, is_found, read_model
 from cpfls_cli.flights.recordings import read_alone
+from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
 from cpfls_cli.flights.training import check_file, torque_source_of
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
@@ -37,7 +38,7 @@ from cpfls_cli.regressor.regressor import InertiaValues, Motion
 from cpfls_cli.rotations import attitude_rate, body_torque, generalised_torque
 from cpfls_cli.store import read
 from cpfls_cli.validation.bands import Draws, inertia_band, torque_band
-from cpfls_cli.validation.verdict import Trust
+from cpfls_cli.validation.trust import Trust
 
 _UNJUDGED = "has no verdict and no bands; `cpfls identify` with identification.validation.enabled adds them"
 

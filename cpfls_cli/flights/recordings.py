@@ -27,7 +27,7 @@ from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster, shown_slowly, stated_vehicle
 from cpfls_cli.flights.flight import Imported, read_whole
-from cpfls_cli.flights.models import require_same_vehicle
+from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import LogColumns, is_log, read_log
 from cpfls_cli.units import SPEED_UNITS

@@ -27,6 +27,7 @@ from cpfls_cli.flights.recordings import (
 )
 from cpfls_cli.identification.data import (
     CHUNK,
+    TRAINING,
     Split,
     TorqueData,
     TorqueSource,
@@ -35,7 +36,6 @@ from cpfls_cli.identification.data import (
     sample_times,
     split_flight,
 )
-from cpfls_cli.identification.identify import TRAINING
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, joined_ranges, uniform_breakpoints

@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array, IntArray, require_columns
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.regressor.regressor import Motion
 
+TRAINING = "training"
 CHUNK = 65536
 """Samples worked on at a time: 7 MB of motion and torque, whatever the length of a flight."""
 

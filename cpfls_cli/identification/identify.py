@@ -13,7 +13,7 @@ from cpfls_cli.dynamics import InertiaFunctions, not_positive_definite, vertical
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.engine import History
 from cpfls_cli.identification.closed_loop import freed_torque, loop_along, source_of
-from cpfls_cli.identification.data import TorqueSource, axis_scale
+from cpfls_cli.identification.data import TRAINING, TorqueSource, axis_scale
 from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
 from cpfls_cli.identification.findings import FitDiagnostics, RuleExcitation, axis_evidence, findings, rule_excitation
 from cpfls_cli.identification.judge import Baseline, Score, fit_baselines, score_of
@@ -26,7 +26,6 @@ from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.result import BODY, EULER, about, result
 
-TRAINING = "training"
 UNIFORM = "uniform-partitions"
 
 

@@ -20,7 +20,8 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.comparison import BEYOND, compared_constants
 from cpfls_cli.pages.identification import WORDS as OF_IDENTIFIED
 from cpfls_cli.pages.identified_figures import COMPARED
-from cpfls_cli.pages.model import cautions_of, model_words
+from cpfls_cli.pages.model import cautions_of
+from cpfls_cli.pages.trust import model_words
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.report.canvas import figure_html, pictures
 from cpfls_cli.report.content import (

@@ -14,8 +14,8 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError, SettingError, about
-from cpfls_cli.flights.models import read_result_of_vehicle
 from cpfls_cli.flights.path import PathQuestion, PlannedPath
+from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight

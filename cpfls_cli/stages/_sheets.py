@@ -21,7 +21,7 @@ from cpfls_cli.export.sheet import REFITTED, Sheet
 from cpfls_cli.flights.models import any_model, modelled
 from cpfls_cli.pages.model import against, impossible_in_words, worth_in_words
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.validation.verdict import Trust
+from cpfls_cli.validation.trust import Trust
 
 _SCORE_UNITS = {"mse": "(N m)^2", "max_error": "N m", "relative_error": "1", "r2": "1", "vaf": "1", "r2_body": "1"}
 

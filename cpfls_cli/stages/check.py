@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cpfls_cli.arguments import FileArgument
 from cpfls_cli.artifacts.model import AnyModel
-from cpfls_cli.pages.model import stopped_words
+from cpfls_cli.pages.trust import stopped_words
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.store import findings_in, read

@@ -13,7 +13,8 @@ from cpfls_cli.artifacts.model import as_inputs, joined_flights
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.flights.models import learned_by, read_base, read_result_of_vehicle
+from cpfls_cli.flights.models import learned_by, read_base
+from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon, left_out, played_pairs, rates_fade
 from cpfls_cli.gap.extended import extend as refitted
 from cpfls_cli.gap.extended import plain
@@ -27,7 +28,8 @@ from cpfls_cli.gap.whole_vehicle import (
     whole_vehicle,
     with_known_wrench,
 )
-from cpfls_cli.pages.gap import GAP_WORDS, intervals_drawn, playback_drawn, sizes_drawn
+from cpfls_cli.pages.gap import intervals_drawn, sizes_drawn
+from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
 from cpfls_cli.playback.model import VehicleModel

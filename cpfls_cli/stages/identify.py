@@ -27,7 +27,7 @@ from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
-from cpfls_cli.flights.models import other_vehicles
+from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.flights.training import (
     TrainingData,
     check_file,
@@ -45,15 +45,16 @@ from cpfls_cli.identification.search import NothingFoundError, SearchRun, Search
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.identification import WORDS
 from cpfls_cli.pages.identified_figures import FIGURES
-from cpfls_cli.pages.playback import tell_before_search
+from cpfls_cli.pages.sensors import tell_before_search
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command, Text
 from cpfls_cli.search import SearchOptions, Watch, begin_search
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._checkpoint import stop_note, without_model
+from cpfls_cli.validation.trust import Trust
 from cpfls_cli.validation.validate import Validation
 from cpfls_cli.validation.validate import validate as examine
-from cpfls_cli.validation.verdict import Trust, contradicted
+from cpfls_cli.validation.verdict import contradicted
 from cpfls_cli.workers.workforce import WorkerError
 
 SelectionOption = Annotated[

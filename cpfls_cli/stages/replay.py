@@ -16,8 +16,8 @@ from cpfls_cli.flights.playback import flights_to_play, model_notes, played
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
-from cpfls_cli.pages.model import seen_warnings
 from cpfls_cli.pages.playback import ERRORS, WORDS, draw_errors, errors_height
+from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.along_flights import Playback, playback
 from cpfls_cli.playback.errors import NOTHING_MOVES, STATED
 from cpfls_cli.playback.flight import LoggedFlight

@@ -13,8 +13,8 @@ from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.config.study import Study
 from cpfls_cli.files import read_content
 from cpfls_cli.pages.comparison import differing
-from cpfls_cli.pages.model import model_words
 from cpfls_cli.pages.page import WORDS, report_page
+from cpfls_cli.pages.trust import model_words
 from cpfls_cli.report.content import Form
 from cpfls_cli.report.source import Source, Sources, source_of_result, unique_labels
 from cpfls_cli.result import about, result

@@ -14,7 +14,7 @@ from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.export.samples import Samples, require_ending
 from cpfls_cli.export.text import identifier
 from cpfls_cli.flights.models import any_model, found_vehicle, is_found, is_model
-from cpfls_cli.pages.model import trust_words
+from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.playback.gusts import GUST_AXES
 from cpfls_cli.playback.spread import Estimates, drawn, require_sure
 from cpfls_cli.result import about as described

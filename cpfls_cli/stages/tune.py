@@ -31,7 +31,8 @@ from cpfls_cli.look.gains import HOLDS, LogGains, TunedGains, tuned_gains
 from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.reasons import TOO_SLOW
 from cpfls_cli.look.vibration import Change, vibration_of
-from cpfls_cli.pages.model import slow_words, trust_words
+from cpfls_cli.pages.model import slow_words
+from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import (
     BASELINE,
@@ -51,7 +52,7 @@ from cpfls_cli.stages._numbers import to_fly, with_numbers
 from cpfls_cli.tuning.gains import AskedMargins
 from cpfls_cli.tuning.plant import LEAST, Noise, Spread, noise_of, spread_of
 from cpfls_cli.tuning.vehicle import PROPOSED, Gains, ParameterRow, gains_for_vehicle
-from cpfls_cli.validation.verdict import Trust
+from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
 
 if TYPE_CHECKING:

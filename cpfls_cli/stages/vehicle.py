@@ -50,19 +50,13 @@ from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, shown_slowly
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
 from cpfls_cli.flights.training import numbered_roles
-from cpfls_cli.pages.gap import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
+from cpfls_cli.pages.disturbance import gust_words
+from cpfls_cli.pages.gap_words import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.model import said_by
-from cpfls_cli.pages.playback import (
-    ERRORS,
-    NOTHING_COMES,
-    contradicted,
-    draw_errors,
-    errors_height,
-    gust_words,
-    tell_before_search,
-)
+from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
+from cpfls_cli.pages.sensors import NOTHING_COMES, contradicted, tell_before_search
 from cpfls_cli.playback.errors import AlongFlights
 from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.loop import ANY, LoopBounds, shows_loop_anyhow
@@ -80,7 +74,7 @@ from cpfls_cli.search import VehicleCheckpoint, Watch, begin_vehicle_search
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._checkpoint import stop_note
 from cpfls_cli.stages._numbers import to_fly
-from cpfls_cli.validation.verdict import Trust
+from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import did_you_mean, joined
 
 if TYPE_CHECKING:

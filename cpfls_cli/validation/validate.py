@@ -11,8 +11,8 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics import InertiaFunctions, Predictor, inertia_matrix
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.closed_loop import source_of
-from cpfls_cli.identification.data import OtherTorque, TorqueData, TorqueSource
-from cpfls_cli.identification.identify import TRAINING, Identification, model_evaluator
+from cpfls_cli.identification.data import TRAINING, OtherTorque, TorqueData, TorqueSource
+from cpfls_cli.identification.identify import Identification, model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import PITCH, ROLL

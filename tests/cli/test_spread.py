@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from cpfls_cli.artifacts.vehicle_model import Vehicle
-from cpfls_cli.validation.verdict import Trust
+from cpfls_cli.validation.trust import Trust
 from tests.builders.spread_vehicles import found_record
 from tests.builders.vehicle_models import write_vehicle
 

@@ -162,7 +162,6 @@ def test_tests_import_from_shared_builders_alone():
 # looked up by its place: a command, an effect, a reader of logs, a simulator that is exported to or whose file is read.
 ONE_OF_A_KIND = ("autopilots/catalogue/", "effects/catalogue/", "export/simulators/", "logs/", "simulators/", "stages/")
 SMALL_ALL_THE_SAME = {
-    "cli/stages.py": "reads sources",
     "cli/main.py": "runs before anything heavy is loaded",
     "gap/next_flight/search.py": "what the room is for",
     "workers/compatibility.py": "loads without Dask",

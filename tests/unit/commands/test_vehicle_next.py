@@ -12,7 +12,7 @@ from cpfls_cli.logs.formats import DATAFLASH_MAGIC
 from cpfls_cli.report.content import command_line
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.stages.vehicle import next_commands
-from cpfls_cli.validation.verdict import Trust
+from cpfls_cli.validation.trust import Trust
 from tests.builders.vehicle_search import CONFIG
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.pages.gap import NOT_SPLIT, WHAT_TO_FLY, repeatability_drawn
+from cpfls_cli.pages.gap_words import NOT_SPLIT, WHAT_TO_FLY, repeatability_drawn
 from cpfls_cli.report.canvas import picture_of
 from cpfls_cli.report.content import Box, Facts, Folded, Table, Text, unfolded
 from cpfls_cli.result import plain

@@ -9,7 +9,7 @@ from cpfls_cli import page
 from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.artifacts.vehicle_model import ResponseMismatch, vehicle_section
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.pages.gap import WHAT_TO_FLY
+from cpfls_cli.pages.gap_words import WHAT_TO_FLY
 from cpfls_cli.pages.model import against, slow_words
 from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
 from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
@@ -18,7 +18,7 @@ from cpfls_cli.playback.vehicle import Trade
 from cpfls_cli.report.content import Plot, Table, Text, unfolded
 from cpfls_cli.result import plain
 from cpfls_cli.stages.vehicle import remainder_curves, vehicle
-from cpfls_cli.validation.verdict import Trust, capped
+from cpfls_cli.validation.trust import Trust, capped
 from tests.builders.vehicle_models import number_of, remainder, source_of_vehicle, vehicle_of, whole
 
 NAMES = ("inertia.Ixx", "rotor_drag.k_d", "remainder.0_0_0", "remainder_force.3_0_0", "remainder_force.3_0_1")

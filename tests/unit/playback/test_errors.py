@@ -9,7 +9,7 @@ from cpfls_cli.playback.errors import MODEL, ByHorizon, Errors, Prediction
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of, still_runs
 from cpfls_cli.playback.replay import Played, fading, replay
-from cpfls_cli.validation.verdict import GOOD, Trust, trust_by_playback
+from cpfls_cli.validation.trust import GOOD, Trust, trust_by_playback
 from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights
 
 HORIZON = np.array([0.1, 0.2, 0.3, 0.4])

@@ -8,7 +8,8 @@ import pytest
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.validation.evidence import MODEL, Evidence
 from cpfls_cli.validation.replay import NOTHING_MOVES
-from cpfls_cli.validation.verdict import Reason, Trust, Verdict, _band, beside_loop, confirmed_axes, region_in_words
+from cpfls_cli.validation.trust import Trust
+from cpfls_cli.validation.verdict import Reason, Verdict, _band, beside_loop, confirmed_axes, region_in_words
 
 LOOP = LoopBounds(np.full(3, 0.5), np.full(3, 2.0), np.array([0.5, 0.8, 0.1]))
 
