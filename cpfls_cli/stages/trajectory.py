@@ -27,6 +27,7 @@ from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_tor
 from cpfls_cli.simulation.room_left import RoomLeft, room_left
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import demand_sentences, draw_attitude, draw_rotation
+from cpfls_cli.stages._mission import mission_of, mission_paths, mission_texts, mission_words
 from cpfls_cli.stages._path_options import (
     Added,
     BandOption,
@@ -44,10 +45,6 @@ from cpfls_cli.stages._path_options import (
     SizeOption,
     ToTellOption,
     WaypointsOption,
-    mission_of,
-    mission_paths,
-    mission_texts,
-    mission_words,
     option_overrides,
     require_no_room,
 )
