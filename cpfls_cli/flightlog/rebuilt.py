@@ -1,7 +1,7 @@
 """Commands of the rotors rebuilt from what the autopilot allocates, which is often logged faster than they are.
 
 A log may hold the commands of the rotors 10 times a second and what they are mixed from 50 times and more. They are
-mixed again (`autopilots.allocation`) and compared with the logged ones sample by sample: only what reproduces those is
+mixed again (`autopilots.motors`) and compared with the logged ones sample by sample: only what reproduces those is
 used.
 """
 
