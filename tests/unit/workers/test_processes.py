@@ -243,7 +243,7 @@ def test_too_little_memory_has_a_remedy():
 def test_any_other_error_is_named_and_its_origin_is_a_note():
     with pytest.raises(WorkerError, match="ZeroDivisionError: by nothing") as caught:
         result_of(failing(ZeroDivisionError("by nothing")))
-    assert "test_workforce.py" in caught.value.__notes__[0]
+    assert "test_processes.py" in caught.value.__notes__[0]
 
 
 def test_a_failure_survives_being_pickled():
