@@ -371,7 +371,7 @@ def test_a_vehicle_that_should_not_be_used(cpfls, refuse, vehicle_file, tmp_path
     monkeypatch.setattr(Vehicle, "verdict", "do-not-use")
     output = tmp_path / f"uav.{ending}"
     (line,) = refuse("export", vehicle_file, "-o", output)
-    assert line == f"{vehicle}: its verdict is do-not-use; --anyway exports it, marked as such"
+    assert line == f"{vehicle_file}: its verdict is do-not-use; --anyway exports it, marked as such"
     result = cpfls("export", vehicle_file, "-o", output, "--force")
     assert result.exit_code == 0
     mark = "DO NOT USE: this is the verdict on the model"
