@@ -88,7 +88,7 @@ ARPL, CRAZYPAD, CRAZYSWARM = (f"real/{name}" for name in ("arpl_crazyflie_1khz",
 
 @pytest.fixture(scope="module")
 def heavy(answer_of):
-    held = ["add_weight_W3_near_M3__E9_log02"]
+    held = ("add_weight_W3_near_M3__E9_log02",)
     return answer_of("crazypad", CRAZYPAD, "add_weight_W3_near_M3__E9_log00", held_out=held)
 
 
@@ -130,7 +130,7 @@ def test_a_filter_of_the_import_changes_no_floor(answer_of):
 
 
 def test_flights_without_weight_have_no_offset(answer_of):
-    normal = [f"normal_flight__E9_log0{number}" for number in range(3)]
+    normal = tuple(f"normal_flight__E9_log0{number}" for number in range(3))
     answer = answer_of("crazypad", CRAZYPAD, *normal[:2], held_out=normal[2:])
     assert names_of(answer) == set()
 
@@ -185,7 +185,7 @@ def test_commands_of_torque_and_thrust_tell_the_flapping_of_the_rotors(of_comman
 
 def test_the_most_cut_propeller_is_named(answer_of, coefficients_of):
     """M3 is back left and faces M1; with 4 mm less on both blades its commands reach their limit."""
-    flights = [f"cut_propeller_M3_4mm_4mm_39mm__E8_log0{number}" for number in (1, 0)]
+    flights = tuple(f"cut_propeller_M3_4mm_4mm_39mm__E8_log0{number}" for number in (1, 0))
     answer = answer_of("crazypad_usd", "real/crazypad_usd", *flights[:1], held_out=flights[1:])
     loss = coefficients_of(answer, "rotor_mismatch")["difference_1"]
     assert loss["value"] == pytest.approx(0.31, abs=0.05)
