@@ -54,12 +54,12 @@ def flight_of(seconds, **more):
 
 @pytest.fixture(scope="module")
 def flight():
-    return flight_of(12.0)
+    return flight_of(6.0)
 
 
 @pytest.fixture(scope="module")
 def commanded():
-    return replace(flight_of(12.0, commands=True), hold="previous")
+    return replace(flight_of(6.0, commands=True), hold="previous")
 
 
 def given(folder, ending, text=""):
