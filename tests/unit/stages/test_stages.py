@@ -1,13 +1,46 @@
-"""Figures of `look`: what they draw, as who does not see them reads it."""
+"""What single stages add to numerics: extensions, figures of look, reductions."""
 
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.report.canvas import picture_of
 from cpfls_cli.result import Estimate
+from cpfls_cli.stages.extend import named_effects
 from cpfls_cli.stages.look import FIGURES
+from cpfls_cli.stages.reduce import _naming
+from tests.builders import gap_artifacts as made
+
+
+@pytest.mark.parametrize("verdict", [GapVerdict.UNEXPLAINED, GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED])
+def test_only_names_are_added(verdict):
+    found = made.diagnosis()
+    with pytest.raises(ComputationError, match=f"the diagnosis is {verdict} and names no effect"):
+        named_effects(replace(found, verdict=verdict))
+    with pytest.raises(ComputationError, match="names no effect"):
+        named_effects(replace(found, effects=(), closest=found.effects))
+    for good in (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS):
+        assert named_effects(replace(found, verdict=good)) == found.effects
+
+
+def test_axes_that_get_worse_are_warned_of():
+    before, gap = np.array([2.0, 1.4, 10.0, 3.0, np.nan, 1.0]), made.extended().gap
+    for factor, axes in ((1.3, [0, 2]), (1.1, [])):
+        grown = replace(made.extended(), gap=replace(gap, before_floors=before, after_floors=factor * before))
+        assert grown.gap.worse_axes == axes
+        assert len(grown.warnings) == len(axes)
+
+
+def test_numbers_that_overflow_are_an_error_that_names_the_flight():
+    said = r"own/flight\.h5: the regressor has numbers too far apart"
+    with pytest.raises(ComputationError, match=said), _naming([Path("own/flight.h5")]):
+        np.linalg.eigvalsh(np.full((3, 3), np.nan))
+
 
 HZ = np.array([1.0, 2.0, 5.0, 10.0])
 ROTORS = tuple(
