@@ -231,6 +231,8 @@ def plain(given: Any) -> Any:
         return {name: plain(getattr(given, name)) for name in (*getattr(given, "SHOWN", ()), *own)}
     if isinstance(given, Mapping):
         return {name: plain(each) for name, each in given.items()}
+    if isinstance(given, np.ndarray) and given.dtype.kind in "biuf":
+        return (given if np.isfinite(given).all() else np.where(np.isfinite(given), given, np.array(None))).tolist()
     if isinstance(given, tuple | list | np.ndarray):
         return [plain(each) for each in given]
     given = given.item() if hasattr(given, "item") else given

@@ -53,15 +53,14 @@ def fly_mujoco(model: Any, course: Course, controls: Controls, *, lags: bool) ->
     off, stated, flags = mujoco.mjtDisableBit, model.opt.timestep, model.opt.disableflags
     steps = course.steps(stated)
     data, body, start = mujoco.MjData(model), _Body.of(model), course.start
-    asked, filtered = controls.of(course.commands, model), np.flatnonzero(model.actuator_actadr >= 0).tolist()
-    begun = asked[:, 0, filtered]
+    asked, filtered = controls.of(course.commands, model), np.flatnonzero(model.actuator_actadr >= 0)
+    begun, times = asked[:, 0, filtered], model.actuator_dynprm[filtered, 0]
     # Speeds are lines between samples, and their squares are none.
     fine = course.finer_flight
     fine = replace(fine, speed=controls.of(fine.speed, model))
     controlled = replace(course, flight=fine, starts=course.finer * course.starts, finer=1)
-    for column, own in enumerate(filtered if lags else ()):
-        lagging = RotorResponse(lag_s=float(model.actuator_dynprm[own, 0]))
-        begun[:, column] = controlled.lagged(lagging)[:, own]
+    for lag in np.unique(times) if lags else ():
+        begun[:, times == lag] = controlled.lagged(RotorResponse(lag_s=float(lag)))[:, filtered[times == lag]]
 
     def along(run: int) -> Iterator[State]:
         mujoco.mj_resetData(model, data)

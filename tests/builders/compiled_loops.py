@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-PACKAGE = Path(__file__).resolve().parents[2] / "cpfls_cli"
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def regressor():
@@ -25,22 +25,44 @@ def regressor():
     samples.products(uniform_breakpoints(structure))
 
 
-LOOPS = {"regressor": regressor}
+def payload():
+    """Swing a load under a hook that stays where it is."""
+    from cpfls_cli.effects.catalogue.payload import swing
+    from cpfls_cli.effects.signals import Signals
+    from cpfls_cli.vehicle.settings import VehicleSettings
+
+    still = {name: np.zeros((99, 3)) for name in ("body_rate", "attitude", "velocity")}
+    swing(Signals(time=0.01 * np.arange(99), vehicle=VehicleSettings(), **still), 1.0, 0.1)
+
+
+def gusts():
+    """Fly in gusts for a moment."""
+    from tests.builders.gusty_flights import SMALL, Flight, gusty_flights
+
+    list(gusty_flights([Flight(SMALL)], 0.1))
+
+
+LOOPS = {
+    "cpfls_cli/regressor/kernels.py": regressor,
+    "cpfls_cli/effects/catalogue/payload.py": payload,
+    "tests/builders/gusty_flights.py": gusts,
+}
+"""What calls the loops of a source."""
 
 
 def missing():
-    """Rooms whose loops were not compiled since their source was written."""
-    for room in LOOPS:
-        kernels = PACKAGE / room / "kernels.py"
-        kept = [index.stat().st_mtime for index in (kernels.parent / "__pycache__").glob("kernels.*.nbi")]
-        if max(kept, default=0.0) < kernels.stat().st_mtime:
-            yield room
+    """Sources whose loops were not compiled since they were written."""
+    for source in LOOPS:
+        path = ROOT / source
+        kept = [index.stat().st_mtime for index in (path.parent / "__pycache__").glob(f"{path.stem}.*.nbi")]
+        if max(kept, default=0.0) < path.stat().st_mtime:
+            yield source
 
 
 def compile_missing():
     """Compile what is missing, side by side."""
     command = (sys.executable, "-m", "tests.builders.compiled_loops")
-    started = [subprocess.Popen((*command, room), cwd=PACKAGE.parent) for room in missing()]
+    started = [subprocess.Popen((*command, source), cwd=ROOT) for source in missing()]
     for process in started:
         process.wait()
 

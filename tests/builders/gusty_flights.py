@@ -163,21 +163,26 @@ def _path(number, reach, swing, samples):
 
 def _sines(rng, turns, size, samples):
     """Add sines of random phases: value, first and second derivative, shape (samples, 9)."""
-    phase = np.arange(samples)[:, None, None] * STEP_S * turns + rng.uniform(0, 2 * np.pi, (len(size), len(turns)))
-    sine, cosine = size * np.sin(phase), size * np.cos(phase)
-    return np.hstack([sine.sum(axis=2), (turns * cosine).sum(axis=2), -(turns**2 * sine).sum(axis=2)])
+    waves = -1j * size * np.exp(1j * rng.uniform(0, 2 * np.pi, (len(size), len(turns))))
+    waves = np.vstack([(1j * turns) ** power * waves for power in range(3)])
+    # Products of blocks and steps: sines of each sample took nine tenths of the time of a flight.
+    blocks, steps = (
+        np.exp(1j * STEP_S * np.outer(each, turns)) for each in (np.arange(0, samples, 128), np.arange(128))
+    )
+    return ((waves * blocks[:, None]) @ steps.T).real.swapaxes(1, 2).reshape(-1, len(waves))[:samples]
 
 
 def _flown(flights, path, pushes, shoves, noise):
     """Integrate each flight; give motion with the measured rate, speed, command and wanted up, flights second."""
-    logs = np.empty((-(-len(path) // EVERY), len(flights), 29))
+    # Of each flight without gaps, so that one form of the loop is compiled.
+    logs = np.empty((len(flights), -(-len(path) // EVERY), 29))
     for number, (truth, *_, bandwidth) in enumerate(flight[:5] for flight in flights):
         hover, outer = truth.mass * GRAVITY / 4 / truth.thrust_factor, min(2.0, bandwidth / 6)
         body = np.array([truth.mass, truth.lag_s, truth.damping, truth.drag, *truth.inertia, truth.rotor_drag])
         pilot = np.array([outer**2, 1.6 * outer, 0.05 * hover, 4 * hover, *(bandwidth * np.array([1.0, 1.0, 0.4]))])
         told = (np.ascontiguousarray(each[:, number]) for each in (path, pushes, shoves, noise))
-        _integrated(body, pilot, truth.mixer, np.linalg.inv(truth.mixer), hover**0.5, *told, logs[:, number])
-    parts = np.split(logs, [3, 6, 15, 18, 22, 26], axis=2)
+        _integrated(body, pilot, truth.mixer, np.linalg.inv(truth.mixer), hover**0.5, *told, logs[number])
+    parts = np.split(logs.swapaxes(0, 1), [3, 6, 15, 18, 22, 26], axis=2)
     return [part.reshape(*part.shape[:2], 3, 3) if part.shape[2] == 9 else part for part in parts]
 
 

@@ -1,7 +1,13 @@
-"""Wrong configs: one line for each wrong key, naming file, key, value and what was meant."""
+"""Configs: what is printed loads again, and each wrong key has a line."""
+
+import json
 
 import pytest
+import yaml
 
+from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import SECTIONS, Study
+from cpfls_cli.report.content import number
 from tests.builders.studies import with_vehicle
 
 
@@ -221,3 +227,92 @@ def test_an_inertia_that_flights_can_correct_is_taken(cpfls, tmp_path):
     config = tmp_path / "study.yaml"
     config.write_text(with_vehicle("vehicle: {inertia_kg_m2: [0.42, 0.42, 1.2]}"))
     assert cpfls("config", config).exit_code == 0
+
+
+def test_default_is_the_default_study(cpfls, tmp_path):
+    path = tmp_path / "default.yaml"
+    path.write_text(cpfls("config").stdout)
+    assert load_study(path) == Study()
+
+
+def test_shipped_configs_load_and_print_the_same_study(cpfls, configs, tmp_path):
+    for config in configs:
+        path = tmp_path / config.name
+        path.write_text(cpfls("config", config).stdout)
+        assert load_study(path) == load_study(config), config
+
+
+def test_any_yaml_reader_reads_it_as_the_json_says(cpfls, configs):
+    for config in configs:
+        as_json = cpfls.told("config", config)
+        assert yaml.safe_load(cpfls("config", config).stdout) == as_json
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_section(cpfls, study, section):
+    printed = yaml.safe_load(cpfls("config", study, "--section", section).stdout)
+    whole = cpfls.told("config", study)
+    assert printed == {"seed": 1, section: whole[section]}
+
+
+def test_single_key_and_several_sections(cpfls, study):
+    words = ("config", study, "--section", "vehicle.mass_kg", "--section", "reduction", "--json")
+    printed = json.loads(cpfls(*words).stdout)
+    assert printed["vehicle"] == {"mass_kg": 6.0}
+    assert set(printed) == {"seed", "vehicle", "reduction"}
+
+
+def test_unknown_section(refuse, study):
+    (line,) = refuse("config", study, "--section", "vehicl")
+    assert line.startswith("--section vehicl: no such section or key; the sections are vehicle, ")
+
+
+def test_overrides_need_a_config(refuse):
+    (line,) = refuse("config", "--set", "seed=2")
+    assert line == "--set seed=2: needs a CONFIG"
+
+
+def test_overrides_show(cpfls, study):
+    words = ("config", study, "--set", "vehicle.rotors.0.spin=-1", "--set", "reduction.criterion=A", "--seed", 9)
+    shown = cpfls.told(*words)
+    assert (shown["seed"], shown["reduction"]["criterion"]) == (9, "A")
+    assert [rotor["spin"] for rotor in shown["vehicle"]["rotors"]] == [-1, -1, 1, -1]
+
+
+@pytest.mark.parametrize("dry", [(), ("--dry-run",)], ids=["run", "dry-run"])
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [
+        (550, "the training set has only 549 samples; keep fewer"),
+        (37, "the training set has rank 113, which takes 38 samples or more"),
+    ],
+)
+def test_size_that_does_not_suit_the_flight(refuse, pipeline, study, tmp_path, size, message, dry):
+    words = ("-o", tmp_path / "out.h5", "--set", f"reduction.size={size}", *dry)
+    assert refuse("reduce", study, pipeline.flight, *words) == [
+        f"{pipeline.flight}: reduction.size = {size}: {message}"
+    ]
+
+
+def test_all_samples_can_be_asked_for(cpfls, pipeline, study, tmp_path):
+    words = ("-o", tmp_path / "out.h5", "--set", "reduction.size=549", "--dry-run")
+    cpfls.done("reduce", study, pipeline.flight, *words)
+
+
+@pytest.mark.decides
+@pytest.mark.parametrize(
+    ("size", "target", "words"),
+    [
+        ("60", 2.0, "reduction.size stopped the selection; raise it or set it to null"),
+        ("null", 2.0, "all samples are in"),
+        ("60", 1e9, None),
+    ],
+)
+def test_a_condition_number_that_is_not_reached_is_said(cpfls, pipeline, study, tmp_path, size, target, words):
+    options = ("--set", f"reduction.size={size}", "--set", f"reduction.condition_number={target}", "--json")
+    faster = ("--set", "reduction.criterion=D", "--set", "identification.training_share=0.2")
+    result = cpfls("reduce", study, pipeline.flight, "-o", tmp_path / "out.h5", *options, *faster)
+    reached = json.loads(result.stdout)["condition_number"]
+    note = f"the target reduction.condition_number = 2 is not reached, the selection has {number(reached, 5)}: {words}"
+    assert (f"cpfls: note: {note}\n" in result.stderr) is bool(words)
+    assert ("reduction.condition_number" in result.stderr) is bool(words)

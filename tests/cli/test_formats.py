@@ -1,8 +1,12 @@
-"""The formats are well formed, `cpfls info --format` describes them, and docs/format.md says what all share."""
+"""Formats, benchmarks and examples are as the docs have them."""
 
+import runpy
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+import typer
+from typer.testing import CliRunner
 
 from cpfls_cli.artifacts.gate import SCHEMA_VERSION
 from cpfls_cli.result import datasets
@@ -58,3 +62,34 @@ def test_a_wrong_name_lists_those_that_there_are(cpfls):
     assert result.exit_code == 2
     assert "no such format (did you mean flight or flight-numbers?); there are changed," in result.stderr
     assert "leave out FILE or --format" in cpfls("info", "flight.h5", "--format", "flight").stderr
+
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+OF_THE_EXTRA = {"jax", "rotorpy"}
+WITHOUT_OPTIONS = {"__init__", "comparison"}
+NAMES = sorted(path.stem for path in BENCHMARKS.glob("*.py") if path.stem not in WITHOUT_OPTIONS)
+
+
+@pytest.mark.parametrize("name", [*NAMES, "paper.report"])
+def test_every_benchmark_starts(name):
+    try:
+        module = import_module(f"benchmarks.{name}")
+    except ModuleNotFoundError as missing:
+        if missing.name not in OF_THE_EXTRA:
+            raise
+        pytest.skip(f"{missing.name} comes with the extra simulators")
+    app = typer.Typer()
+    app.command()(module.main)
+    assert CliRunner().invoke(app, ["--help"]).exit_code == 0
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def test_control_with_a_model_follows_closer_than_feedback_alone(cpfls, study, pipeline, tmp_path, capsys):
+    path = tmp_path / "path.h5"
+    cpfls.done("trajectory", study, "-o", path, "--set", "trajectory.sample_time_s=0.05")
+    runpy.run_path(str(EXAMPLES / "computed_torque.py"))["main"](study, path, pipeline.model)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    errors = {name: [float(size) for size in sizes] for name, *sizes in lines}
+    assert all(own < other for own, other in zip(errors["model"], errors["feedback"], strict=True))

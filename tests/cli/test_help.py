@@ -1,13 +1,21 @@
-"""Help, version and usage."""
+"""Help, version, usage, the cheat sheet, and command lines as the source has them."""
 
+import inspect
+import json
+import re
+import shlex
 import subprocess
 import sys
+from pathlib import Path
+from typing import get_args
 
 import pytest
 import typer
 
 from cpfls_cli import __version__
-from cpfls_cli.cli.stages import app
+from cpfls_cli.cli.options import WORKFLOWS, sheet
+from cpfls_cli.cli.stages import PARTS, STAGES, app, command_line
+from cpfls_cli.stage import loaded
 
 COMMANDS = (
     "look",
@@ -83,3 +91,76 @@ def test_wrong_usage(cpfls, words, message):
     assert result.exit_code == 2
     assert result.stdout == ""
     assert message in result.stderr
+
+
+ROOT = Path(__file__).parents[2]
+LISTED = [command for _, commands in WORKFLOWS for command in commands]
+
+
+def test_the_help_begins_with_it_on_one_screen(cpfls):
+    said = cpfls("--help").stdout
+    lines = sheet("  ").splitlines()
+    assert "\n".join(lines) in said
+    assert len(lines) <= 24
+    assert max(map(len, lines)) <= 80
+    assert said.index(lines[-1]) < said.index("Options:")
+    # Wider terminals keep its lines.
+    assert "\n".join(lines) in cpfls("-h").stdout
+
+
+def test_readme_begins_with_it():
+    page = (ROOT / "README.md").read_text()
+    assert sheet("    ") in page
+    assert page.index(sheet("    ")) < page.index("## Install")
+
+
+@pytest.mark.parametrize("command", LISTED)
+def test_each_command_is_taken_as_it_stands(command):
+    program, name, *words = shlex.split(command)
+    if program == "make":
+        assert re.search(rf"^{name}:", (ROOT / "Makefile").read_text(), re.M)
+        return
+    assert program == "cpfls"
+    group = typer.main.get_command(app)
+    # A shell writes the files that a pattern stands for.
+    words = [own for word in words for own in (["logs/a.csv", "logs/b.csv"] if word == "logs/*" else [word])]
+    with group.commands[name].make_context(name, list(words)) as context:
+        assert context.params["output"] == Path(words[words.index("-o") + 1])
+
+
+FILES = [file for file in sorted(STAGES.glob("[a-z]*.py")) if file.stem not in PARTS]
+LOADS = """
+import json, sys
+from pathlib import Path
+import cpfls_cli.cli.stages
+from cpfls_cli.cli.stages import command_line
+print(json.dumps({name: sorted({module.partition(".")[0] for module in set(sys.modules)})
+    for name in json.loads(sys.argv[1]) if command_line(Path(name))}))
+"""
+
+
+def described(parameter):
+    """All that a parameter says: its options are objects, which the library compares by identity."""
+    kind, *options = get_args(parameter.annotation)
+    said = [{key: value for key, value in vars(own).items() if not callable(value)} for own in options]
+    return parameter.name, str(kind), str(parameter.default), said
+
+
+@pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
+def test_it_is_that_of_the_function(file):
+    read, own = command_line(file), loaded(file.stem)
+    parameters = inspect.signature(own.function, eval_str=True).parameters.values()
+    assert list(map(described, read.parameters)) == [described(each) for each in parameters if each.name != "run"]
+    flags = (bool(own.study), own.folder, own.fills is not None, own.several)
+    assert (read.study, read.folder, read.fills, read.several) == flags
+    assert (read.output is None) == (own.output is None)
+
+
+def test_it_loads_nothing_heavy():
+    words = [sys.executable, "-c", LOADS, json.dumps([str(file) for file in FILES])]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    heavy = {"h5py", "jinja2", "matplotlib", "numba", "numpy", "scipy", "yaml"}
+    assert {
+        name: heavy & set(modules) for name, modules in json.loads(done.stdout).items() if heavy & set(modules)
+    } == {}

@@ -1,5 +1,6 @@
-"""What people see on a terminal: a bar with the generation and the time left, and what -v says above it."""
+"""What people see on a terminal, and what -v and --json print."""
 
+import json
 import os
 import pty
 import re
@@ -7,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cpfls_cli import compiling
@@ -17,6 +19,7 @@ from cpfls_cli.page import said
 from cpfls_cli.report.content import Folded, Outcome, Text
 from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.forked import Forked
+from tests.builders.studies import VEHICLE
 
 
 @pytest.fixture
@@ -257,3 +260,137 @@ def test_what_turns_or_hides_text_in_a_name_reaches_no_terminal_and_no_page(orde
     assert "".join(terminal_lines([block])) == f"gyro_x{escaped} is no column"
     assert order not in said(block.text)
     assert visible("a table\n\tß → µ ́") == "a table\n\tß → µ ́"
+
+
+LOG = "t,p,q,r,roll,pitch,yaw\n" + "".join(
+    f"{row / 100},0.1,0.2,0.3,{row % 7},{row % 5},{row % 3}\n" for row in range(400)
+)
+SIGNALS = "{body_rate: {columns: [p, q, r], unit: rad/s}, body_torque: {columns: [roll, pitch, yaw], unit: N m}}"
+
+
+@pytest.fixture
+def words(pipeline, tmp_path):
+    """Arguments of each stage command, inputs first."""
+    log = tmp_path / "log.csv"
+    log.write_text(LOG)
+    return {
+        "trajectory": ([], []),
+        "simulate": ([pipeline.trajectory], []),
+        "import": ([log], ["--set", "import.time_column=t", "--set", f"import.signals={SIGNALS}"]),
+        "reduce": ([pipeline.flight], []),
+        "identify": ([pipeline.flight], []),
+        "report": ([pipeline.trajectory, pipeline.selection], []),
+    }
+
+
+COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "report")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_verbose_names_what_is_read_and_written(cpfls, words, study, tmp_path, command):
+    inputs, options = words[command]
+    output = tmp_path / "out"
+    result = cpfls.done(command, study, *inputs, "-o", output, "-v", *options)
+    said = [line for line in result.stderr.splitlines() if re.match(rf"{command}: (reads|wrote) ", line)]
+    sizes = r" \([\d.]+ (bytes|kB|MB)\)"
+    patterns = [rf"{command}: reads {re.escape(str(path))}{sizes}" for path in [study, *inputs]]
+    patterns.append(rf"{command}: wrote {re.escape(str(output))}{sizes} in \d+\.\d\d s")
+    assert len(said) == len(patterns)
+    assert all(re.fullmatch(pattern, line) for pattern, line in zip(patterns, said, strict=True)), said
+
+
+def test_size_is_that_of_the_file(cpfls, study, tmp_path):
+    result = cpfls("trajectory", study, "-o", tmp_path / "t.h5", "-v")
+    assert f"({(tmp_path / 't.h5').stat().st_size / 1000:.1f} kB)" in result.stderr
+
+
+@pytest.mark.parametrize("options", [(), ("-q",), ("-q", "-v")], ids=" ".join)
+def test_nothing_is_said_unasked(cpfls, study, tmp_path, options):
+    assert cpfls("trajectory", study, "-o", tmp_path / "t.h5", *options).stderr == ""
+
+
+def test_a_dry_run_writes_nothing_and_says_so(cpfls, study, tmp_path):
+    result = cpfls("trajectory", study, "-o", tmp_path / "t.h5", "-v", "--dry-run")
+    assert "reads" in result.stderr
+    assert "wrote" not in result.stderr
+
+
+KEYS = {
+    "trajectory": {"samples", "duration_s", "dt_s", "max"},
+    "flight": {"samples", "max_torque"},
+    "selection": {"candidates", "selected", "criterion", "rank", "condition_number", "condition_number_full"},
+    "model": {
+        "mse",
+        "max_error",
+        "relative_error",
+        "condition_number",
+        "rank",
+        "parameters",
+        "generations",
+        "evaluations",
+        "baselines",
+        "held_out",
+        "seconds",
+    },
+}
+
+
+@pytest.mark.parametrize("stage", KEYS)
+def test_json_is_one_object_on_one_line_with_the_promised_keys(pipeline, stage):
+    assert pipeline.printed[stage].count("\n") == 1
+    assert KEYS[stage] <= set(pipeline.summaries[stage])
+
+
+def test_figures_of_the_tiny_study(pipeline):
+    trajectory, flight, selection, model = (pipeline.summaries[stage] for stage in KEYS)
+    # Rows of 54.86 s at 0.1 s, counted from 0; and the selection that the config asks for.
+    assert trajectory["samples"] == flight["samples"] == 549
+    assert trajectory["dt_s"] == 0.1
+    assert len(flight["max_torque"]) == 3
+    assert (selection["candidates"], selection["selected"], selection["rank"]) == (549, 60, 113)
+    assert (model["parameters"], model["rank"], model["generations"]) == (113, 113, 1)
+    assert model["evaluations"] >= 10
+    assert {"rigid-body", "constant-inertia", "torque-zero"} <= set(model["baselines"])
+    assert model["baselines"]["rigid-body"]["mse"] < 1e-20 < model["mse"]
+    assert model["held_out"] == {}
+
+
+def test_held_out_part_and_other_flights_are_judged_by_name(cpfls, pipeline, study, tmp_path):
+    path, other = tmp_path / "path.h5", tmp_path / "other.h5"
+    cpfls("trajectory", study, "-o", path, "--set", "trajectory.sample_time_s=0.2")
+    cpfls("simulate", study, path, "-o", other)
+    words = ("identify", study, pipeline.flight, "--validate", other, "-o", tmp_path / "m.h5", "--json")
+    result = cpfls(*words, "--set", "identification.training_share=0.6")
+    held_out = json.loads(result.stdout)["held_out"]
+    assert set(held_out) == {"held-out rest", "other.h5"}
+    assert held_out["other.h5"]["samples"] == 275
+    assert {"mse", "relative_error", "baselines"} <= set(held_out["held-out rest"])
+
+
+def test_an_import_tells_in_json_and_in_lines_what_it_read_and_what_it_did_about_it(cpfls, tmp_path):
+    time = np.delete(np.arange(0.0, 4.0, 0.02), [50, 51, 52])
+    angles = [0.2 * np.sin((2 + axis) * time) for axis in range(3)]
+    angles[1][120] += 1
+    log, config = tmp_path / "log.csv", tmp_path / "study.yaml"
+    np.savetxt(log, np.column_stack([time, *angles]), delimiter=",", header="t,roll,pitch,yaw", comments="")
+    signals = "signals: {attitude: {columns: [roll, pitch, yaw], unit: rad}}"
+    config.write_text(f"import: {{{signals}, torque_source: null, crop_s: [0, 3.5]}}\n{VEHICLE}")
+    result = cpfls("import", config, log, "-o", tmp_path / "flight.h5", "--json")
+    assert (result.exit_code, result.stdout.count("\n")) == (0, 1)
+    summary = json.loads(result.stdout)
+    assert summary["samples"] == 176
+    assert summary["rate_hz"] == summary["log_rate_hz"] == pytest.approx(50)
+    assert summary["dropped"] == {"crop": 24}
+    assert (summary["gaps"], summary["longest_gap_s"]) == (1, pytest.approx(0.08))
+    assert summary["span_s"] == pytest.approx([0, 3.5])
+    assert (summary["lowpass_hz"], summary["spikes"], summary["suspected_spikes"]) == (None, {}, {"pitch": 1})
+    assert {"samples_read", "missing", "saturated", "delay_s", "delay_r2", "signals"} <= set(summary)
+    assert "1 suspected spike in column pitch" in result.stderr
+    repaired = cpfls("import", config, log, "-o", tmp_path / "f.h5", "--set", "import.spike_deviations=10", "-v")
+    assert [line.rsplit(maxsplit=1) for line in repaired.stdout.splitlines()[-3:]] == [
+        ["outside import.crop_s: rows dropped", "24"],
+        ["gaps in the time stamps, up to 0.08 s: interpolated", "1"],
+        ["spikes: values interpolated", "1"],
+    ]
+    assert "What was found in the log of f.h5." in repaired.stdout.splitlines()
+    assert "spike" not in repaired.stderr

@@ -1,8 +1,19 @@
+"""Rotations, and inertia as a tensor."""
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli import rotations
+from cpfls_cli.inertia import (
+    INERTIA_ENTRIES,
+    INERTIA_PARAMETERS,
+    beyond_any_body,
+    body_torque_columns,
+    more_than_others,
+    symmetric,
+    symmetric_columns,
+)
 
 
 def states(count=100):
@@ -82,3 +93,68 @@ def test_cross_product_is_numpys_to_the_bit(shapes):
     rng = np.random.default_rng(0)
     first, second = (rng.normal(size=shape) for shape in shapes)
     np.testing.assert_array_equal(rotations.cross(first, second), np.cross(first, second))
+
+
+PARAMETERS = np.array([1.0, 2.0, 3.0, 0.4, 0.5, 0.6])
+MATRIX = np.array([[1.0, 0.4, 0.5], [0.4, 2.0, 0.6], [0.5, 0.6, 3.0]])
+
+
+def vectors(seed, count=50):
+    return np.random.default_rng(seed).normal(size=(count, 3))
+
+
+def test_six_parameters_fill_the_matrix():
+    np.testing.assert_array_equal(symmetric(PARAMETERS), MATRIX)
+
+
+def test_three_parameters_fill_the_diagonal():
+    np.testing.assert_array_equal(symmetric((1.0, 2.0, 3.0)), np.diag([1.0, 2.0, 3.0]))
+
+
+def test_names_say_the_places():
+    axes = "xyz"
+    assert tuple(f"I{axes[row]}{axes[column]}" for row, column in INERTIA_ENTRIES) == INERTIA_PARAMETERS
+
+
+def test_columns_times_parameters_are_the_matrix_times_the_vectors():
+    v = vectors(1)
+    np.testing.assert_allclose(symmetric_columns(v) @ PARAMETERS, v @ MATRIX, atol=1e-14)
+
+
+def test_body_torque_by_euler_s_equations():
+    (p, q, r), (dp, dq, dr) = vectors(2).T, vectors(3).T
+    xx, yy, zz = PARAMETERS[:3]
+    expected = np.column_stack([xx * dp + (zz - yy) * q * r, yy * dq + (xx - zz) * p * r, zz * dr + (yy - xx) * p * q])
+    torque = body_torque_columns(vectors(2), vectors(3))[:, :, :3] @ PARAMETERS[:3]
+    np.testing.assert_allclose(torque, expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_torque_of_a_full_tensor_is_the_change_of_its_angular_momentum(axis):
+    """Along a turn about one body axis, where world and body axes agree at time 0: d(R I omega)/dt."""
+    rate, acceleration, step = 1.3, -0.7, 1e-5
+    direction = np.eye(3)[axis]
+
+    def momentum(time):
+        angle, speed = rate * time + acceleration * time**2 / 2, rate + acceleration * time
+        return Rotation.from_rotvec(angle * direction).apply(MATRIX @ (speed * direction))
+
+    expected = (momentum(step) - momentum(-step)) / (2 * step)
+    found = body_torque_columns(rate * direction[None], acceleration * direction[None])[0] @ PARAMETERS
+    np.testing.assert_allclose(found, expected, atol=1e-8)
+
+
+def test_a_body_with_all_its_mass_in_the_hubs_can_be_and_one_twice_as_heavy_cannot():
+    hubs = np.array([[0.3, 0.0, 0.02], [0.0, -0.2, 0.02], [-0.3, 0.0, 0.02], [0.0, 0.2, 0.02]])
+    in_hubs = {"inertia.Ixx": 6 * 0.0404, "inertia.Iyy": 6 * 0.0904, "inertia.Izz": 6 * 0.09, "thrust_factor": 1e9}
+    assert beyond_any_body(6.0, hubs, in_hubs) == {}
+    twice = beyond_any_body(6.0, hubs, {name: 2 * value for name, value in in_hubs.items()})
+    assert list(twice) == ["inertia.Ixx", "inertia.Iyy", "inertia.Izz"]
+    assert twice["inertia.Iyy"] == pytest.approx(1.25**2 * 6 * 0.0904)
+
+
+@pytest.mark.parametrize(
+    ("moments", "named"), [((1.0, 2.0, 3.0), ()), ((3.4, 2.0, 1.0), ("Ixx",)), ((0.01, 0.1, 0.05), ("Iyy",))]
+)
+def test_a_moment_is_no_more_than_the_others_together_but_for_what_is_measured(moments, named):
+    assert more_than_others(moments) == named

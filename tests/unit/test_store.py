@@ -1,6 +1,7 @@
-"""Results in files."""
+"""Results describe themselves, and are stored whole or not at all."""
 
 import dataclasses
+import json
 from typing import ClassVar
 
 import h5py
@@ -15,9 +16,9 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.result import about, part, plain, result
+from cpfls_cli.result import Estimate, about, column, datasets, described_fields, part, plain, result
 from tests.builders import exported_models
-from tests.builders.results import Craft, craft, estimate
+from tests.builders.results import Craft, Curve, Rotor, craft, estimate
 from tests.builders.vehicle_models import whole, wrench_somewhere
 
 ORIGIN = store.Origin(
@@ -341,3 +342,46 @@ def test_a_file_of_a_newer_version_is_said_to_be_one(written):
     changed(written, lambda file: file.attrs.modify("schema_version", 9))
     with pytest.raises(InputError, match="schema_version = 9: written by a newer cpfls; this one reads up to"):
         store.read(written, Craft)
+
+
+def test_it_is_frozen_and_takes_its_fields_by_keyword():
+    with pytest.raises(AttributeError):
+        craft().mass = 3.0
+    with pytest.raises(TypeError):
+        Estimate(1.0, 0.0, 2.0)
+
+
+def test_json_holds_what_is_brief_and_what_is_shown():
+    told = plain(craft(mass=2.5))
+    assert told["heavy"] is True
+    assert told["hover"] == {"value": None, "low": None, "high": None}
+    assert told["rotors"][0]["share"] == {"value": 0.2, "low": -0.8, "high": 1.2}
+    assert told["rotors"][0]["lag"] is None
+    assert told["rotors"][1]["peaks"][0]["kinds"] == ["motor", "propeller"]
+    assert list(told["curves"]) == ["yaw", "roll"]
+    assert "gain" not in told["curves"]["roll"]
+    assert json.loads(json.dumps(told, allow_nan=False)) == told
+
+
+def test_fields_say_what_they_are():
+    own = {each.name: each for each in described_fields(Craft)}
+    assert own["battery"].optional
+    assert own["battery"].kind is str
+    assert own["kind"].scalar is str
+    assert own["order"].scalar is int
+    assert own["marked"].scalar is bool
+    assert own["notes"].many
+    assert (own["rotors"].table, own["rotors"].inner) == (True, Rotor)
+    assert (own["curves"].named, own["curves"].inner) == (True, Curve)
+    assert (own["hover"].inner, own["hover"].optional) == (Estimate, True)
+
+
+def test_datasets_are_listed_by_path():
+    paths = [path for path, _ in datasets(Craft)]
+    assert {"mass", "hover/low", "rotors/peaks/frequency", "curves/*/gain"} <= set(paths)
+    assert len(paths) == len(set(paths))
+
+
+def test_a_column_of_a_table():
+    assert column(craft().rotors, "name") == ["M1", "M2 ±|*x*"]
+    assert np.isclose(estimate(3.0, 2.0).half, 2.0)

@@ -1,19 +1,25 @@
-"""The evidence on a model in its artifact: what `identify` writes and says, and what the library makes of it."""
+"""What a model is judged on: flights to choose on, evidence, and flights that are too short."""
 
 import json
 import os
 import signal
+import warnings
 
 import h5py
 import numpy as np
 import pytest
 
 import cpfls_cli
+from cpfls_cli import load_model
 from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.findings import swings
+from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.report.content import sentence
 from cpfls_cli.result import datasets
 from cpfls_cli.validation import validate
 from tests.builders.identified_models import write_changed
+from tests.builders.studies import VEHICLE
 
 EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "verdict")
 VALIDATION = [path for path, _ in datasets(IdentifiedModel) if path.split("/")[0] in EVIDENCE]
@@ -133,3 +139,151 @@ def test_use_of_a_model_that_was_judged_unfit_is_told(validated, cpfls, study, p
         write_changed(validated[0], model, verdict__label=label)
         stderr = cpfls("replay", study, model, pipeline.flight, "--every", "50", "-o", output).stderr
         assert (told in stderr) if told else ("verdict" not in stderr)
+
+
+HELD_OUT = ("--set", "identification.choice=held-out")
+SEARCH = ("--set", "identification.generations=2")
+
+
+@pytest.fixture(scope="module")
+def others(cpfls, study, tmp_path_factory):
+    """Two more flights of the tiny study."""
+    folder, flights = tmp_path_factory.mktemp("others"), []
+    for displacement in (50, 40):
+        path, flight = (folder / f"{name}-{displacement}.h5" for name in ("trajectory", "flight"))
+        turned = ("--set", f"trajectory.displacement_m={displacement}.0")
+        for words in (("trajectory", study, *turned, "-o", path), ("simulate", study, path, "-o", flight)):
+            cpfls.done(*words)
+        flights.append(flight)
+    return flights
+
+
+def test_a_model_is_chosen_on_a_flight_and_judged_on_another(cpfls, study, pipeline, others, tmp_path):
+    model, (kept, judged) = tmp_path / "model.h5", others
+    words = ("--choose-on", kept, "--validate", judged, *HELD_OUT, *SEARCH)
+    summary = cpfls.told("identify", study, pipeline.flight, *words, "-o", model)
+    assert list(summary["held_out"]) == [judged.name]
+    again = cpfls("identify", study, pipeline.flight, "--validate", kept, *SEARCH, "-o", tmp_path / "b.h5", "--json")
+    # The same search, chosen by its objectives: never better on the flight that the other was chosen on.
+    assert 0 < summary["choice_error"] <= json.loads(again.stdout)["held_out"][kept.name]["mse"] * (1 + 1e-6)
+    with h5py.File(model) as file:
+        assert {"flight", "choose-on-1", "validate-1"} == set(file["inputs"])
+
+
+def test_choice_and_flights_must_go_together(refuse, study, pipeline, others, tmp_path):
+    output = ("-o", tmp_path / "out.h5")
+    (message,) = refuse("identify", study, pipeline.flight, *HELD_OUT, *output)
+    assert 'identification.choice = "held-out": needs a flight' in message
+    assert "--choose-on FLIGHT" in message
+    (message,) = refuse("identify", study, pipeline.flight, "--choose-on", others[0], *output)
+    assert "--choose-on" in message
+    assert "held-out" in message
+
+
+def test_a_flight_that_trains_or_judges_cannot_choose(refuse, study, pipeline, others, tmp_path):
+    output = ("-o", tmp_path / "out.h5")
+    (message,) = refuse("identify", study, pipeline.flight, "--choose-on", pipeline.flight, *HELD_OUT, *output)
+    assert "is a training flight" in message
+    same = ("--validate", others[0], "--choose-on", others[0])
+    (message,) = refuse("identify", study, pipeline.flight, *same, *HELD_OUT, *output)
+    assert "judges (--validate)" in message
+    twice = ("--choose-on", others[0], "--choose-on", others[0])
+    (message,) = refuse("identify", study, pipeline.flight, *twice, *HELD_OUT, *output)
+    assert "is given twice" in message
+
+
+def test_what_is_no_flight_cannot_choose(refuse, study, pipeline, tmp_path):
+    """Not even where the same file is an input of its own."""
+    words = ("--choose-on", pipeline.selection, *HELD_OUT, "-o", tmp_path / "out.h5")
+    (message,) = refuse("identify", study, pipeline.flight, "--selection", pipeline.selection, *words)
+    assert f"--choose-on {pipeline.selection}: is the selection, not a flight" in message
+    (message,) = refuse("identify", study, pipeline.flight, *words)
+    assert str(pipeline.selection) in message
+    assert "flight" in message
+
+
+def test_flights_of_another_vehicle_are_named(cpfls, study, pipeline, others, tmp_path):
+    """Their numbers are of that vehicle; they are used all the same."""
+    heavy = tmp_path / "heavy.h5"
+    path = others[0].with_name(others[0].name.replace("flight", "trajectory"))
+    inertia = ("--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]")
+    cpfls.done("simulate", study, path, *inertia, "-o", heavy)
+    words = ("identify", study, pipeline.flight, *HELD_OUT, *SEARCH, "--choose-on", heavy, "--validate", others[1])
+    result = cpfls.done(*words, "-o", tmp_path / "out.h5")
+    said = [line for line in result.stderr.splitlines() if "another vehicle" in line]
+    assert len(said) == 1
+    assert f"{heavy.name}: was made with another vehicle; these differ: vehicle.inertia_kg_m2" in said[0]
+
+
+def test_a_model_of_another_vehicle_is_named(cpfls, study, pipeline, tmp_path):
+    other = tmp_path / "other.yaml"
+    other.write_text(cpfls.done("config", study, "--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]").stdout)
+    said = f"{pipeline.model.name}: models a vehicle other than the config's; these differ: vehicle.inertia_kg_m2"
+    with warnings.catch_warnings(record=True) as noted:
+        warnings.simplefilter("always")
+        load_model(pipeline.model, other).predict(pipeline.flight)
+    assert any(said in str(each.message) for each in noted)
+
+
+STUDY = """\
+seed: 1
+import:
+  signals:
+    attitude: {columns: [roll, pitch, yaw], unit: rad}
+    body_rate: {columns: [p, q, r], unit: rad/s}
+    body_torque: {columns: [mx, my, mz], unit: N m}
+identification:
+  structure: cpfls
+  base: none
+  input_map: data-range
+  consequents: seesaw
+  products: additive
+  membership_functions: 5
+  population: 10
+  generations: 1
+  local_search: {enabled: false}
+  validation: {enabled: false}
+"""
+INERTIA = np.array([0.6, 0.6, 1.2])
+
+
+@pytest.fixture
+def notes(cpfls, tmp_path):
+    """Identify a model in a log of some seconds; give the notes of it."""
+
+    def call(seconds):
+        time, rng = np.arange(0.0, seconds, 0.02), np.random.default_rng(3)
+        pace = np.array([3.0, 2.5, 2.0])
+        attitude = 0.3 * np.sin(pace * time[:, None])
+        rate, change = 0.3 * pace * np.cos(pace * time[:, None]), -0.3 * pace**2 * np.sin(pace * time[:, None])
+        torque = INERTIA * change + 0.01 * rng.standard_normal(change.shape)
+        rows = np.column_stack([time, attitude, rate + 0.01 * rng.standard_normal(rate.shape), torque])
+        log, config, flight = (tmp_path / name for name in ("log.csv", "study.yaml", "flight.h5"))
+        np.savetxt(log, rows, delimiter=",", header="t,roll,pitch,yaw,p,q,r,mx,my,mz", comments="")
+        config.write_text(STUDY + VEHICLE)
+        for words in (("import", config, log, "-o", flight), ("identify", config, flight, "-o", tmp_path / "m.h5")):
+            result = cpfls.done(*words, "--force", "-v")
+        return [line for line in result.stderr.splitlines() if "swings" in line]
+
+    return call
+
+
+def test_two_seconds_are_too_short_and_it_says_how_long_would_do(notes):
+    (note,) = notes(2.0)
+    assert note.startswith("cpfls: note: the training flights are short: in 2 s the rates reverse 2, 2, 1 times about")
+    assert "roll, pitch, yaw, 5 swings for " in note
+    assert "train on about " in note
+
+
+def test_two_minutes_are_long_enough(notes):
+    assert notes(120.0) == []
+
+
+def test_noise_is_no_swing():
+    time = np.arange(0.0, 20.0, 0.01)
+    noise = 0.05 * np.random.default_rng(1).standard_normal((2000, 3))
+    rate = np.sin(np.array([1.0, 2.0, 3.0]) * time[:, None]) + noise
+    still = np.zeros_like(rate)
+    found = swings(TorqueData(time, Motion(still, rate, still), still))
+    assert found.seconds == pytest.approx(20.0)
+    np.testing.assert_allclose(found.by_axis, 20 * np.array([1, 2, 3]) / np.pi, atol=1.5)

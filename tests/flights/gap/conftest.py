@@ -1,6 +1,7 @@
 """The gap workflow on flights of others, with the shipped configs."""
 
 import json
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,9 @@ CONFIGS = Path(__file__).parents[3] / "configs" / "gap"
 
 @pytest.fixture(scope="session")
 def answer_of(tmp_path_factory):
-    """Run `cpfls gap` on logs below the folder of flights; what it says, for machines."""
+    """Run `cpfls gap` on logs below the folder of flights, once on each; what it says, for machines."""
 
+    @cache
     def call(config, folder, *names, held_out=(), options=()):
         paths = [path_of_log(folder, name) for name in (*names, *held_out)]
         held = [word for path in paths[len(names) :] for word in ("--held-out", path)]

@@ -2,12 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.dynamics import (
-    inertia_matrix,
-    inertia_matrix_gradient,
-    newton_euler_torque,
-    rigid_columns,
-)
+from cpfls_cli.dynamics import inertia_matrix, inertia_matrix_gradient, newton_euler_torque, rigid_columns
 from cpfls_cli.regressor.regressor import Motion
 from tests.builders.christoffel import torque
 

@@ -17,7 +17,7 @@ from tests.builders.simulator_files import mjcf_in_newtons, mjcf_of, rotorpy_of,
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
-FLIGHTS, SECONDS = 4, 40.0
+FLIGHTS, SECONDS = 4, 30.0
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Ground effect and vertical descent: what changes the thrust of each rotor by where and how it moves."""
+"""Effects on what rotors do: their state, mismatch, and the way from command to speed."""
 
 from dataclasses import replace
 
@@ -6,11 +6,18 @@ import numpy as np
 import pytest
 from scipy.interpolate import interp1d
 
+from cpfls_cli.effects.actuation import second_order
+from cpfls_cli.effects.catalogue.rotor_mismatch import gains
 from cpfls_cli.effects.catalogue.vertical_descent import (
     descent_state,
     induced_velocity,
 )
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.lag import delayed, lagged
+from cpfls_cli.vehicle.rotors import body_wrench, gain_modes, opposite_pairs
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.stepping import Machine, RotorMotion
+from cpfls_cli.vehicle.values import Each
 
 
 def level(flight, height, roll=0.0):
@@ -116,3 +123,166 @@ def test_bounds_hold_the_curves_of_the_sources(vehicle):
         coefficients = np.linalg.lstsq(hats, curve - 1, rcond=None)[0]
         assert (bounds[:, 0] < coefficients).all()
         assert (coefficients < bounds[:, 1]).all()
+
+
+def with_gains(vehicle, thrust, drag=(0.0,) * 4):
+    factors = zip(vehicle.rotors, thrust, drag, strict=True)
+    rotors = (
+        replace(
+            rotor,
+            thrust_factor_n_s2=rotor.thrust_factor_n_s2 * (1 + kappa),
+            drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * (1 + delta),
+        )
+        for rotor, kappa, delta in factors
+    )
+    return replace(vehicle, rotors=tuple(rotors))
+
+
+def circle(number):
+    angles = 2 * np.pi * np.arange(number) / number
+    return VehicleSettings(
+        rotors=tuple(
+            RotorSettings(position_m=(0.3 * np.cos(angle), 0.3 * np.sin(angle), 0.0), spin=1 - 2 * (index % 2))
+            for index, angle in enumerate(angles)
+        )
+    )
+
+
+def test_columns_are_what_other_factors_do(columns, flight):
+    true = with_gains(flight.vehicle, [0.05, -0.03, -0.05, 0.03], [-0.05, 0.07, -0.15, 0.13])
+    change = body_wrench(true, flight.rotor_speed).body_torque - flight.torque
+    found = columns("rotor_mismatch", flight).direct @ [0.1, -0.06, 0.1, 0.0]
+    np.testing.assert_allclose(found[:, :3], change, atol=1e-12)
+    np.testing.assert_allclose(found[:, 5], body_wrench(true, flight.rotor_speed).thrust - flight.thrust, atol=1e-9)
+
+
+def test_what_one_spin_lifts_more_shows_in_force_only(columns, flight):
+    """In torque it is a wrong Ixx and a wrong Iyy of opposite signs, which the inertia columns hold already."""
+    true = body_wrench(with_gains(flight.vehicle, [0.05, -0.05, 0.05, -0.05]), flight.rotor_speed)
+    found = columns("rotor_mismatch", flight).direct[..., 3] * 0.05
+    np.testing.assert_allclose(found[:, 5], true.thrust - flight.thrust, atol=1e-9)
+    assert not found[:, :5].any()
+    np.testing.assert_allclose(true.body_torque - flight.torque, flight.torque * [-0.05, 0.05, 0.0], atol=1e-12)
+
+
+def test_pairs_face_each_other_and_spin_alike(vehicle):
+    assert opposite_pairs(vehicle) == ((0, 2), (1, 3))
+    assert opposite_pairs(circle(6)) == ()
+    beside = (
+        replace(rotor, position_m=(rotor.position_m[0] + 0.01, *rotor.position_m[1:])) for rotor in vehicle.rotors
+    )
+    assert opposite_pairs(replace(vehicle, rotors=tuple(beside))) == ((0, 2), (1, 3))
+
+
+@pytest.mark.parametrize("number", [4, 6, 8])
+def test_nothing_that_an_inertia_could_stand_in_for_is_left(number):
+    modes = gain_modes(circle(number))
+    spins = np.array([rotor.spin for rotor in circle(number).rotors])
+    np.testing.assert_allclose(modes.T @ np.column_stack([np.ones(number), spins]), 0.0, atol=1e-12)
+    assert np.linalg.matrix_rank(modes) == 2
+
+
+def test_the_weaker_rotor_is_blamed(vehicle):
+    np.testing.assert_allclose(gains(vehicle, np.array([0.06, -0.1])), [0.0, -0.1, -0.06, 0.0])
+
+
+def step_by_step(link, speed, period):
+    """Speeds and accelerations of rotors behind a link, for speeds that are given step by step."""
+    rotors = speed.shape[1]
+
+    def build(memory, given):
+        passed = link(RotorMotion(Each(given), Each([0.0] * rotors)), memory)
+        return *passed.speed, *passed.acceleration
+
+    machine = Machine.of(build, rotors, period)
+    return np.split(np.array([machine.advance(tuple(row)) for row in speed.tolist()]), 2, axis=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"), [("motor_lag", {"time_constant_s": 0.05}), ("command_delay", {"delay_s": 0.03})]
+)
+def test_column_is_true_minus_commanded_wrench(columns, commanded, name, shape):
+    true = CATALOGUE[name].apply(commanded, shape)
+    assert true.commanded
+    change = body_wrench(commanded.vehicle, true.rotor_speed).body_torque - commanded.torque
+    found = columns(name, commanded, **shape).direct
+    np.testing.assert_allclose(found[:, :3, 0], change, atol=1e-12)
+    assert np.abs(found[:, :3]).max() > 0.1
+
+
+def test_stated_torque_lags_where_rotor_speeds_are_not_logged(columns, flight):
+    stated = np.sin(np.outer(flight.time, [3.0, 4.0, 5.0]))
+    known = replace(flight, rotor_speed=None, stated_torque=stated, commanded=True)
+    found = columns("motor_lag", known, time_constant_s=0.05).direct[..., 0]
+    np.testing.assert_allclose(found[:, :3], lagged(stated, 10.0).start - stated, atol=1e-12)
+    assert not found[:, 3:].any()
+
+
+@pytest.mark.parametrize("upper", [(1.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.5, 2.0)])
+@pytest.mark.parametrize("frequency", [0.0, 1.0, 3.0, 9.0])
+def test_filter_answers_a_wave_as_its_formula_says(upper, frequency):
+    natural, damping, period = 3.0, 0.2, 0.002
+    time = period * np.arange(5000)
+    s = 1j * frequency / natural
+    gain = np.polyval(upper, s) / np.polyval((1.0, 2 * damping, 1.0), s)
+    wave = np.exp(2j * np.pi * frequency * time)
+    found = second_order(natural, damping, period, upper).along(wave)
+    np.testing.assert_allclose(found[-500:], gain * wave[-500:], atol=2e-3)
+
+
+@pytest.mark.parametrize(("name", "breadth"), [("notch_filter", "width"), ("low_pass_filter", "damping")])
+def test_a_filter_passes_rotors_step_by_step_as_along_a_flight(commanded, name, breadth):
+    known, shape = CATALOGUE[name], {"frequency_hz": 4.0, breadth: 0.7}
+    link = known.actuation.link
+    speed, acceleration = step_by_step(lambda one, memory: link(one, shape, memory), commanded.speed, commanded.period)
+    np.testing.assert_allclose(speed, known.apply(commanded, shape).speed, rtol=1e-12)
+    assert not acceleration.any()
+
+
+def test_battery_takes_the_same_share_of_thrust_and_torque(columns, commanded):
+    found = columns("battery_sag", commanded, exponent=1.5).direct[..., 0]
+    np.testing.assert_allclose(found, (commanded.voltage**1.5 - 1)[:, None] * commanded.wrench, atol=1e-9)
+
+
+def test_only_measured_rotors_can_be_late_and_only_commands_can_lag(flight, commanded):
+    assert CATALOGUE["channel_delay"].missing(commanded) == ("measured_rotor_speed",)
+    assert not CATALOGUE["channel_delay"].missing(flight)
+    for name in ("motor_lag", "command_delay", "notch_filter", "low_pass_filter"):
+        assert CATALOGUE[name].missing(flight) == ("command",)
+        assert not CATALOGUE[name].missing(commanded)
+
+
+def test_sag_is_looked_for_in_any_rotor_speeds_with_a_voltage(flight, commanded):
+    sag = CATALOGUE["battery_sag"]
+    assert not sag.missing(flight)
+    assert not sag.missing(commanded)
+    assert sag.missing(replace(flight, voltage=None)) == ("voltage",)
+
+
+def test_what_is_applied_before_other_columns_is_what_its_column_says(columns, flight, commanded):
+    """The search exchanges the actuation instead of subtracting a column; both must mean the same."""
+    actuators = [entry for entry in CATALOGUE.values() if entry.kind == "actuator"]
+    others = {"motor_lag", "notch_filter", "low_pass_filter", "command_delay", "battery_sag", "channel_delay"}
+    assert {entry.name for entry in actuators} == {*others, "drag_factor_error"}
+    for entry in actuators:
+        known = flight if entry.name == "channel_delay" else commanded
+        shape = {one.name: one.grid[-1] for one in entry.shapes}
+        change = entry.apply(known, shape).wrench - known.wrench
+        np.testing.assert_allclose(columns(entry.name, known, **shape).direct[..., 0], change, atol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [0.0, 0.4, 1.0, 2.0, 2.3])
+def test_a_delay_taken_step_by_step_is_that_along_a_flight(commanded, steps):
+    speed, _ = step_by_step(lambda one, memory: memory.delayed(one, steps), commanded.speed, 1.0)
+    np.testing.assert_allclose(speed, delayed(commanded.speed, steps, "linear"), rtol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.3, 3.0])
+def test_a_lag_taken_step_by_step_is_that_of_what_stays_the_same_during_each_step(commanded, ratio):
+    speed = commanded.speed
+    middle, _ = step_by_step(
+        lambda one, memory: one._replace(speed=memory.lagged(one.speed, ratio, speed[0])), speed, 1.0
+    )
+    along = lagged(speed, ratio, "previous")
+    expected = speed + (along.start - speed) * (np.exp(-0.5 / ratio) if ratio else 0.0)
+    np.testing.assert_allclose(middle, expected, rtol=1e-12)

@@ -1,13 +1,16 @@
+"""The engine of the evolution, its state, ranking and archive."""
+
 import copy
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.stats import rankdata
 
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.evolution.archive import Evaluation
-from cpfls_cli.evolution.engine import evolve, start, step
+from cpfls_cli.evolution.archive import Archive, Evaluation, positions, rank
+from cpfls_cli.evolution.engine import History, ended, evolve, stalled, start, step
 from cpfls_cli.evolution.settings import EvolutionSettings
 
 # The operators of the paper, after the Sheffield toolbox.
@@ -208,3 +211,179 @@ def test_initial_chromosomes_that_do_not_fit_are_refused(initial):
 def test_refined_genes_out_of_range_are_refused():
     with pytest.raises(ComputationError, match=r"evaluation\.genes: expected genes from 0 to 65535"):
         run(lambda genes: Evaluation(genes - 65536, zdt1(genes).objectives))
+
+
+def course(*best):
+    rows = np.arange(len(best))
+    return History(rows, np.array(best, dtype=float), rows)
+
+
+def sphere(genes):
+    x = genes / 65535
+    return Evaluation(genes, np.column_stack([np.sum(x**2, axis=1), np.sum((x - 1) ** 2, axis=1)]))
+
+
+@pytest.mark.parametrize(
+    ("best", "expected"),
+    [
+        ([[8, 4], [8, 4], [8, 4]], True),
+        ([[8, 4], [7.3, 4], [7.2, 4]], True),
+        ([[8, 4], [7.3, 4], [7.1, 4]], False),
+        ([[8, 4], [8, 3.9], [8, 3.5]], False),
+        ([[9, 4], [8, 4], [8, 4], [8, 4]], True),
+        ([[8, 4], [8, 4]], False),
+        ([[np.inf, 4], [np.inf, 4], [8, 4]], False),
+        ([[np.inf, 4], [np.inf, 4], [np.inf, 4]], True),
+        ([[-8, 4], [-8, 4], [-8.9, 4]], False),
+        ([[-8, 4], [-8, 4], [-8.7, 4]], True),
+        ([[0, 0], [0, 0], [0, 0]], True),
+    ],
+)
+def test_stalled_looks_back_two_generations_for_ten_per_cent(best, expected):
+    assert stalled(course(*best), 2, 0.1) is expected
+
+
+def test_nothing_stalls_by_default():
+    assert not stalled(course(*[[1, 1]] * 1000), EvolutionSettings().stall_generations, 0.1)
+
+
+def test_evolution_ends_in_the_first_generation_that_stalls():
+    settings = EvolutionSettings(population=20, generations=400, stall_generations=5, stall_improvement=0.02)
+    generations = list(evolve(sphere, 4, settings, np.random.default_rng(1)))
+    best = np.array([generation.front_objectives.min(axis=0) for generation in generations])
+    improved = np.any(best[5:] < best[:-5] * (1 - 0.02), axis=1)
+    assert improved[:-1].all()
+    assert not improved[-1]
+    assert 5 < len(generations) < 401
+
+
+def test_reason_of_the_end():
+    settings = EvolutionSettings(population=10, generations=2, stall_generations=1, stall_improvement=0.999)
+    state = start(sphere, 4, settings, np.random.default_rng(1))
+    assert ended(state, settings) is None
+    state = step(state, sphere, settings)
+    assert ended(state, settings) == "converged"
+    assert ended(step(state, sphere, settings), settings) == "generations"
+
+
+def test_history_has_a_row_for_each_generation():
+    settings = EvolutionSettings(population=10, generations=4)
+    reports = list(evolve(sphere, 4, settings, np.random.default_rng(2)))
+    state = start(sphere, 4, settings, np.random.default_rng(2))
+    while ended(state, settings) is None:
+        state = step(state, sphere, settings)
+    np.testing.assert_array_equal(state.history.evaluations, [report.evaluations for report in reports])
+    np.testing.assert_array_equal(state.history.front_size, [len(report.front_genes) for report in reports])
+    np.testing.assert_array_equal(state.history.best, [report.front_objectives.min(axis=0) for report in reports])
+
+
+class RoundingRecorder:
+    """Evaluate to (sum, -sum) of genes that a local search rounds up to a multiple of ten."""
+
+    def __init__(self):
+        self.calls = []
+
+    def __call__(self, genes):
+        self.calls.append(genes.tolist())
+        refined = -(-genes // 10) * 10
+        total = refined.sum(axis=1, keepdims=True).astype(float)
+        return Evaluation(refined, np.hstack([total, -total]))
+
+
+def test_only_unknown_chromosomes_are_evaluated_once_in_order_of_appearance():
+    archive, recorder = Archive(), RoundingRecorder()
+    archive.evaluate(np.array([[13], [2], [13], [31]]), recorder)
+    archive.evaluate(np.array([[5], [2], [5], [31]]), recorder)
+    assert recorder.calls == [[[13], [2], [31]], [[5]]]
+    assert len(archive) == 4
+
+
+def test_a_known_chromosome_recalls_its_refinement_and_so_does_the_refined_one():
+    archive, recorder = Archive(), RoundingRecorder()
+    first = archive.evaluate(np.array([[13, 4]]), recorder)
+    again = archive.evaluate(np.array([[20, 10], [13, 4]]), recorder)
+    assert len(recorder.calls) == 1
+    assert first.genes.tolist() == [[20, 10]]
+    assert again.genes.tolist() == [[20, 10], [20, 10]]
+    assert again.objectives.tolist() == [[30.0, -30.0]] * 2
+
+
+def test_objectives_that_are_not_finite_are_kept_as_worst():
+    archive = Archive()
+    archive.store(np.array([[1], [2]]), Evaluation(np.array([[1], [2]]), np.array([[np.nan, -np.inf], [1, 2]])))
+    assert archive.results.objectives.tolist() == [[np.inf, np.inf], [1.0, 2.0]]
+    assert archive.front.genes.tolist() == [[2]]
+
+
+def test_the_front_grows_and_forgets_the_dominated():
+    archive = Archive()
+    genes = np.arange(5)[:, np.newaxis]
+    objectives = np.array([[3.0, 3.0], [1.0, 5.0], [2.0, 2.0], [2.0, 2.0], [5.0, 1.0]])
+    fronts = []
+    for row in range(5):
+        archive.store(genes[[row]], Evaluation(genes[[row]], objectives[[row]]))
+        fronts.append(archive.front.genes[:, 0].tolist())
+    assert fronts == [[0], [0, 1], [1, 2], [1, 2], [1, 2, 4]]
+
+
+@pytest.mark.parametrize(
+    ("genes", "objectives", "name"),
+    [
+        (np.zeros((2, 2), dtype=int), np.zeros((3, 1)), "genes"),
+        (np.zeros((3, 2)), np.zeros((3, 1)), "genes"),
+        (np.zeros((3, 2), dtype=int), np.zeros((2, 1)), "objectives"),
+        (np.zeros((3, 2), dtype=int), np.zeros(3), "objectives"),
+    ],
+)
+def test_an_evaluation_that_does_not_fit_is_refused(genes, objectives, name):
+    with pytest.raises(ComputationError, match=f"evaluation.{name}: expected"):
+        Archive().evaluate(np.arange(6).reshape(3, 2), lambda _: Evaluation(genes, objectives))
+
+
+def test_rebuilt_archive_knows_counts_and_gives_the_same():
+    rng = np.random.default_rng(8)
+
+    def evaluate(genes):
+        # Refined to even genes: what one chromosome becomes, another one is, and equal objectives are common.
+        refined = genes // 2 * 2
+        objectives = np.column_stack([refined.sum(axis=1) % 5, refined[:, 0] % 7]).astype(float)
+        objectives[refined[:, 1] > 12] = np.nan
+        return Evaluation(refined, objectives)
+
+    archive = Archive()
+    for _ in range(8):
+        archive.evaluate(rng.integers(0, 16, (12, 2)), evaluate)
+    rebuilt = Archive.of(archive.submitted, archive.results)
+    assert len(rebuilt) == len(archive)
+    asked = np.stack(np.meshgrid(np.arange(16), np.arange(16)), axis=-1).reshape(-1, 2)
+    for one, other in ((archive.front, rebuilt.front), *[[a.evaluate(asked, evaluate) for a in (archive, rebuilt)]]):
+        np.testing.assert_array_equal(one.genes, other.genes)
+        np.testing.assert_array_equal(one.objectives, other.objectives)
+    np.testing.assert_array_equal(archive.submitted, rebuilt.submitted)
+
+
+# a, b and c do not dominate one another; d is dominated by b; e by all four.
+HAND_WORKED = np.array([[1.0, 4.0], [2.0, 2.0], [4.0, 1.0], [3.0, 3.0], [4.0, 4.0]])
+
+
+@pytest.mark.parametrize("method", ["quantity-dominance", "pareto-count", "pareto-fronts"])
+def test_a_failed_individual_ranks_last_and_failures_tie(method):
+    failed = [[np.nan, np.nan], [np.inf, -np.inf], [np.nan, np.inf]]
+    ranks = rank(np.vstack([HAND_WORKED, failed]), method)
+    assert len(set(ranks[5:].tolist())) == 1
+    assert ranks[5] > ranks[:5].max()
+
+
+def test_a_weight_counts_the_first_objective_so_many_times():
+    # first objective: smaller minus larger is -4 -2 3 0 3, ten times; second: 3 -2 -4 0 3
+    assert rank(HAND_WORKED, "quantity-dominance", 10).tolist() == [-37, -22, 26, 0, 33]
+
+
+@pytest.mark.parametrize("method", ["pareto-count", "pareto-fronts"])
+def test_pareto_rankings_know_no_weight(method):
+    np.testing.assert_array_equal(rank(HAND_WORKED, method, 10), rank(HAND_WORKED, method))
+
+
+@pytest.mark.parametrize("values", [[3, 1, 2], [1, 1, 2, 1], [np.inf, 0.5, np.inf, -1.0, 0.5], [7]])
+def test_positions_are_ranks_with_ties_averaged(values):
+    np.testing.assert_array_equal(positions(np.array(values)), rankdata(values, method="average"))

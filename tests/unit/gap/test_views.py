@@ -9,7 +9,6 @@ from cpfls_cli.gap.residual.views import heat_map, stretches
 HOP = 0.2
 CENTRES = np.tile(0.3 + HOP * np.arange(200), 2)
 FLIGHT_INDEX = np.repeat([0, 1], 200)
-LONG_FLIGHT_INDEX = np.repeat([0, 1], 300)
 
 
 def quiet():

@@ -1,17 +1,194 @@
-"""Chromosomes, and the refinement of partition weights: its Jacobian, and what it does to a chromosome."""
+"""Evaluators of chromosomes against a slow reference."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
-from cpfls_cli.dynamics import rigid_columns
-from cpfls_cli.identification.evaluator import LARGEST_GENE, Problem, decode, encode, uniform_chromosome
+from cpfls_cli.dynamics import newton_euler_torque, rigid_columns
+from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.identification.evaluator import (
+    LARGEST_GENE,
+    Problem,
+    decode,
+    encode,
+    refine,
+    stepped,
+    uniform_chromosome,
+)
 from cpfls_cli.identification.identify import model_evaluator
+from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
-from cpfls_cli.regressor.regressor import RIGID, Regressor, data_ranges, uniform_breakpoints
+from cpfls_cli.regressor.regressor import RIGID, Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
+from cpfls_cli.trajectory.planning import plan
+from cpfls_cli.trajectory.settings import TrajectorySettings
 from tests.builders.flights import random_flight, rigid_torque
+from tests.builders.reference_evaluator import ReferenceEvaluator
+
+PAPER = {"base": "none", "consequents": "seesaw", "products": "additive", "input_map": "data-range"}
+OFF = LocalSearchSettings(enabled=False)
+WELL_CONDITIONED = 1e6
+
+
+@cache
+def cube_diagonal():
+    """The paper's path and the torque of its vehicle, 1524 samples."""
+    path = plan(TrajectorySettings(sample_time_s=0.036), 9.81)
+    motion = Motion(path.attitude, path.attitude_rate, path.attitude_acceleration)
+    torque = newton_euler_torque(motion.attitude, motion.rate, motion.acceleration, np.diag([0.6, 0.6, 1.2]))
+    return TorqueData(path.time, motion, torque)
+
+
+def evaluators(training, learned, **settings):
+    """The fast evaluator and the plain one."""
+    settings = IdentificationSettings(**{**PAPER, "local_search": OFF, **settings})
+    return model_evaluator(training, learned, settings), ReferenceEvaluator(training, learned, settings)
+
+
+def chromosomes(structure, count, seed):
+    """Half of them anywhere, half without very narrow functions, and one with functions of zero width."""
+    rng = np.random.default_rng(seed)
+    genes = rng.integers(0, LARGEST_GENE + 1, (count, structure.genes))
+    genes[count // 2 :] = rng.integers(20000, LARGEST_GENE + 1, (count - count // 2, structure.genes))
+    for part in structure.weight_slices():
+        genes[0, part][:-1] = 0
+    return genes
+
+
+@pytest.mark.parametrize(
+    ("settings", "every", "learned"),
+    [
+        ({"membership_functions": 5}, 1, 1),
+        ({"membership_functions": 5}, 2, 3),
+        ({"membership_functions": (3, 3, 2, 3, 2, 2), "structure": "fls"}, 3, 1),
+        ({"membership_functions": (1, 2, 3, 4, 3, 2)}, 3, 2),
+    ],
+)
+def test_objectives_are_those_of_the_plain_evaluator(settings, every, learned):
+    """Equal where the condition number is below 1e6, and above it worse than all of those."""
+    data = cube_diagonal()[::every]
+    fast, plain = evaluators(data, data[::learned], **settings)
+    genes = chromosomes(fast.structure, 36, 33)
+    found, expected = fast(genes), plain(genes)
+    np.testing.assert_array_equal(found.genes, genes)
+    well = expected.objectives[:, 2] < WELL_CONDITIONED
+    assert well.sum() >= 10
+    np.testing.assert_allclose(found.objectives[well], expected.objectives[well], rtol=1e-9)
+    assert np.isfinite(found.objectives[~well]).all()
+    assert np.min(found.objectives[~well, 2], initial=np.inf) > np.max(found.objectives[well, 2])
+
+
+def test_more_dependent_columns_are_never_better():
+    """Where columns are dependent, the fast evaluator counts no fewer of them, and no error below the smallest."""
+    data = cube_diagonal()[::6]
+    fast, plain = evaluators(data, data, membership_functions=5, rank_tolerance=1e-10)
+    genes = np.random.default_rng(34).integers(0, LARGEST_GENE + 1, (80, fast.structure.genes))
+    found, expected = fast(genes).objectives, plain(genes).objectives
+    counted, dependent = (
+        np.where(objectives[:, 2] * tolerance > 1.5, np.round(objectives[:, 2] * tolerance - 1), 0)
+        for objectives, tolerance in ((found, SMALLEST_SINGULAR_SHARE), (expected, 1e-10))
+    )
+    assert len(np.unique(dependent)) > 3
+    assert np.all(counted >= dependent)
+    same = counted == dependent
+    assert same.sum() > 40
+    assert np.all(np.diff(found[same, 2][np.lexsort((expected[same, 2], dependent[same]))]) >= 0)
+    assert np.all(found[:, 0] >= expected[:, 0] * (1 - 1e-6))
+    np.testing.assert_allclose(found[same, :2], expected[same, :2], rtol=1e-6)
+
+
+def test_both_refuse_the_same_chromosomes():
+    data = cube_diagonal()[::8]
+    fast, plain = evaluators(data, data, membership_functions=4)
+    genes = np.random.default_rng(35).integers(1, LARGEST_GENE + 1, (4, fast.structure.genes))
+    genes[1], genes[2, 3:6] = 0, 0
+    defined = [True, False, False, True]
+    for evaluator in (fast, plain):
+        np.testing.assert_array_equal(np.isfinite(evaluator(genes).objectives), np.transpose([defined] * 3))
+        assert [evaluator.fit(chromosome) is not None for chromosome in genes] == defined
+
+
+def test_fit_is_that_of_the_plain_evaluator():
+    data = cube_diagonal()
+    fast, plain = evaluators(data, data[::2], membership_functions=3)
+    chromosome = np.random.default_rng(36).integers(1, LARGEST_GENE + 1, fast.structure.genes)
+    found, expected = (evaluator.fit(chromosome) for evaluator in (fast, plain))
+    np.testing.assert_allclose(found.coefficients, expected.coefficients, rtol=0, atol=1e-6)
+    assert found.mean_squared_error == pytest.approx(expected.mean_squared_error, rel=1e-6)
+    assert found.conditioning == pytest.approx(expected.conditioning, rel=1e-6)
+
+
+def test_local_search_leaves_no_more_than_differences_through_the_whole_solve_do():
+    """From the same starts, at the default budget; where a surface has many minima, no method is better from each."""
+    data = cube_diagonal()[::8]
+    fast, plain = evaluators(data, data, membership_functions=3, local_search=LocalSearchSettings())
+    genes = np.random.default_rng(37).integers(0, LARGEST_GENE + 1, (12, fast.structure.genes))
+    unrefined = evaluators(data, data, membership_functions=3)[0](genes).objectives[:, 0]
+    found, expected = fast(genes).objectives[:, 0], plain(genes).objectives[:, 0]
+    assert np.all(expected < unrefined)
+    assert np.all(found < unrefined)
+    assert np.mean(np.log(found / expected)) <= 1e-6
+    assert np.mean(found <= expected * (1 + 1e-6)) >= 0.75
+
+
+def test_what_a_local_search_found_is_written_back_where_it_is_better_or_always():
+    """Learned on few samples, it can be worse on all."""
+    data = cube_diagonal()[::2]
+    plain = evaluators(data, data[::12], membership_functions=3)[0]
+    genes = np.random.default_rng(38).integers(0, LARGEST_GENE + 1, (12, plain.structure.genes))
+    unrefined = plain(genes)
+    improved, always = (
+        evaluators(data, data[::12], membership_functions=3, local_search=LocalSearchSettings(reinsert=kind))[0](genes)
+        for kind in ("improved", "always")
+    )
+    assert np.all(improved.objectives[:, 0] <= unrefined.objectives[:, 0])
+    worse = always.objectives[:, 0] > unrefined.objectives[:, 0]
+    assert worse.any()
+    np.testing.assert_array_equal(improved.genes[worse], genes[worse])
+    np.testing.assert_array_equal(improved.genes[~worse], always.genes[~worse])
+    assert not np.any((always.genes == genes).all(axis=1))
+
+
+def test_a_search_can_be_judged_on_what_it_learns_from():
+    data, learned = cube_diagonal(), cube_diagonal()[::9]
+    settings = {"input_map": "full-circle", "membership_functions": 3}
+    on_these, on_all = (evaluators(data, learned, **settings, judged_on=kind)[0] for kind in ("learned", "training"))
+    genes = chromosomes(on_these.structure, 6, 39)
+    alone = evaluators(learned, learned, **settings)[0](genes).objectives
+    np.testing.assert_array_equal(on_these(genes).objectives, alone)
+    assert not np.any(on_all(genes).objectives[:, 0] == alone[:, 0])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_local_search_ends_in_the_minimum_beside_its_start(seed):
+    """Near the partitions that made the torque both methods end in the same minimum."""
+    rng = np.random.default_rng(seed)
+    settings = {"input_map": "full-circle", "membership_functions": 4}
+    structure = model_structure(IdentificationSettings(**{**PAPER, **settings}))
+    attitude = rng.uniform(-np.pi, np.pi, (120, 3))
+    motion = Motion(attitude, *rng.standard_normal((2, 120, 3)))
+    weights = rng.uniform(0.3, 0.9, structure.genes)
+    regressor = Regressor(structure, motion, data_ranges(structure, attitude))
+    torque = regressor.torque(decode(structure, weights), rng.standard_normal(structure.parameters))
+    data = TorqueData(0.01 * np.arange(120), motion, torque + 0.01 * rng.standard_normal(torque.shape))
+    fast, plain = evaluators(data, data, **settings, local_search=LocalSearchSettings(evaluations=20))
+
+    def fit(weights):
+        return fast.solver.fit(decode(structure, weights))
+
+    start = weights * rng.uniform(0.98, 1.02, structure.genes)
+    genes = encode(start)
+    problem = Problem(fast.solver, fit(genes.astype(float)))
+    refined = refine(problem, genes, fast.solver.products(decode(structure, genes.astype(float))), 20)
+    # One step more, which is not rounded to genes.
+    last = stepped(refined.genes / LARGEST_GENE, *problem.linearised(refined), damping=1e-6)
+    found = fit(last).mean_squared_error
+    expected = fit(plain.refine(start)).mean_squared_error
+    assert expected < 0.5 * fit(start).mean_squared_error
+    assert found <= expected * (1 + 1e-6)
+
 
 STRUCTURE = model_structure(StructureSettings(membership_functions=(2, 3, 1, 5, 6, 7)))
 

@@ -1,17 +1,32 @@
-"""What a log holds, read without a config."""
+"""What logs hold: columns, matrices and dates, in each format."""
 
 import gzip
+import io
+import struct
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from importlib import import_module
+from math import isnan
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pyarrow
 import pytest
+import scipy.io
 from pyarrow import parquet
 
 from cpfls_cli import files
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.formats import log_contents
-from tests.builders import ulogs
+from cpfls_cli.logs import matrices
+from cpfls_cli.logs.csv_log import contents, row_lines
+from cpfls_cli.logs.formats import LOG_FORMATS, foreign_file, formats_in_words, is_log, log_contents, suffixes_in_words
+from tests.builders import blackbox_logs, ulogs
+from tests.builders.dataflash_logs import dataflash, definition
+from tests.builders.ros_bags import BEGIN_NS, imu, write_bag
 
 
 def listed(contents):
@@ -101,3 +116,412 @@ def test_what_a_small_file_cannot_hold_is_refused_before_it_is_read(tmp_path, mo
         file.create_dataset("t", (1 << 18,), "u1", chunks=(1 << 12,))
     with pytest.raises(InputError, match=r"log\.h5: claims 0\.0021 GB of numbers"):
         log_contents(bytes_of_eight)
+
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_each_row_has_a_reader_and_an_extra_that_installs_its_package():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    for form in LOG_FORMATS:
+        assert callable(import_module(form.reader).contents)
+        installed = [requirement.partition(">")[0] for requirement in extras.get(form.extra, ())]
+        assert {module.partition(".")[0] for module in form.packages} == set(installed)
+
+
+def test_no_format_hides_another():
+    """The first suffix that fits decides, and so do the first bytes."""
+    for number, form in enumerate(LOG_FORMATS):
+        for other in LOG_FORMATS[number + 1 :]:
+            assert not form.suffix or not other.suffix.endswith(form.suffix)
+            assert form.reader == other.reader or not form.magic or not other.magic.startswith(form.magic)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.CSV.GZ", "b/a.parquet", "a.b.ULG", "a.BIN", "a.mat"])
+def test_a_log_is_told_by_its_name(name):
+    assert is_log(Path(name))
+
+
+@pytest.mark.parametrize("name", ["a.h5", "a.gz", "csv", "a.csv.zip", ""])
+def test_other_names_are_no_logs(name):
+    assert not is_log(Path(name))
+
+
+@pytest.mark.parametrize("first", [b"\xbc\x02\x00", b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n"])
+def test_binary_logs_are_told_by_their_first_bytes_whatever_their_name(tmp_path, first):
+    for name in ("log00", "LOG.TXT", "log.tar.gz", "study.h5", "log.ulg", "log.csv"):
+        (tmp_path / name).write_bytes(first)
+        assert is_log(tmp_path / name)
+    (tmp_path / "other").write_bytes(b"t,roll\n0,1\n")
+    assert not is_log(tmp_path / "other")
+
+
+def test_an_hdf5_file_is_a_log_if_it_is_not_of_this_program(tmp_path):
+    for name, attributes, is_one in (
+        ("a.h5", {}, True),
+        ("b.hdf5", {"format": 2}, True),
+        ("c.h5", {"format": "cpfls/flight"}, False),
+    ):
+        with h5py.File(tmp_path / name, "w") as file:
+            file.attrs.update(attributes)
+        assert is_log(tmp_path / name) == is_one
+
+
+def test_the_page_on_import_describes_every_format():
+    page = (ROOT / "docs" / "import.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1:-1] for line in page.splitlines() if line.startswith("|")]
+    for form in LOG_FORMATS:
+        (row,) = [row for row in rows if (f"`{form.suffix}`" if form.suffix else "none") in row[0]]
+        assert form.name in row[1]
+        assert (f'`pip install "cpfls[{form.extra}]"`' if form.extra else " ") in row[3]
+
+
+def test_words():
+    suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .log, .bbl, .bfl, Crazyflie uSD, .db3, .mcap, .h5, .hdf5 or .mat"
+    assert suffixes_in_words() == suffixes
+    formats = "CSV, Parquet, ULog, ArduPilot DataFlash, Betaflight blackbox, Crazyflie uSD, ROS 2 bag, HDF5, MATLAB"
+    assert formats_in_words() == formats
+
+
+def test_a_reader_and_its_package_are_loaded_only_when_used(tmp_path):
+    (tmp_path / "log.csv").write_text("t,roll\n0,1\n1,2\n")
+    code = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from cpfls_cli.logs.formats import read_log\n"
+        "assert 'numpy' not in sys.modules\n"
+        "from cpfls_cli.flightlog.settings import ImportSettings\n"
+        f"print(read_log(Path({str(tmp_path / 'log.csv')!r}), ImportSettings()).columns['t'].tolist())\n"
+        "assert not {'pyarrow', 'pyulog', 'cpfls_cli.logs.parquet_log', 'cpfls_cli.logs.ulog'} & sys.modules.keys()\n"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == "[0.0, 1.0]\n"
+
+
+ROWS = [[0.0, 1.5, -2.0], [0.5, 2.5, 3e-3], [1.0, 3.5, 4.0]]
+
+
+def _written(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def _rows(separator: str, decimal: str = ".") -> str:
+    return "".join(separator.join(str(x).replace(".", decimal) for x in row) + "\n" for row in ROWS)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time,p,q\n" + _rows(","),
+        "time;p;q\n" + _rows(";"),
+        "time;p;q\n" + _rows(";", ","),
+        "time\tp\tq\n" + _rows("\t", ","),
+        "time p q\n" + _rows("  "),
+        "# a flight, on a windy day\n// of 2024\ntime,p,q\n" + _rows(","),
+        "# time,p,q\n" + _rows(","),
+        "# time p q\n" + _rows(" "),
+        "# a flight\n# time,p,q\n" + _rows(" "),
+        "% time\tp\tq\n" + _rows("\t"),
+    ],
+    ids=lambda text: text[:12].replace("\n", " "),
+)
+def test_separators_decimal_commas_and_remarks(tmp_path: Path, text: str) -> None:
+    own = contents(_written(tmp_path / "log.csv", text))
+    assert list(own.topics[""]) == ["time", "p", "q"]
+    np.testing.assert_array_equal(np.column_stack(list(own.topics[""].values())), ROWS)
+
+
+def test_names_with_spaces_are_of_commas(tmp_path: Path) -> None:
+    own = contents(_written(tmp_path / "log.csv", "time (us), gyroADC[0], vbat latest (V)\n1, 2, 3\n"))
+    assert list(own.topics[""]) == ["time (us)", "gyroADC[0]", "vbat latest (V)"]
+
+
+@pytest.mark.parametrize("first", ["2024-05-01T12:00:59.5Z", "2024-05-01 12:00:59.5", "12:00:59.5"])
+def test_dates_and_times_of_day_are_stamps_in_seconds(tmp_path: Path, first: str) -> None:
+    second = first.replace("00:59.5", "01:00.75")
+    own = contents(_written(tmp_path / "log.csv", f"time,p\n{first},1\n{second},2\n"))
+    assert own.units == {"time": "s"}
+    assert np.diff(own.topics[""]["time"]) == pytest.approx(1.25)
+
+
+def test_a_log_without_names_says_where_they_go(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"has no line of column names, line 1 holds 3 numbers: put a line above it"):
+        contents(_written(tmp_path / "log.csv", _rows(",")))
+
+
+def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
+    path = _written(tmp_path / "log.csv", "# remark\ntime,p\n0,1\n\n1,2\n")
+    assert row_lines(path) == [3, 5]
+    path.write_text("# remark\ntime,p\n0,1\n\n1,x\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"log\.csv:5: column 'p' = 'x': not a number"):
+        contents(path, {"time", "p"})
+
+
+AT = 1_683_108_000.0
+"""2023-05-03 10:00 UTC."""
+
+
+@pytest.fixture
+def flown(tmp_path):
+    def call(name, content):
+        path = tmp_path / name
+        path.write_bytes(content)
+        return log_contents(path).flown_at
+
+    return call
+
+
+@pytest.mark.parametrize(("told", "at"), [([0, 5], AT), ([0], None)])
+def test_of_px4_by_its_receiver_once_that_knows(flown, told, at):
+    fields = {"sensor_gps": "uint64_t timestamp;uint64_t time_utc_usec"}
+    rows = [
+        ulogs.message("D", struct.pack("<HQQ", 0, ulogs.BEGIN + since * 10**6, int(AT + since) * 10**6 if since else 0))
+        for since in told
+    ]
+    begins = flown("log.ulg", ulogs.ulog([], fields) + b"".join(rows))
+    assert begins == at if at else isnan(begins)
+
+
+@pytest.mark.parametrize("names", [("TimeUS,GWk,GMS", "QHI"), ("TimeUS,Week,TimeMS", "QHI")])
+def test_of_ardupilot_by_weeks_of_gps(flown, names):
+    columns, letters = names
+    # GPS counts leap seconds, 18 of them since it began.
+    week, second = divmod(AT + 18 - 315_964_800, 604_800)
+    rows = [("GPS", (1_000_000, 0, 0)), ("GPS", (3_000_000, int(week), int(1000 * (second + 2))))]
+    assert flown("log.bin", dataflash({"GPS": (letters, columns)}, rows)) == pytest.approx(AT, abs=1e-5)
+
+
+@pytest.mark.parametrize("said", ["2023-05-03T10:00:00.000+00:00", "2023-05-03T12:00:00.000+02:00", "2023-05-03T10:00"])
+def test_of_betaflight_by_its_header(flown, said):
+    lines = blackbox_logs.header() + f"H Log start datetime:{said}\n".encode()
+    assert flown("log.bbl", lines + b"".join(blackbox_logs.frames(blackbox_logs.flight()))) == AT
+
+
+@pytest.mark.parametrize("said", ["0000-01-01T00:00:00.000+00:00", "1970-01-01T00:00:00.000+00:00", "soon"])
+def test_a_clock_that_was_never_set_tells_none(flown, said):
+    lines = blackbox_logs.header() + f"H Log start datetime:{said}\n".encode()
+    assert isnan(flown("log.bbl", lines + b"".join(blackbox_logs.frames(blackbox_logs.flight()))))
+
+
+def test_of_a_bag_by_the_recorder(tmp_path):
+    sent = [("/imu/data", BEGIN_NS + 10**7 * row, imu(BEGIN_NS, (0, 0, 0), (0, 0, 9.8))) for row in range(3)]
+    assert log_contents(write_bag(tmp_path / "bag", ".mcap", sent)).flown_at == pytest.approx(1e-9 * BEGIN_NS)
+
+
+def test_of_a_table_by_nothing(flown):
+    assert isnan(flown("log.csv", b"t,a\n0,1\n1,2\n"))
+
+
+TIME = np.arange(5) * 0.02
+RATE = np.arange(15.0).reshape(5, 3)
+
+
+def hdf5(path, **options):
+    with h5py.File(path, "w", **options) as file:
+        file["t"] = (1e3 * TIME).astype("i8")
+        file["t"].attrs["units"] = "ms"
+        file["imu/rate"] = RATE.astype("f4")
+        file["imu/rate"].attrs["unit"] = b"rad/s"
+        file["imu/turned"] = RATE.T
+        file["imu/row"] = TIME[None, :]
+        file["imu/valid"] = TIME > 0.03
+        file["imu/name"] = "a gyroscope"
+        file["imu/mass"] = 0.5
+        file["imu/images"] = np.zeros((5, 8, 8))
+        file["imu/wide"] = np.zeros((500, 65))
+        file["#refs#/a"] = TIME
+
+
+def columns_of(contents):
+    return {name: values.tolist() for name, values in contents.topics[""].items()}
+
+
+@pytest.mark.parametrize("name", ["log.h5", "log.HDF5"])
+def test_columns_of_hdf5_are_paths(tmp_path, name):
+    hdf5(tmp_path / name)
+    contents = log_contents(tmp_path / name)
+    assert columns_of(contents) == (
+        {"t": TIME.tolist(), "imu/row": TIME.tolist(), "imu/valid": [0, 0, 1, 1, 1]}
+        | {f"imu/rate[{axis}]": RATE[:, axis].tolist() for axis in range(3)}
+        | {f"imu/turned[{axis}]": RATE[:, axis].tolist() for axis in range(3)}
+    )
+    # Stamps that state their unit are in seconds.
+    assert contents.units == {"t": "s"} | {f"imu/rate[{axis}]": "rad/s" for axis in range(3)}
+
+
+def test_only_what_is_wanted_is_read(tmp_path):
+    hdf5(tmp_path / "log.h5")
+    columns = columns_of(log_contents(tmp_path / "log.h5", ["imu/rate[1]", "none"]))
+    assert {name for name, values in columns.items() if values} == {f"imu/rate[{axis}]" for axis in range(3)}
+    assert {"t", "imu/turned[0]"} <= columns.keys()
+
+
+@pytest.mark.parametrize("version", ["4", "5"])
+def test_columns_of_matlab_are_paths(tmp_path, version):
+    data = {"t": TIME[:, None], "rate": RATE, "mass": 0.5}
+    nested = (
+        {}
+        if version == "4"
+        else {"log": {"imu": {"acc": RATE.T, "name": "a"}, "cells": np.array([1, "b"], dtype=object)}}
+    )
+    scipy.io.savemat(tmp_path / "log.mat", data | nested, format=version)
+    expected = {"t": TIME.tolist()} | {f"rate[{axis}]": RATE[:, axis].tolist() for axis in range(3)}
+    if version == "5":
+        expected |= {f"log/imu/acc[{axis}]": RATE[:, axis].tolist() for axis in range(3)}
+    assert columns_of(log_contents(tmp_path / "log.mat")) == expected
+
+
+def test_matlab_is_read_whatever_its_name_ends_in(tmp_path):
+    scipy.io.savemat(tmp_path / "log.mat", {"t": TIME[:, None]})
+    (tmp_path / "log.mat").rename(tmp_path / "log.h5")
+    assert columns_of(log_contents(tmp_path / "log.h5")) == {"t": TIME.tolist()}
+
+
+def test_matlab_of_version_7_3_is_hdf5_behind_a_line_of_text(tmp_path):
+    path = tmp_path / "log.mat"
+    hdf5(path, userblock_size=512)
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+    assert columns_of(log_contents(path))["imu/rate[2]"] == RATE[:, 2].tolist()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("log.mat", b"", "an empty file: nothing was logged, or the copy failed"),
+        (
+            "log.mat",
+            b"MATLAB 5.0 MAT-file".ljust(126) + b"IM" + b"\x0f\0\0\0\xff\xff\0\0broken",
+            "cannot be read as MATLAB: ",
+        ),
+        ("log.h5", b"\x89HDF\r\n\x1a\n" + bytes(30), "cannot be read as HDF5: "),
+        ("log.h5", b"MATLAB 5.0 MAT-file".ljust(126), "cannot be read as MATLAB: "),
+    ],
+    ids=["empty", "broken", "cut", "under another ending"],
+)
+def test_what_cannot_be_read(tmp_path, name, content, message):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        log_contents(tmp_path / name)
+    assert f"{name}: {message}" in str(caught.value)
+
+
+def test_what_keeps_hdf5_busy_for_ever(tmp_path, monkeypatch):
+    hdf5(tmp_path / "log.h5")
+    # As damage does, where HDF5 follows addresses in a circle.
+    monkeypatch.setattr(matrices, "_PROBE", "while True: pass")
+    monkeypatch.setattr(matrices, "longest_read_s", lambda _: 0.3)
+    with pytest.raises(InputError, match=r"log\.h5: damaged: HDF5 did not finish reading it within"):
+        log_contents(tmp_path / "log.h5")
+    assert not matrices.is_log(tmp_path / "log.h5")
+
+
+def test_a_file_without_columns(tmp_path):
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["name"] = "nothing"
+    with pytest.raises(InputError, match=r"log\.h5: holds no vectors or matrices of numbers"):
+        log_contents(tmp_path / "log.h5")
+
+
+def test_an_artifact_of_this_program_is_no_log(tmp_path):
+    hdf5(tmp_path / "flight.h5")
+    with h5py.File(tmp_path / "flight.h5", "a") as file:
+        file.attrs["format"] = "cpfls/flight"
+    with pytest.raises(InputError, match=r"flight\.h5: is an artifact of this program \(cpfls/flight\), not a log"):
+        log_contents(tmp_path / "flight.h5")
+
+
+def test_a_file_that_states_more_than_memory_may_hold_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "_PLAIN", 1 << 20)
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file.create_dataset("t", (10**9,), "f8", chunks=(1 << 16,))
+    scipy.io.savemat(tmp_path / "log.mat", {"t": np.zeros(3 << 20)}, do_compression=True)
+    with pytest.raises(InputError, match=r"log\.h5: claims 8 GB of numbers, far more"):
+        log_contents(tmp_path / "log.h5")
+    with pytest.raises(InputError, match=r"log\.mat: holds more than .* GB of numbers in .* MB: damaged, or not a log"):
+        log_contents(tmp_path / "log.mat")
+
+
+def archive(**members):
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as packed:
+        for name, content in members.items():
+            packed.writestr(name.replace("_", "/", 1).replace("__", "."), content)
+    return stream.getvalue()
+
+
+def tape():
+    stream = io.BytesIO()
+    with tarfile.open(fileobj=stream, mode="w") as packed:
+        packed.addfile(tarfile.TarInfo("log.bin"), io.BytesIO())
+    return stream.getvalue()
+
+
+def array():
+    stream = io.BytesIO()
+    np.save(stream, np.zeros(3))
+    return stream.getvalue()
+
+
+TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + bytes(15) for i in range(9))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "what", "way"),
+    [
+        ("a.bag", b"#ROSBAG V2.0\n" + bytes(99), "a bag of ROS 1", "rosbags-convert"),
+        ("a.tlog", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
+        ("a.bin", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
+        ("a.rlog", TELEMETRY[8:], "telemetry of MAVLink", "the log that the autopilot writes itself"),
+        ("a.zip", archive(a="x"), "a zip archive", "unpack it first"),
+        ("a.ulg", archive(a="x"), "a zip archive", "unpack it first"),
+        ("a.bin.gz", b"\x1f\x8b\x08" + bytes(9), "data compressed by gzip", "unpack it first"),
+        ("a.tar", tape(), "a tar archive", "unpack it first"),
+        ("a.xlsx", archive(xl_book="x"), "a spreadsheet", "save its table as CSV"),
+        ("a.px4log", definition(0x80, "FMT", "BBnZ", "Type,Length"), "a log of PX4 before ULog (sdlog2)", "to CSV"),
+        ("a.npy", array(), "an array of NumPy", "a name for each column"),
+        ("a.ulg", b"version https://git-lfs.github.com/spec/v1\n", "a pointer of Git LFS", "git lfs pull"),
+        ("a.DAT", bytes(16) + b"BUILD 2019", "a .DAT of DJI", "to CSV"),
+        ("a.gpx", b'<?xml version="1.0"?>\n<gpx version="1.1">', "a GPX track", "log of the autopilot"),
+        ("a.kml", b"<kml>", "a KML track", "log of the autopilot"),
+        ("a.csv", b"<!DOCTYPE html>\n<html>a,b", "a web page", "save the log itself"),
+        ("a.csv", b'{"t": 1,\n', "JSON", "write its numbers as CSV"),
+        ("a.px4log", b"\xa3\x95\x80\x027ATT" + bytes(80), "a log of PX4 before ULog (sdlog2)", "to CSV"),
+        ("a.log", b"[2024-06-13 11:56:33.1] [0x7f] Time [s], x [m]\n", "text with a stamp in brackets", "as CSV"),
+        (
+            "a.csv",
+            b"Date,Time,1RSS(dB),Alt(m),Alt(m)\n",
+            "telemetry that a radio logs",
+            "log that the flight controller",
+        ),
+        ("a.log", b"#DroneDeploy\t2.7\n", "a log of an app", "the log that the autopilot writes"),
+        ("a.txt", b'[{"t": 1}]', "JSON", "write its numbers as CSV"),
+        ("a.bin", b"", "an empty file", "the copy failed"),
+        ("a.log", b"", "an empty file", "the copy failed"),
+        ("a.pdf", b"%PDF-1.4", "a PDF", "the log that it shows"),
+        ("a.jpg", b"\xff\xd8\xff\xe0", "a picture", "the log that it shows"),
+    ],
+)
+def test_a_file_that_is_no_log_is_named_with_the_way_to_one(tmp_path, name, content, what, way):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        log_contents(path)
+    said = str(caught.value)
+    assert said.startswith(f"{path}: {what}")
+    assert way in said
+
+
+def test_messages_of_sdlog2_are_told_from_those_of_dataflash_whatever_the_name(tmp_path):
+    kinds = {"TIME": ("Q", "StartTime"), "ATT": ("fff", "Roll,Pitch,Yaw"), "PARM": ("Nf", "Name,Value")}
+    path = tmp_path / "log.bin"
+    path.write_bytes(dataflash(kinds | {"MSG": ("Z", "Message")}, [("TIME", (5,)), ("ATT", (0.1, 0.2, 0.3))]))
+    with pytest.raises(InputError, match="sdlog2"):
+        log_contents(path)
+
+
+def test_a_log_is_no_foreign_file(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,x\n0,1\n")
+    assert foreign_file(path) is None

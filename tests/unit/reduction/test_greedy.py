@@ -1,11 +1,14 @@
-"""The selection against a brute-force greedy that evaluates every sample from its definition."""
+"""Greedy selection, exchanges, and flights that do not determine all."""
+
+from itertools import combinations
 
 import numpy as np
 import pytest
 
-from cpfls_cli.errors import SettingError
+from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.reduction.settings import ReductionSettings
-from tests.builders.reductions import reduce
+from cpfls_cli.reduction.training_set import check_space
+from tests.builders.reductions import random_selections, reduce, row_space
 
 
 def problem(seed, samples=40, columns=8):
@@ -152,3 +155,224 @@ def test_nearly_equal_small_eigenvalues_do_not_hide_the_best_sample(seed):
     for step in range(10, 16):
         scores = {i: score("sigma_min", Q, chosen[:step], i) for i in range(160) if i not in chosen[:step]}
         assert scores[chosen[step]] >= max(scores.values()) * (1 - 1e-11)
+
+
+def condition_number(Q, indices):
+    return np.linalg.cond(Q[list(indices)].reshape(-1, Q.shape[2]))
+
+
+def compound(Q, indices):
+    """The criterion in the limit of a high power, from its definition."""
+    values = np.linalg.svd(Q[list(indices)].reshape(-1, Q.shape[2]), compute_uv=False)
+    return 2 * np.log(values[0] / values[-1]) - 2.0 * np.mean(2 * np.log(values))
+
+
+def exchanged(Q, size, criterion="K-exchange", **limits):
+    return reduce(Q, ReductionSettings(criterion=criterion, size=size, **limits))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_close_to_the_best_of_all_subsets(seed):
+    Q = problem(seed, samples=14, columns=5)
+    every = [condition_number(Q, subset) for subset in combinations(range(14), 5)]
+    found = exchanged(Q, 5).condition_number
+    assert found <= np.quantile(every, 0.01)
+    assert found <= 1.15 * min(every)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_information_counts_where_it_is_asked_for(seed):
+    Q = problem(seed, samples=14, columns=5)
+    every = [compound(Q, subset) for subset in combinations(range(14), 5)]
+    assert compound(Q, exchanged(Q, 5, "KD-exchange").indices) <= np.quantile(every, 0.01)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_better_conditioned_than_any_greedy_choice(seed):
+    Q = problem(seed, samples=200)
+    greedy = [
+        reduce(Q, ReductionSettings(criterion=rule, size=30)).condition_number for rule in ("sigma_min", "A", "D")
+    ]
+    selection = exchanged(Q, 30)
+    assert selection.exchanges > 0
+    assert selection.condition_number == pytest.approx(condition_number(Q, selection.indices), rel=1e-9)
+    assert selection.condition_number < 0.9 * min(greedy)
+
+
+def test_keeping_information_predicts_better():
+    """A condition number is also lowered by dropping the samples that say most; predictions pay for that."""
+    Q = problem(1, samples=300)
+
+    def worst_variance(selection):
+        kept = Q[selection.indices].reshape(-1, 8)
+        return np.einsum("nij,jk,nik->ni", Q, np.linalg.inv(kept.T @ kept), Q).max()
+
+    assert worst_variance(exchanged(Q, 40, "KD-exchange")) < 0.5 * worst_variance(exchanged(Q, 40))
+
+
+@pytest.mark.parametrize("criterion", ["K-exchange", "KD-exchange"])
+def test_stops_at_the_first_size_that_reaches_the_target(criterion):
+    Q = problem(2, samples=200)
+    target = 1.1 * exchanged(Q, 24, criterion).condition_number
+    selection = exchanged(Q, None, criterion, condition_number=target)
+    assert selection.stop_reason == "condition-number"
+    assert selection.condition_number <= target
+    assert np.all(selection.condition_number_trace[:-1] > target)
+    assert len(selection.indices) <= 30
+
+
+def test_a_target_out_of_reach_of_the_size_ends_at_the_size():
+    selection = exchanged(problem(2), 12, condition_number=1.001)
+    assert (selection.stop_reason, len(selection.indices)) == ("size", 12)
+
+
+@pytest.mark.parametrize("size", [3, 40])
+def test_the_smallest_and_the_largest_set(size):
+    selection = exchanged(problem(3), size)
+    assert (selection.rank, len(set(selection.indices.tolist()))) == (8, size)
+
+
+def test_badly_scaled_samples_are_exchanged_without_squaring_the_condition_number():
+    rng = np.random.default_rng(0)
+    Q = rng.standard_normal((80, 3, 6)) * np.geomspace(1.0, 1e-8, 6)
+    selection = exchanged(Q, 20)
+    greedy = reduce(Q, ReductionSettings(criterion="sigma_min", size=20))
+    assert selection.rank == 6
+    assert selection.exchanges > 0
+    assert selection.condition_number < greedy.condition_number
+
+
+def test_one_parameter_has_nothing_to_exchange():
+    Q = np.random.default_rng(0).standard_normal((20, 3, 1))
+    assert exchanged(Q, 5).condition_number == pytest.approx(1.0)
+
+
+def deficient(rank=7, columns=16, samples=60, seed=0):
+    rng = np.random.default_rng(seed)
+    basis = np.linalg.qr(rng.standard_normal((columns, rank)))[0].T
+    return rng.standard_normal((samples, 3, rank)) * np.geomspace(1, 0.05, rank) @ basis
+
+
+def kept_condition_number(Q, indices, rank):
+    values = np.linalg.svd(Q[indices].reshape(-1, Q.shape[2]), compute_uv=False)
+    return values[0] / values[rank - 1]
+
+
+@pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "sigma_min", "A", "D"])
+def test_works_in_the_row_space(criterion):
+    Q = deficient()
+    selection = reduce(Q, ReductionSettings(criterion=criterion, size=20))
+    assert (selection.rank, selection.rank_full) == (7, 7)
+    assert selection.rank_trace.tolist()[:3] == [3, 6, 7]
+    assert not selection.stalled
+    assert selection.condition_number == pytest.approx(kept_condition_number(Q, selection.indices, 7), rel=1e-8)
+    assert selection.condition_number_full == pytest.approx(kept_condition_number(Q, np.arange(60), 7), rel=1e-8)
+
+
+def test_same_choice_as_in_coordinates_of_full_rank():
+    Q = deficient()
+    reduced = Q @ np.linalg.svd(Q.reshape(-1, 16))[2][:7].T
+    for criterion in ("KD-exchange", "sigma_min", "A", "D"):
+        settings = ReductionSettings(criterion=criterion, size=20)
+        assert reduce(Q, settings).indices.tolist() == reduce(reduced, settings).indices.tolist()
+
+
+def test_samples_of_dependent_rows_reach_the_rank_one_by_one():
+    rng = np.random.default_rng(4)
+    Q = rng.standard_normal((30, 1, 6)) * np.array([1.0, 0.5, -2.0])[:, None]
+    selection = reduce(Q, ReductionSettings(size=12))
+    assert selection.rank_trace[:6].tolist() == [1, 2, 3, 4, 5, 6]
+    with pytest.raises(SettingError, match="has rank 6, which takes 6 samples"):
+        reduce(Q, ReductionSettings(size=4))
+
+
+def test_mixed_blocks_prefer_the_sample_that_adds_most_rank():
+    strong_line = np.zeros((3, 6))
+    strong_line[0, 5] = 100.0
+    blocks = np.stack([strong_line, np.eye(6)[:3] * 0.1, np.eye(6)[3:] * 0.1])
+    selection = reduce(blocks, ReductionSettings(size=3))
+    assert selection.indices.tolist() == [1, 2, 0]
+
+
+def test_badly_scaled_full_set_keeps_its_small_singular_values():
+    rng = np.random.default_rng(9)
+    Q = rng.standard_normal((50, 3, 6)) * np.geomspace(1.0, 1e-9, 6)
+    selection = reduce(Q, ReductionSettings(size=20))
+    assert selection.rank == 6
+    values = [np.linalg.svd(Q[selection.indices[:n]].reshape(-1, 6), compute_uv=False)[-1] for n in range(2, 21)]
+    assert np.allclose(selection.singular_value_min_trace[1:], values, rtol=1e-5)
+
+
+def test_printed_rule_stalls_and_says_so():
+    # Three equal rows a sample: the smallest singular value is zero whatever is taken, so the loudest are.
+    Q = np.zeros((40, 3, 9))
+    Q[:30, :, :3] = np.random.default_rng(1).standard_normal((30, 1, 3)) * 10.0
+    Q[30:, :, 3:] = np.random.default_rng(2).standard_normal((10, 1, 6))
+    selection = reduce(Q, ReductionSettings(criterion="paper-literal", size=20))
+    assert (selection.rank, selection.rank_full, selection.stalled) == (3, 9, True)
+    assert np.isinf(selection.condition_number)
+    assert not np.any(selection.singular_value_min_trace)
+    assert reduce(Q, ReductionSettings(size=20)).rank == 9
+
+
+def test_random_selection_has_the_condition_number_of_its_rows():
+    Q = deficient(rank=16)
+    subsets = random_selections(Q, 25, 4, np.random.default_rng(0))
+    assert len({tuple(subset.indices) for subset in subsets}) == 4
+    for subset in subsets:
+        assert len(set(subset.indices.tolist())) == 25
+        assert subset.condition_number == pytest.approx(kept_condition_number(Q, subset.indices, 16), rel=1e-9)
+    (few,) = random_selections(Q, 3, 1, np.random.default_rng(0))
+    assert (few.rank, few.full_rank, few.condition_number) == (9, False, np.inf)
+
+
+REGRESSOR = np.random.default_rng(0).standard_normal((20, 3, 10))
+
+
+def check_reducible(Q, settings):
+    check_space(row_space(Q, settings.rank_tolerance), settings)
+
+
+def test_something_must_stop_the_reduction():
+    with pytest.raises(SettingError) as caught:
+        ReductionSettings(size=None)
+    assert caught.value.key == "size"
+
+
+@pytest.mark.parametrize("refuse", [reduce, check_reducible])
+@pytest.mark.parametrize(("size", "message"), [(21, "has only 20 samples"), (3, "rank 10, which takes 4 samples")])
+def test_size_must_fit_the_samples_and_the_rank(refuse, size, message):
+    with pytest.raises(SettingError, match=message) as caught:
+        refuse(REGRESSOR, ReductionSettings(size=size))
+    assert caught.value.key == "size"
+
+
+@pytest.mark.parametrize("size", [4, 20])
+def test_the_smallest_and_the_largest_size_are_taken(size):
+    check_reducible(REGRESSOR, ReductionSettings(size=size))
+    assert reduce(REGRESSOR, ReductionSettings(size=size)).rank == 10
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_value_that_is_not_finite_is_located(value):
+    broken = REGRESSOR.copy()
+    broken[[7, 9], 1, 4] = value
+    with pytest.raises(ComputationError, match=r"sample 7 is not finite \(2 of 20"):
+        reduce(broken, ReductionSettings(size=10))
+
+
+@pytest.mark.parametrize("shape", [(20, 10), (20, 2, 10), (0, 3, 10), (20, 3, 0)])
+def test_wrong_shape(shape):
+    with pytest.raises(ComputationError, match=r"expected shape \(samples, 3, parameters\)"):
+        reduce(np.ones(shape), ReductionSettings(size=10))
+
+
+def test_no_excitation():
+    with pytest.raises(ComputationError, match="every value is zero"):
+        reduce(np.zeros((20, 3, 10)), ReductionSettings(size=10))
+
+
+@pytest.mark.parametrize("size", [0, 21])
+def test_random_selection_of_an_impossible_size(size):
+    with pytest.raises(ComputationError, match="expected 1 to 20"):
+        random_selections(REGRESSOR, size, 1, np.random.default_rng(0))

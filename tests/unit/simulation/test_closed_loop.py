@@ -1,6 +1,7 @@
-"""Flights in closed loop: the balance of what is logged, effect by effect, against the formulas of the catalogue."""
+"""Closed-loop simulation: autopilots, room that is left, and effects."""
 
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -8,14 +9,26 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from cpfls_cli import rotations
+from cpfls_cli.consistency import audit as audit_module
+from cpfls_cli.effects.effect import Coefficient, Effect, Shape
+from cpfls_cli.effects.hooks import Actuation, FaultFit, ReadingError, SensorLog, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import ComputationError
+from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.gap.balance.weak_flight import weak_flight
+from cpfls_cli.simulation import model
+from cpfls_cli.simulation.closed_loop import Setpoints, fly_setpoints
 from cpfls_cli.simulation.measured import measure
-from cpfls_cli.simulation.settings import SimulationSettings
-from cpfls_cli.vehicle.settings import RotorSettings
+from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.room_left import ROTOR_SHARE, hover_squared, room_left, rotor_load, squared_speeds, tilt_of
+from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
+from cpfls_cli.trajectory.excited import added_motion
+from cpfls_cli.trajectory.planning import plan
+from cpfls_cli.trajectory.settings import ExciteSettings, TrajectorySettings
+from cpfls_cli.vehicle.motion import Wrench
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.weak_form.windows import windows
+from tests.builders.autopilots import CROSS
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, planned, signals_of
 
 
@@ -228,3 +241,213 @@ def test_trajectory_of_changing_rate_is_refused():
     settings = SimulationSettings(mode="closed-loop")
     with pytest.raises(ComputationError, match="at one rate"):
         measure(time**2, plan, VEHICLE, settings, np.random.default_rng(1))
+
+
+def flown_by(autopilot, seed=1, **parameters):
+    time, plan = planned(1.5)
+    loop = ClosedLoopSettings(autopilot=autopilot, autopilot_parameters=parameters, integration_rate_hz=400.0)
+    settings = SimulationSettings(mode="closed-loop", noise={"body_rate": 0.01}, closed_loop=loop)
+    return measure(time, plan, CROSS, settings, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot", "crazyflie"])
+def test_an_autopilot_flies_a_path_with_its_own_law(autopilot):
+    flight = flown_by(autopilot)
+    assert np.abs(flight.position_error).max() < 0.3
+    behind = flight.signals["setpoint_attitude"] - flight.signals["attitude"]
+    # It follows the attitude that it is asked for late, and follows it.
+    assert 0.01 < np.sqrt(np.mean(behind[:, :2] ** 2)) < 0.12
+
+
+def test_noise_of_the_gyroscope_is_in_its_loop_and_drawn_again():
+    one, other, again = flown_by("px4"), flown_by("px4", seed=2), flown_by("px4")
+    np.testing.assert_array_equal(one.signals["rotor_speed"], again.signals["rotor_speed"])
+    assert np.abs(one.signals["rotor_speed"] - other.signals["rotor_speed"]).max() > 0.1
+
+
+def test_along_setpoints_the_law_reaches_what_it_is_asked_for():
+    time = 0.01 * np.arange(101)
+    settings = ClosedLoopSettings(autopilot="px4", rotor_time_constant_s=0.02)
+    thrust = np.full(len(time), 0.6)
+    step = np.where(time >= 0.2, 0.2, 0.0)[:, None] * [1.0, 0.0, 0.0]
+    start = np.zeros(12)
+    tilted = fly_setpoints(time, Setpoints(step, None, thrust), start, CROSS, settings, None, SimulatedEffects())
+    assert tilted.state[-1, 6:9] == pytest.approx([0.2, 0.0, 0.0], abs=0.02)
+    assert np.abs(tilted.state[:20, 6:12]).max() < 1e-9
+    turned = fly_setpoints(time, Setpoints(None, step, thrust), start, CROSS, settings, None, SimulatedEffects())
+    assert turned.state[-1, 9:12] == pytest.approx([0.2, 0.0, 0.0], abs=0.03)
+
+
+def test_parameters_of_no_autopilot_are_refused():
+    with pytest.raises(SettingError, match="name one as"):
+        ClosedLoopSettings(autopilot_parameters={"MC_ROLLRATE_P": 0.1})
+    with pytest.raises(SettingError, match="did you mean MC_ROLLRATE_P"):
+        ClosedLoopSettings(autopilot="px4", autopilot_parameters={"MC_ROLRATE_P": 0.1})
+
+
+USUAL = VehicleSettings()
+
+
+def of(vehicle=USUAL, *, tilt_max=None, **asked):
+    excite = ExciteSettings(**{"axes": ("roll", "pitch"), "band_hz": (0.5, 2.0), **asked})
+    settings = TrajectorySettings(path="hover", duration_s=20.0, tilt_max_rad=tilt_max, excite=excite)
+    path = plan(settings, vehicle.gravity_m_s2)
+    added = added_motion(excite, path, vehicle.gravity_m_s2)
+    return path, added, settings, room_left(path, added, settings, vehicle)
+
+
+def flown_along(path, added, factor=1.0):
+    return added.of_sizes(factor * added.sizes).onto(path, USUAL.gravity_m_s2)
+
+
+def test_what_fits_is_left_as_it_is():
+    _, added, _, room = of(size_rad=0.03)
+    np.testing.assert_array_equal(room.added.sizes, added.sizes)
+    assert room.limits == ("", "")
+
+
+def test_tilt_is_kept_and_reached():
+    path, _, _, room = of(size_rad=0.4, tilt_max=0.1, band_hz=(0.5, 1.0))
+    assert room.limits == ("tilt (trajectory.tilt_max_rad = 0.1)",) * 2
+    tilt = tilt_of(flown_along(path, room.added).attitude).max()
+    assert 0.0995 < tilt <= 0.1
+
+
+def test_velocity_is_kept_and_reached():
+    _, _, _, room = of(size_rad=0.4, velocity_max_m_s=0.2, band_hz=(0.5, 1.0))
+    assert all("trajectory.excite.velocity_max_m_s = 0.2" in limit for limit in room.limits)
+    velocity = np.linalg.norm(room.added.motion[1], axis=1).max()
+    assert 0.199 < velocity <= 0.2
+
+
+def test_rotors_keep_what_control_takes():
+    path, _, _, room = of(size_rad=0.3)
+    assert all("rotor speed" in limit for limit in room.limits)
+    squared, hover = squared_speeds(vars(flown_along(path, room.added)), USUAL), hover_squared(USUAL)
+    assert squared.max() <= ROTOR_SHARE * USUAL.rotor_speed_max_rad_s**2
+    assert (squared >= (1 - ROTOR_SHARE) * hover * (1 - 1e-9)).all()
+    load = rotor_load(vars(flown_along(path, room.added, 1.01)), USUAL)
+    assert max(load.fast, load.slow) > 1
+
+
+def test_the_largest_speed_is_named():
+    hover = float(np.sqrt(hover_squared(USUAL).max()))
+    weak = replace(USUAL, rotor_speed_max_rad_s=1.15 * hover)
+    _, _, _, room = of(weak, size_rad=0.1)
+    largest = f"rotor speed (85 % of the square of vehicle.rotor_speed_max_rad_s = {1.15 * hover:g})"
+    assert room.limits == (largest, largest)
+
+
+def test_an_axis_that_can_little_leaves_the_others_their_size():
+    alone = of(axes=("roll",), size_rad=0.02)[3]
+    path, _, _, room = of(axes=("roll", "yaw"), size_rad=0.02)
+    roll, yaw = room.added.sizes
+    assert alone.added.sizes[0] == 0.02
+    assert yaw < 0.6 * roll
+    assert roll > 0.9 * 0.02
+    load = rotor_load(vars(flown_along(path, room.added)), USUAL)
+    assert 0.99 < max(load.fast, load.slow) <= 1
+
+
+def test_next_to_no_room_is_refused():
+    with pytest.raises(SettingError, match=r"room for only .* degrees of roll: rotor speed") as caught:
+        of(size_rad=0.5, band_hz=(0.5, 10.0))
+    assert caught.value.key == "excite.size_rad"
+
+
+def new_effect(**fields):
+    words = dict.fromkeys(("title", "formula", "sentence", "excitation", "source"), "made up")
+    known = {"needs": frozenset(), "rivals": {}, "columns": None, "coefficients": (), **words}
+    return Effect(**{**known, **fields})
+
+
+def leaning_log(signals, _motion, values):
+    return {"acceleration": signals["acceleration"] + np.array(list(values.values()))}
+
+
+def leaning_fit(flights):
+    """Mean acceleration of each tenth of a flight, less the change of the velocity over it."""
+    [flight] = flights
+    parts = [slice(first, first + 30) for first in range(0, len(flight) - 30, 30)]
+    apart = [
+        flight.acceleration[p].mean(axis=0)
+        - (flight.velocity[p][-1] - flight.velocity[p][0]) / (PERIOD * (len(flight.time[p]) - 1))
+        for p in parts
+    ]
+    error = np.std(apart, axis=0, ddof=1) / np.sqrt(len(apart))
+    return FaultFit(np.mean(apart, axis=0), error, np.zeros(3), np.ones(3, dtype=bool), len(apart))
+
+
+ACCELEROMETER = new_effect(
+    name="accelerometer_offset",
+    kind="sensor",
+    coefficients=tuple(Coefficient(f"a_{axis}", "m/s^2", -2.0, 2.0, f"offset along {axis}") for axis in "xyz"),
+    log=SensorLog(change=leaning_log),
+    test=SensorTest(
+        estimate=leaning_fit,
+        labels=("x", "y", "z"),
+        smallest=0.05,
+        number=lambda axis, value: f"{value:+.2f} m/s^2 along {axis}",
+        found="The accelerometer is off by {}.",
+        nothing="The accelerometer is right.",
+        error=lambda values: ReadingError(offset=values),
+        signal="acceleration",
+    ),
+)
+
+
+def slowest(rotors, values, memory):
+    return rotors._replace(speed=memory.functions.smallest(rotors.speed, values["limit"]))
+
+
+LIMITED = new_effect(
+    name="limited_rotors",
+    kind="actuator",
+    shapes=(Shape("limit", "rad/s", (100.0, 900.0), "fastest that a rotor turns"),),
+    actuation=Actuation(link=slowest),
+)
+
+
+PULLED_UP = new_effect(
+    name="pulled_up",
+    kind="wrench",
+    coefficients=(Coefficient("f", "N", 0.0, 10.0, "force along body z, where the vehicle is above a metre"),),
+    acts=lambda see, p: Wrench(force=(0, 0, see.functions.where(see.height > 1.0, p["f"], 0.0))),
+)
+
+
+def flown_with(monkeypatch, **effects):
+    entries = {effect.name: effect for effect in (ACCELEROMETER, LIMITED, PULLED_UP)}
+    monkeypatch.setattr(model, "find", entries.__getitem__)
+    return flown(effects=effects)
+
+
+def test_a_new_sensor_effect_is_flown_found_and_repaired(monkeypatch):
+    flight = signals_of(flown_with(monkeypatch, accelerometer_offset=(0.5, 0.0, -0.3)))
+    grown = MappingProxyType({**CATALOGUE, ACCELEROMETER.name: ACCELEROMETER})
+    monkeypatch.setattr(audit_module, "CATALOGUE", grown)
+    found = audit_module.audit([flight], windows(PERIOD, 0.4, 0.5))
+    [finding] = [each for each in found.named if each.name == ACCELEROMETER.name]
+    assert finding.sentence == "The accelerometer is off by +0.50 m/s^2 along x, -0.30 m/s^2 along z."
+    np.testing.assert_allclose([number.value for number in finding.coefficients], [0.5, 0.0, -0.3], atol=0.01)
+    repaired = replace(found, findings=(finding,)).repaired(flight)
+    np.testing.assert_allclose(repaired.acceleration, flight.acceleration - [0.5, 0.0, -0.3], atol=0.01)
+    np.testing.assert_array_equal(repaired.body_rate, flight.body_rate)
+
+
+def test_a_new_actuator_effect_is_a_link_of_the_chain(monkeypatch):
+    free = flown_with(monkeypatch)
+    flight = flown_with(monkeypatch, limited_rotors=(500.0,))
+    assert free.signals["rotor_speed"].min() < 345 < free.signals["rotor_speed"].max() < 500
+    assert flight.effects.hides_rotor_speed
+    np.testing.assert_array_equal(flight.signals["position"], free.signals["position"])
+    slow = flown_with(monkeypatch, limited_rotors=(345.0,))
+    assert slow.position_error[-1, 2] < free.position_error[-1, 2] - 0.01
+
+
+def test_a_new_effect_on_the_vehicle_is_one_function(monkeypatch):
+    free, pulled = flown_with(monkeypatch), flown_with(monkeypatch, pulled_up=(3.0,))
+    thrust = [121.5e-6 * (each.signals["rotor_speed"][-1] ** 2).sum() for each in (free, pulled)]
+    assert thrust[0] - thrust[1] == pytest.approx(3.0, rel=0.3)
+    high = flown_with(monkeypatch, pulled_up=(0.0,))
+    np.testing.assert_array_equal(high.signals["position"], free.signals["position"])

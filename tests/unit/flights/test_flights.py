@@ -1,0 +1,281 @@
+"""Flights: where they come from, and what is computed from their signals."""
+
+import pickle
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from cpfls_cli.artifacts.gate import InputFile
+from cpfls_cli.config.load import parse_config, validate
+from cpfls_cli.config.study import Study, resolved_yaml
+from cpfls_cli.errors import InputError
+from cpfls_cli.files import seal_of
+from cpfls_cli.flights import playback, recordings
+from cpfls_cli.flights import training as sources
+from cpfls_cli.flights.flight import MOTION, Flight, Imported, Simulated
+from cpfls_cli.flights.path import PlannedPath
+from cpfls_cli.flights.recordings import ReadFlight, signals_of
+from cpfls_cli.simulation.inverse import flyability
+from cpfls_cli.store import Origin, write
+from cpfls_cli.trajectory.planning import plan
+from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
+from cpfls_cli.vehicle.rotors import body_wrench
+from cpfls_cli.vehicle.settings import Unknown, VehicleSettings
+
+TIME = np.arange(3.0)
+THREE = np.zeros((3, 3))
+
+
+@pytest.mark.parametrize(
+    ("signals", "lacks"),
+    [
+        ({}, ("attitude", "rotation", "torque")),
+        ({"body_rate": THREE}, ("attitude", "torque")),
+        ({"body_rate": THREE, "body_torque": THREE}, ("attitude",)),
+        ({"attitude": THREE}, ("torque",)),
+        ({"attitude": THREE, "body_torque": THREE}, ()),
+        ({"attitude": THREE, "torque": THREE}, ()),
+    ],
+)
+def test_what_later_commands_will_miss(signals, lacks):
+    assert Flight(time=TIME, **signals).lacks == lacks
+
+
+def test_a_flight_turns_where_roll_or_pitch_goes_round():
+    def turns(axis, angle):
+        attitude = THREE + np.where(np.arange(3) == axis, angle, 0.0) * TIME[:, None]
+        return Flight(time=TIME, attitude=attitude, attitude_rate=THREE).turns
+
+    assert [turns(axis, 3.2) for axis in range(3)] == [True, True, False]
+    assert not turns(0, 3.1)
+
+
+def trajectory(**settings):
+    asked = TrajectorySettings(**settings)
+    planned = plan(asked, 9.81)
+    return PlannedPath.of(planned, flyability(vars(planned), VehicleSettings(), asked.tilt_max_rad), asked)
+
+
+def test_the_paper_s_move_shows_its_printed_maxima():
+    peaks = {peak.name: peak.largest for peak in trajectory().peaks}
+    printed = {"pop": 2 * np.pi, "crackle": 2, "snap": 1, "jerk": 1, "acceleration": 2, "velocity": 8}
+    assert peaks == pytest.approx({**printed, "displacement": 64}, rel=1e-3)
+
+
+@pytest.mark.parametrize("duration_s", [48.0, 54.86])
+def test_the_first_leg_is_the_first_sixteen_seconds(duration_s):
+    leg = trajectory(duration_s=duration_s).first_leg()
+    assert leg.time[-1] == pytest.approx(16.0, abs=0.1)
+    assert leg.curves["displacement"][-1] == pytest.approx(64.0)
+    assert np.trapezoid(leg.curves["velocity"], leg.time) == pytest.approx(64.0, rel=1e-4)
+    assert leg.curves["velocity"].min() >= -1e-9
+
+
+def test_the_first_leg_of_a_path_through_waypoints_ends_at_the_second_point():
+    points = tuple(WaypointSettings(position_m=place) for place in ((1.0, 2.0, 3.0), (4.0, 6.0, 3.0), (40.0, 6.0, 3.0)))
+    leg = trajectory(path="waypoints", waypoints=points).first_leg()
+    assert leg.time[-1] == pytest.approx(16.0)
+    assert leg.curves["displacement"][-1] == pytest.approx(5.0)
+
+
+def test_a_file_that_does_not_know_its_legs_shows_the_whole_path():
+    leg = replace(trajectory(), legs=()).first_leg()
+    assert len(leg.time) == 5487
+    assert leg.curves["displacement"].max() == pytest.approx(64.0)
+
+
+SAMPLES = 20
+
+
+def read(vehicle, speed, **changes):
+    """Read a flight that states what such speeds give."""
+    wrench = body_wrench(vehicle, speed)
+    stated = {"thrust": wrench.thrust, "body_torque": wrench.body_torque} | changes
+    known = {"time": np.arange(SAMPLES) / 100, "body_rate": np.ones((SAMPLES, 3))} | stated
+    known = {name: values for name, values in known.items() if values is not None}
+    return signals_of(ReadFlight("flight.csv", known, {}, ()), known, Study(vehicle=vehicle))
+
+
+@pytest.fixture
+def speed():
+    return np.random.default_rng(1).uniform(300.0, 600.0, (SAMPLES, 4))
+
+
+def test_the_commands_are_those_that_give_the_wrench(speed):
+    signals, notes = read(VehicleSettings(), speed)
+    np.testing.assert_allclose(signals.rotor_speed, speed, rtol=1e-9)
+    assert signals.commanded
+    assert "four rotors of the config" in " ".join(notes)
+
+
+def test_a_rotor_that_would_have_to_push_down_stands_still(speed):
+    vehicle = VehicleSettings()
+    thrust = body_wrench(vehicle, speed).thrust
+    thrust[:3] = 0.0
+    signals, notes = read(vehicle, speed, thrust=thrust)
+    assert f"at 3 of {SAMPLES} samples" in " ".join(notes)
+    assert (signals.rotor_speed[:3] == 0).any(axis=1).all()
+
+
+@pytest.mark.parametrize("unknown", [name for name in get_args(Unknown) if name.endswith("factor")])
+def test_rotors_of_unknown_factors_are_asked_for_nothing(unknown, speed):
+    signals, notes = read(replace(VehicleSettings(), unknown=(unknown,)), speed)
+    assert signals.rotor_speed is None
+    assert signals.stated_thrust is not None
+    assert not notes
+
+
+def test_torque_without_thrust_tells_no_commands(speed):
+    signals, _ = read(VehicleSettings(), speed, thrust=None)
+    assert signals.rotor_speed is None
+    assert signals.stated_torque is not None
+
+
+def test_six_rotors_leave_a_choice(speed):
+    vehicle = VehicleSettings()
+    six = replace(vehicle, rotors=(*vehicle.rotors, *vehicle.rotors[:2]))
+    signals, _ = read(six, np.hstack([speed, speed[:, :2]]))
+    assert signals.rotor_speed is None
+
+
+def simulated(**given):
+    """Make a simulated flight of its signals."""
+    return Simulated(**({"noise_std": {}, "infeasible": (), "effects": {}} | given))
+
+
+def imported(**given):
+    """Make a flight of a log that nothing is said of."""
+    time = given["time"]
+    counts = {key: {} for key in ("dropped", "missing", "spikes", "suspected_spikes", "saturated")}
+    rate = 1 / (time[1] - time[0])
+    said = {
+        "samples_read": len(time),
+        "samples": len(time),
+        "gaps": 0,
+        "longest_gap_s": 1 / rate,
+        "span_s": (0.0, float(time[-1])),
+        "first_stamp_s": 0.0,
+        "crop_s": None,
+        "log_rate_hz": rate,
+        "rate_hz": rate,
+        "cut_off_hz": {},
+        "updated_hz": {},
+        "parameters": {},
+        "stated": {},
+    }
+    return Imported(**(counts | said | given))
+
+
+LENGTH = 30
+
+
+def write_flight(path, samples):
+    rng = np.random.default_rng(2)
+    signals = {name: rng.normal(size=(samples, 3)) for name in (*MOTION, "torque")}
+    flight = simulated(time=np.arange(samples) / 10, **signals)
+    write(path, flight, Origin(stage="simulate", seed=1, config=resolved_yaml(Study())))
+
+
+@pytest.fixture
+def source(tmp_path, monkeypatch):
+    """As a worker gets it: pickled here, and read there."""
+    monkeypatch.setattr(sources, "IN_MEMORY", 10)
+    write_flight(tmp_path / "flight.h5", LENGTH)
+    opened = sources.part_of(sources.flight_source(tmp_path / "flight.h5"), slice(5, 20))
+    return pickle.loads(pickle.dumps(opened))
+
+
+def test_it_is_read_where_the_same_file_lies(source):
+    assert source.path.is_absolute()
+    (part,) = source.chunks()
+    np.testing.assert_array_equal(part.time, np.arange(5, 20) / 10)
+
+
+def another_size(path):
+    path.write_bytes(path.read_bytes() + b"x")
+
+
+def another_length(path):
+    size, sealed = path.stat().st_size, len(seal_of(b""))
+    write_flight(path, LENGTH - 3)
+    content = path.read_bytes()[:-sealed].ljust(size - sealed, b"\0")
+    path.write_bytes(content + seal_of(content))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (Path.unlink, "no such file"),
+        (another_size, "another file, with [0-9]+ bytes instead of"),
+        (another_length, "another file, with 27 samples instead of 30"),
+    ],
+)
+def test_another_file_is_refused_with_path_and_remedy(source, change, said):
+    change(source.path)
+    with pytest.raises(InputError, match=f"{source.path}: {said}.*put the same file there on each"):
+        next(source.chunks())
+
+
+PERIOD_S = 0.5
+
+
+def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):
+    """A flight with a battery that sags, of a log with body torque, or with commands in a unit in its place."""
+    rng = np.random.default_rng(4)
+    mapped = {"voltage": {"columns": ["u"], "unit": unit}, "body_torque": {"columns": ["a", "b", "c"], "unit": "N m"}}
+    source = "column" if commands is None else "rotor-command"
+    if commands is not None:
+        mapped["rotor_command"] = {"columns": ["k", "l", "m", "n"], "unit": commands}
+        del mapped["body_torque"]
+    config = parse_config(resolved_yaml(Study()), "own") | {"import": {"signals": mapped, "torque_source": source}}
+    study = validate(config, "own")
+    inputs = {"log": InputFile("log.csv", "0" * 64, "CSV")}
+    signals = {name: rng.normal(size=(90, 3)) for name in ("attitude", "body_rate")}
+    name, columns = ("body_torque", 3) if commands is None else ("rotor_command", 4)
+    signals[name] = rng.uniform(0.2, 0.8, size=(90, columns))
+    signals["voltage"] = np.linspace(*voltage, 90)
+    flight = imported(time=PERIOD_S * np.arange(90), **signals)
+    write(path, flight, Origin(stage="import", seed=1, config=resolved_yaml(study), inputs=inputs))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("unit", "voltage", "said"),
+    [
+        ("V", (12.5, -0.3), "voltage is 0 or less at 3 of 90 samples, so it is not used: drop these rows, or check"),
+        ("1", (0.9, 0.0), "voltage is 0 or less at 1 of 90 samples"),
+        (
+            "1",
+            (12.5, 10.0),
+            r"12\.5 times that of a full battery, so it is not used: set import\.signals",
+        ),
+    ],
+)
+@pytest.mark.parametrize("read", [recordings.read_flights, playback.flights_to_play])
+def test_a_voltage_that_no_battery_has_is_not_used_and_said(tmp_path, unit, voltage, said, read):
+    path = driven(tmp_path / "flight.h5", unit=unit, voltage=voltage)
+    if read is recordings.read_flights:
+        found = read([path], Study())
+        parts, warnings = [each.signals for each in found.recordings], found.warnings
+    else:
+        (found,) = read([path], Study())
+        parts, warnings = found.parts, found.warnings
+    assert [part.voltage for part in parts] == [None] * len(parts)
+    assert len(re.findall(said, " ".join(warnings))) == 1
+    assert "taken as that of a full battery" not in " ".join(warnings)
+
+
+@pytest.mark.parametrize(("unit", "shares"), [("1", True), ("rad/s", False), (None, False)])
+def test_a_flight_to_play_says_whether_its_commands_are_shares_of_a_full_speed(tmp_path, unit, shares):
+    path = driven(tmp_path / "flight.h5", commands=unit)
+    (flight,) = playback.flights_to_play([path], Study())
+    assert flight.shares is shares
+
+
+def test_an_import_says_what_is_wrong_with_a_voltage(tmp_path):
+    flight = recordings.read_flight(driven(tmp_path / "flight.h5", voltage=(12.5, 0.0)), Study())
+    assert "voltage is 0 or less at 1 of 90" in " ".join(recordings.doubts_on_voltage(flight.signals, flight.units))

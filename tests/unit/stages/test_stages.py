@@ -1,0 +1,122 @@
+"""What single stages add to numerics: extensions, figures of look, reductions."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.errors import ComputationError
+from cpfls_cli.gap.naming.results import GapVerdict
+from cpfls_cli.report.canvas import picture_of
+from cpfls_cli.result import Estimate
+from cpfls_cli.stages.extend import named_effects
+from cpfls_cli.stages.look import FIGURES
+from cpfls_cli.stages.reduce import _naming
+from tests.builders import gap_artifacts as made
+
+
+@pytest.mark.parametrize("verdict", [GapVerdict.UNEXPLAINED, GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED])
+def test_only_names_are_added(verdict):
+    found = made.diagnosis()
+    with pytest.raises(ComputationError, match=f"the diagnosis is {verdict} and names no effect"):
+        named_effects(replace(found, verdict=verdict))
+    with pytest.raises(ComputationError, match="names no effect"):
+        named_effects(replace(found, effects=(), closest=found.effects))
+    for good in (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS):
+        assert named_effects(replace(found, verdict=good)) == found.effects
+
+
+def test_axes_that_get_worse_are_warned_of():
+    before, gap = np.array([2.0, 1.4, 10.0, 3.0, np.nan, 1.0]), made.extended().gap
+    for factor, axes in ((1.3, [0, 2]), (1.1, [])):
+        grown = replace(made.extended(), gap=replace(gap, before_floors=before, after_floors=factor * before))
+        assert grown.gap.worse_axes == axes
+        assert len(grown.warnings) == len(axes)
+
+
+def test_numbers_that_overflow_are_an_error_that_names_the_flight():
+    said = r"own/flight\.h5: the regressor has numbers too far apart"
+    with pytest.raises(ComputationError, match=said), _naming([Path("own/flight.h5")]):
+        np.linalg.eigvalsh(np.full((3, 3), np.nan))
+
+
+HZ = np.array([1.0, 2.0, 5.0, 10.0])
+ROTORS = tuple(
+    SimpleNamespace(rotor=at, share=Estimate.around(1.0 + 0.1 * at, 0.05), expected=1.0 + 0.02 * at) for at in (1, 2)
+)
+PLANT = SimpleNamespace(
+    axis="pitch",
+    identified=True,
+    frequency=HZ,
+    gain=np.array([80.0, 70.0, 60.0, 900.0]),
+    gain_error=np.array([0.1, 0.1, 0.1, 3.0]),
+    model_gain=np.array([80.0, 75.0, 50.0, 30.0]),
+    direct_gain=np.array([10.0, 20.0, 30.0, 40.0]),
+    input_coherence=np.ones(4),
+    output_coherence=np.array([1.0, 0.01, 1.0, 1.0]),
+)
+LOOP = SimpleNamespace(
+    axis="roll",
+    measured=True,
+    time=np.linspace(0.0, 1.0, 6),
+    **{name: np.linspace(0.0, end, 6) for name, end in (("step", 1.0), ("step_low", 0.9), ("step_high", 1.1))},
+    by_step=SimpleNamespace(half_s=Estimate.around(0.04, 0.01)),
+    law_explains=False,
+    frequency=HZ,
+    gain=np.array([1.0, 1.1, 0.8, 0.4]),
+    gain_error=np.full(4, 0.05),
+    clear_hz=6.0,
+)
+SPECTRUM = SimpleNamespace(signal="gyroscope", frequency=10 * HZ, density=np.full((4, 3), np.radians(0.5) ** 2))
+VIBRATION = SimpleNamespace(
+    map_db=np.arange(8.0).reshape(2, 4),
+    map_hz=10 * HZ,
+    map_collective=np.array([0.3, 0.5]),
+    spectra={"gyroscope": SPECTRUM},
+    lines=(SimpleNamespace(hz=42.0),),
+)
+SHAPE = SimpleNamespace(
+    collective=np.array([0.3, 0.4, 0.5]),
+    specific_force=np.array([5.0, 8.0, 13.0]),
+    exponent=Estimate.around(2.0, 0.1),
+)
+FOUND = SimpleNamespace(
+    balance=SimpleNamespace(rotors=ROTORS),
+    plants={"pitch": PLANT},
+    loops={"roll": LOOP},
+    vibration=VIBRATION,
+    hover=SimpleNamespace(shape=SHAPE),
+)
+NOTHING = SimpleNamespace(balance=None, plants={}, loops=None, vibration=None, hover=None, tracks={}, events=())
+
+
+@pytest.mark.usefixtures("drawn")
+@pytest.mark.parametrize(
+    ("name", "rows"),
+    [
+        ("balance", {("share", "M1", "10.00"), ("95 %", "M2", "25.00"), ("equal rotors", "M2", "4.000")}),
+        # Points that no coherence or interval supports are left out.
+        ("effectiveness", {("pitch", "10", "30.00"), ("", "5", "60.00"), ("least squares", "10", "40.00")}),
+        # Ten times as long as half of it takes.
+        ("step", {("roll", "0.4000", "0.4000"), ("", "0.4000", "0.3600")}),
+        ("response", {("roll", "5", "0.8000")}),
+        ("spectra", {("as logged", "100", "0.5000")}),
+        ("thrust", {("", "0.5000", "13.00"), ("exponent 2.00", "0.5000", "13.00")}),
+    ],
+)
+def test_it_draws_what_was_found(name, rows):
+    shown = {row[1:] for row in picture_of(FIGURES[name], name, FOUND).rows}
+    assert rows <= shown
+    assert not {row for row in shown if row[2] == "900.0" or (name == "effectiveness" and row[2] == "70.00")}
+    assert not {row for row in shown if name in ("step", "response") and float(row[1]) > 6.0}
+
+
+@pytest.mark.usefixtures("drawn")
+def test_the_map_is_a_picture():
+    assert 'href="data:image/png' in picture_of(FIGURES["vibration-map"], "vibration-map", FOUND).svg
+
+
+def test_where_nothing_was_found_nothing_is_drawn():
+    assert {name: picture_of(draw, name, NOTHING) for name, draw in FIGURES.items()} == dict.fromkeys(FIGURES)
