@@ -526,25 +526,27 @@ def errors_of_runs(flown: Flown, runs: Runs, steps: Steps) -> tuple[Array, IntAr
 
 
 class Leg(NamedTuple):
-    """Some of the runs, flown."""
+    """Some of the runs, flown, and their errors (see `Runs.errors`)."""
 
     part: slice
     runs: Runs
     path: _Path
+    errors: Array
 
 
 def legs(flown: Flown, runs: Runs, steps: Steps) -> Iterator[Leg]:
     """Fly runs, some at a time."""
     for part, own, of_steps in runs.blocks(steps, MOST_RUNS):
-        yield Leg(part, own, own.fly(flown, of_steps, passed=True))
+        path = own.fly(flown, of_steps, passed=True)
+        yield Leg(part, own, path, own.errors(path))
 
 
 def losses_of(flown: Iterable[Leg], loss: Loss) -> Array:
     """Weigh the errors of runs, shape (run,)."""
     found = []
-    for part, runs, path in flown:
-        weighed = loss.of_runs(part)
-        found.append(_lost(path.diverged, weighed, weighed.of(_squares(runs.errors(path)))).sum(axis=(0, 1)))
+    for leg in flown:
+        weighed = loss.of_runs(leg.part)
+        found.append(_lost(leg.path.diverged, weighed, weighed.of(_squares(leg.errors))).sum(axis=(0, 1)))
     return np.concatenate(found)
 
 
@@ -589,11 +591,10 @@ def sums_of(legs: Iterable[Leg], slopes: Slopes, steps: Steps, loss: Loss, group
 
 def _shares(leg: Leg, loss: Loss) -> tuple[Array, Array]:
     """Give by what rows of the Jacobian are multiplied, and what they come to, shapes (run, step, STATES)."""
-    errors = leg.runs.errors(leg.path)
-    share = np.sqrt(loss.weight / np.sqrt(1.0 + _squares(errors) / loss.delta**2))
+    share = np.sqrt(loss.weight / np.sqrt(1.0 + _squares(leg.errors) / loss.delta**2))
     share[np.broadcast_to(_gone(leg.path.diverged, len(share))[:, None], share.shape)] = 0.0
     shares = np.repeat(share.transpose(2, 0, 1), 3, axis=2)
-    return shares, shares * errors.transpose(3, 1, 0, 2).reshape(shares.shape)
+    return shares, shares * leg.errors.transpose(3, 1, 0, 2).reshape(shares.shape)
 
 
 def _slices(count: int, most: int) -> Iterator[slice]:
