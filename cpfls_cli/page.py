@@ -29,7 +29,8 @@ from typing import Any, cast
 from urllib.parse import quote
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import BytecodeCache, Environment, FileSystemLoader, StrictUndefined
+from jinja2.bccache import Bucket
 from markdown_it import MarkdownIt
 from markdown_it.rules_core import StateCore
 from markdown_it.token import Token
@@ -199,6 +200,22 @@ class _Added:
         return isinstance(other, _Added) and other.names is self.names
 
 
+class _Compiled(BytecodeCache):
+    """Templates as compiled, once for all stages: what each adds is looked up when they are rendered."""
+
+    def __init__(self) -> None:
+        self.kept: dict[tuple[str, str], Any] = {}
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        bucket.code = self.kept.get((bucket.key, bucket.checksum))
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        self.kept[bucket.key, bucket.checksum] = bucket.code
+
+
+_COMPILED = _Compiled()
+
+
 @cache
 def _environment(folder: Path, added: _Added) -> Environment:
     made = Environment(
@@ -207,6 +224,7 @@ def _environment(folder: Path, added: _Added) -> Environment:
         autoescape=True,
         finalize=escaped,
         undefined=StrictUndefined,
+        bytecode_cache=_COMPILED,
         trim_blocks=True,
         lstrip_blocks=True,
     )

@@ -249,9 +249,9 @@ def turns(vector: Array) -> Array:
     -------
     array, shape (samples, 3, 3)
     """
-    angle = np.linalg.norm(vector, axis=1)[:, None, None]
-    x, y, z = vector.T
-    none = np.zeros_like(x)
-    cross = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=1).reshape(-1, 3, 3)
-    half = np.sinc(angle / (2 * np.pi))
-    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * half**2 * (cross @ cross))
+    angle, (x, y, z) = np.linalg.norm(vector, axis=1), vector.T
+    along = np.sinc(angle / np.pi)
+    twice = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    (i, j, k), xy, xz, yz = along * vector.T, twice * (x * y), twice * (x * z), twice * (y * z)
+    xx, yy, zz = (1.0 - twice * (one * one + other * other) for one, other in ((y, z), (x, z), (x, y)))
+    return np.stack([xx, xy - k, xz + j, xy + k, yy, yz - i, xz - j, yz + i, zz], axis=1).reshape(-1, 3, 3)

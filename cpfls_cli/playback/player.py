@@ -220,20 +220,19 @@ def still_runs(
     `moves`: attitude and position follow rates and velocity; rates fade with the time constant `fading_s`; `every`:
     samples of a step.
     """
-    motion = flight.motion
-    velocity, rate, held = motion.velocity[starts], motion.rate[starts], motion.rotation[starts]
-    errors = np.empty((len(starts), horizon, 4, 3))
-    for step in range(horizon):
-        after = (step + 1) * every
-        elapsed = after * motion.period
-        share = np.exp(-elapsed / fading_s)
-        if moves:
-            # How far it has turned: of one that fades, as far as the rate at the start does in a shorter time.
-            as_long = elapsed if np.isinf(fading_s) else fading_s * (1.0 - share)
-            held = motion.rotation[starts] @ rotations.turns(as_long * rate)
-        position = motion.position[starts] + (elapsed * velocity if moves else 0.0)
-        errors[:, step] = less_measured(State(position, velocity, held, share * rate), motion, starts + after)
-    return Runs(errors, np.full(len(starts), -1))
+    motion, after = flight.motion, every * np.arange(1, horizon + 1)
+    elapsed = (after * motion.period)[:, None, None]
+    share = np.exp(-elapsed / fading_s)
+    begin = State(*(each[starts] for each in motion[:4]))
+    position, held, rate = begin.position[None], begin.rotation[None], begin.rate * share
+    if moves:
+        position = position + elapsed * begin.velocity
+        # How far it has turned: of one that fades, as far as the rate at the start does in a shorter time.
+        turned = (elapsed if np.isinf(fading_s) else fading_s * (1.0 - share)) * begin.rate
+        held = held @ rotations.turns(turned.reshape(-1, 3)).reshape(*rate.shape, 3)
+    at = after[:, None] + starts
+    errors = less_measured(State(position, begin.velocity, np.broadcast_to(held, (*rate.shape, 3)), rate), motion, at)
+    return Runs(errors.swapaxes(0, 1), np.full(len(starts), -1))
 
 
 def less_measured(state: State, motion: MeasuredMotion, at: IntArray) -> Array:
@@ -256,4 +255,5 @@ def rotation_vectors(measured: Array, predicted: Array) -> Array:
     array, shape (..., 3), rad
         In the measured body frame; its length is the geodesic distance.
     """
-    return rotation_errors(measured[..., None], predicted[..., None])[..., 0]
+    by_entry = (np.ascontiguousarray(np.moveaxis(each.reshape(-1, 3, 3), 0, -1)) for each in (measured, predicted))
+    return np.asarray(rotation_errors(*by_entry).T.reshape(measured.shape[:-1]))

@@ -1,5 +1,6 @@
 """The noise floor of each channel, from the residual at frequencies above the motion."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -78,18 +79,16 @@ def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
     longer = make_windows(windows.period, wanted, 0.5) if fits else windows
     lowest = _LOWEST_PER_WINDOW / (len(longer.weight) * longer.period)
     frequencies = np.linspace(lowest, max(highest, _BAND * lowest), _FREQUENCIES)
-    power = np.empty((len(frequencies), 6))
-    for number, frequency in enumerate(frequencies):
-        through = modulated(longer, frequency)
-        rows = through.average(residual.direct)
-        if residual.momentum is not None:
-            rows = rows + through.derivative(residual.momentum)
-        # The median, which does not see lines; that of the power of noise is ln 2 of its mean.
-        power[number] = np.median(np.abs(rows) ** 2, axis=0) / np.log(2) / (longer.weight**2).sum()
+    through = modulated(longer, frequencies)
+    rows = through.average(residual.direct)
+    if residual.momentum is not None:
+        rows = rows + through.derivative(residual.momentum)
+    # The median, which does not see lines; that of the power of noise is ln 2 of its mean.
+    power = np.median(np.abs(rows) ** 2, axis=0) / np.log(2) / (longer.weight**2).sum()
     terms = np.array([_terms(longer.weight.tobytes(), longer.period, frequency) for frequency in frequencies])
     window_terms = _terms(windows.weight.tobytes(), windows.period, 0.0) * (windows.weight**2).sum()
     floor = np.zeros(6)
-    for channel, own in enumerate(power.T):
+    for channel, own in enumerate(power):
         if own.min() > 0:
             # Dividing by the power makes relative errors of equal weight.
             relative = terms / own[:, None]
@@ -137,11 +136,12 @@ def _best_pair(relative: Array) -> int:
     return 0 if misfit[0, 0] <= unsure * misfit.min() else int(np.argmin(misfit))
 
 
-def modulated(windows: Windows, frequency: float) -> Windows:
-    """Shift windows to a frequency, ``phi(t) exp(-2 pi i f t)``.
+def modulated(windows: Windows, frequency: float | Array) -> Windows:
+    """Shift windows to a frequency, ``phi(t) exp(-2 pi i f t)``; to several, they are columns of the weights.
 
     `frequency`: Hz; Result: complex.
     """
-    turn = 2j * np.pi * frequency
-    phase = np.exp(-turn * windows.period * np.arange(len(windows.weight)))
-    return Windows(windows.weight * phase, (windows.slope - turn * windows.weight) * phase, windows.hop, windows.period)
+    turn = 2j * np.pi * np.asarray(frequency)
+    phase = np.exp(-windows.period * np.multiply.outer(turn, np.arange(len(windows.weight))))
+    slope = windows.slope - np.multiply.outer(turn, windows.weight)
+    return replace(windows, weight=(windows.weight * phase).T, slope=(slope * phase).T)

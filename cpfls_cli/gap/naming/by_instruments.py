@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain, product
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -46,20 +46,18 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
     instruments).
     """
     stated = at = _of_config(found)
-    if not _sources(at, given):
+    sources = _sources(at, given)
+    if not sources:
         return found
     moved = np.zeros(len(found.values), dtype=bool)
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
-        sources = _sources(at, given)
-        if not sources:
-            break
         values, left_out = _stepped(at, sources)
         step, error, shapes = np.abs(values - at.values), jackknife_error(left_out), values[len(at.estimates.linear) :]
         hypothesis = at.hypothesis.with_shapes(shapes) if len(shapes) else at.hypothesis
         moved = np.any([numbers for _, numbers in sources], axis=0)
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
-        if np.all(10 * step <= error):
+        if np.all(10 * step <= error) or not (sources := _sources(at, given)):
             break
     return at._replace(estimates=_with_unidentified(stated, at.estimates, moved))
 
@@ -208,10 +206,11 @@ def _sources(found: NamedFit, given: Instruments) -> list[_Source]:
     blocks = np.unique(np.concatenate([run.block for run in chain(*windows)]))
     for place, runs in enumerate(windows):
         products = np.zeros((len(blocks), len(open_) + 1, len(open_) + 1))
-        for (row, number), (rows, known, block) in product(enumerate(blocks), runs):
-            own = block == number
-            # As of windows half of which overlap.
-            products[row] += np.einsum("wck,wcl->kl", known[own], rows[own], optimize=True) * (2 / PER_WINDOW)
+        for rows, known, block in runs:
+            for number in np.unique(block):
+                z, x = (each[block == number].reshape(-1, len(open_) + 1) for each in (known, rows))
+                # As of windows half of which overlap.
+                products[np.searchsorted(blocks, number)] += z.T @ x * (2 / PER_WINDOW)
         flown = products[products.any(axis=(1, 2))]
         if len(flown) >= ENOUGH_BLOCKS:
             # What a bound identifies better than these flights is not identified by them.

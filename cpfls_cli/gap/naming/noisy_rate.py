@@ -87,9 +87,8 @@ class _Balance:
         highest = int(min(ends) * samples * self.period)
         if highest < FEWEST_SAMPLES:
             return
-        at = [modulated(own, cycles / (samples * self.period)) for cycles in range(1, highest)]
-        self.hop, self.average = own.hop, np.stack([each.weight for each in at], axis=1) / size
-        self.differentiate = -np.stack([each.slope for each in at], axis=1) / size
+        at = modulated(own, np.arange(1, highest) / (samples * self.period))
+        self.hop, self.average, self.differentiate = own.hop, at.weight / size, -at.slope / size
         power, fine = np.abs(np.fft.fft(self.average, 4 * samples, axis=0)).T ** 2, np.fft.fftfreq(4 * samples)
         near = np.abs(fine) < (highest + 3) / samples
         self.share = power[:, near] / power.sum(axis=1, keepdims=True)
