@@ -58,6 +58,8 @@ def test_dates_and_times_of_day_are_stamps_in_seconds(tmp_path: Path, first: str
 def test_a_log_without_names_says_where_they_go(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"has no line of column names, line 1 holds 3 numbers: put a line above it"):
         contents(_written(tmp_path / "log.csv", _rows(",")))
+    with pytest.raises(InputError, match="line 1 holds 3 numbers"):
+        contents(_written(tmp_path / "log.csv", "1008.24,10901,acc.z,0.01\n1008.25,10902,acc.z,0.02\n"))
 
 
 def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
