@@ -272,7 +272,7 @@ class Stage:
             several = len(results) > 1
             texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
             # Of what is refused among several, the index says all.
-            shown = {name: each for name, each in results.items() if not (several and getattr(each, "refused", ""))}
+            shown = {name: each for name, each in results.items() if not (several and getattr(each, "refused", False))}
             texts += [self.text(each, about=self._source(run, name, each)) for name, each in shown.items()]
             if run.writes and (self.fills or hasattr(self.kind, "FORMAT")):
                 self._write(run, run.output, results)

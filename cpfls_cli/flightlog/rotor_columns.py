@@ -240,7 +240,7 @@ def _connected(found: Found, parameters: Parameters) -> _Connected:
 
 
 def _surfaces(time: Array, values: Array) -> bool:
-    """Tell whether outputs stand away from their least, but one that is off: surfaces and a throttle before take-off."""
+    """Tell whether all outputs but one, which is off, stand away from their least: surfaces and a throttle."""
     changed = np.flatnonzero((values != values[:1]).any(axis=1))
     if values.shape[1] <= _FEWEST or not len(changed) or time[changed[0]] - time[0] < _STANDS_S:
         return False

@@ -393,7 +393,8 @@ def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     most = min(float(np.nanmax(values)), 1.0)
     full = (values >= most - _ROUNDED) & _flown_or_after(flight, time, after_s)[:, None]
     # Where all are there together, it is the crest of a climb.
-    plateaus = list(_held(time, full.any(axis=1) & ~full.all(axis=1), 0.0))
+    some = np.asarray(full.any(axis=1) & ~full.all(axis=1))
+    plateaus = list(_held(time, some, 0.0))
     limits = len(plateaus) >= _FEWEST_PLATEAUS or any(b - a >= _LONG_S for a, b in plateaus)
     if most < _FULL and not (limits and flight.rotors_source == "logged"):
         return
