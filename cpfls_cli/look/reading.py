@@ -112,7 +112,10 @@ class _Reader:
         commands = as_shares(commands) if commands is not None and asks_speeds else commands
         rotors = Rotors(commands, guess, self._airframe(), speeds)
         driving = find_driving(self.log, rotors, self.autopilot, self.parameters, self.signal("body_torque"))
-        attitude, asked = self._attitudes()
+        signal = self.recognition.signal
+        attitude, asked = map(
+            self._as_angles, (signal("quaternion") or signal("attitude"), signal("setpoint_attitude"))
+        )
         setpoint, sticks = self._rate_setpoint(gyroscope), self._sticks()
         thrust = rotors.samples or next(self.log.found("collective"), None) or rotors.thrusts(ThrustCurve())
         if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
@@ -123,7 +126,8 @@ class _Reader:
         height, climb = self._heights()
         force, gaps = self._force(), _gaps(rate, driving.command)
         on, command = (on_clock(each, clock, 3, cubic=True) for each in (rate, driving.command))
-        whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & self._on_rotors(clock)
+        forward = forward_flight(self.log.table.topics, clock) if self.recognition.winged else None
+        whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & (forward is None or ~forward)
         flown = self._flown(clock)
         felt, reads = _felt(flown, on, on_clock(force, clock, 3), 1 / float(clock[1] - clock[0]))
         voltage, current = self._load(clock, flown)
@@ -272,10 +276,6 @@ class _Reader:
 
     # Where it is.
 
-    def _attitudes(self) -> tuple[Samples | None, Samples | None]:
-        attitude = self._as_angles(self.recognition.signal("quaternion") or self.recognition.signal("attitude"))
-        return attitude, self._as_angles(self.recognition.signal("setpoint_attitude"))
-
     def _as_angles(self, guess: Guess | None) -> Samples | None:
         """Give roll, pitch and yaw of a body forward, right, down in a world north, east, down."""
         own = None if guess is None else self._mapped(guess)
@@ -316,10 +316,6 @@ class _Reader:
         if not flown.stretches_s or (flown.span_s is None and len(flown.stretches_s) < 2):
             return np.ones(len(clock), dtype=bool)
         return _within(clock, np.array(flown.stretches_s) + self.recognition.counted_from_s, 0.0)
-
-    def _on_rotors(self, clock: Array) -> BoolArray:
-        forward = forward_flight(self.log.table.topics, clock) if self.recognition.winged else None
-        return np.ones(len(clock), dtype=bool) if forward is None else ~forward
 
 
 # Clocks.

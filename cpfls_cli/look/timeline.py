@@ -171,7 +171,7 @@ def timeline(
     # On the ground a failsafe keeps it there.
     found = [
         replace(event, severity="note")
-        if event.kind == "failsafe" and not _near_flight(flight, event.time_s)
+        if event.kind == "failsafe" and not flight.flown[np.abs(flight.time - event.time_s) < _NEAR_S].any()
         else event
         for event in found
     ]
@@ -229,10 +229,6 @@ def _carried_by(flight: LogFlight) -> float:
     """Give the usual collective of flight; NaN where it is not known."""
     flown = flight.collective[flight.flown & np.isfinite(flight.collective)]
     return float(np.median(flown)) if len(flown) else np.nan
-
-
-def _near_flight(flight: LogFlight, at: float) -> bool:
-    return bool(flight.flown[(flight.time > at - _NEAR_S) & (flight.time < at + _NEAR_S)].any())
 
 
 def _rests(flight: LogFlight, part: slice, stopped: bool = False) -> bool:
@@ -393,8 +389,7 @@ def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     most = min(float(np.nanmax(values)), 1.0)
     full = (values >= most - _ROUNDED) & _flown_or_after(flight, time, after_s)[:, None]
     # Where all are there together, it is the crest of a climb.
-    some = np.asarray(full.any(axis=1) & ~full.all(axis=1))
-    plateaus = list(_held(time, some, 0.0))
+    plateaus = list(_held(time, np.asarray(full.any(axis=1) & ~full.all(axis=1)), 0.0))
     limits = len(plateaus) >= _FEWEST_PLATEAUS or any(b - a >= _LONG_S for a, b in plateaus)
     if most < _FULL and not (limits and flight.rotors_source == "logged"):
         return
