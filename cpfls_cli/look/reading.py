@@ -112,10 +112,7 @@ class _Reader:
         commands = as_shares(commands) if commands is not None and asks_speeds else commands
         rotors = Rotors(commands, guess, self._airframe(), speeds)
         driving = find_driving(self.log, rotors, self.autopilot, self.parameters, self.signal("body_torque"))
-        signal = self.recognition.signal
-        attitude, asked = map(
-            self._as_angles, (signal("quaternion") or signal("attitude"), signal("setpoint_attitude"))
-        )
+        attitude, asked = self._attitudes()
         setpoint, sticks = self._rate_setpoint(gyroscope), self._sticks()
         thrust = rotors.samples or next(self.log.found("collective"), None) or rotors.thrusts(ThrustCurve())
         if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
@@ -275,6 +272,10 @@ class _Reader:
         return voltage, np.full_like(current, np.nan) if none else current
 
     # Where it is.
+
+    def _attitudes(self) -> tuple[Samples | None, Samples | None]:
+        attitude = self._as_angles(self.recognition.signal("quaternion") or self.recognition.signal("attitude"))
+        return attitude, self._as_angles(self.recognition.signal("setpoint_attitude"))
 
     def _as_angles(self, guess: Guess | None) -> Samples | None:
         """Give roll, pitch and yaw of a body forward, right, down in a world north, east, down."""
