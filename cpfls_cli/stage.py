@@ -270,7 +270,9 @@ class Stage:
                 run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
             several = len(results) > 1
             texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
-            texts += [self.text(each, about=self._source(run, name, each)) for name, each in results.items()]
+            # Of what is refused among several, the index says all.
+            shown = {name: each for name, each in results.items() if not (several and getattr(each, "refused", False))}
+            texts += [self.text(each, about=self._source(run, name, each)) for name, each in shown.items()]
             if run.writes and (self.fills or hasattr(self.kind, "FORMAT")):
                 self._write(run, run.output, results)
             elif not run.dry_run:

@@ -291,19 +291,27 @@ def _held(signs: Signs, active: BoolArray) -> str:
 
 def _leans(signs: Signs, active: BoolArray) -> float | None:
     """Give the range of leans, rad, without their vibration."""
-    if signs.upright is None:
+    inner = _inner(signs, active)
+    if signs.upright is None or not inner.any():
         return None
-    upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[active]), 0.0, 1.0)
+    upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[inner]), 0.0, 1.0)
     return float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95])))
 
 
 def _pushed(signs: Signs, active: BoolArray) -> float | None:
     """Give the range of what an accelerometer feels, in weights, without vibration."""
-    edge = round(SLOW_S / signs.period)
-    if signs.felt is None or not active[edge : len(active) - edge].any():
+    inner = _inner(signs, active)
+    if signs.felt is None or not inner.any():
         return None
-    felt = averaged(signs.felt, signs.period, SLOW_S)
-    return float(np.ptp(felt[edge : len(felt) - edge][active[edge : len(felt) - edge]], axis=0).max())
+    return float(np.ptp(averaged(signs.felt, signs.period, SLOW_S)[inner], axis=0).max())
+
+
+def _inner(signs: Signs, active: BoolArray) -> BoolArray:
+    """Leave out the ends of a log, whose means go beyond it."""
+    edge = round(SLOW_S / signs.period)
+    inner = active.copy()
+    inner[:edge] = inner[len(inner) - edge :] = False
+    return inner
 
 
 def _dead_rates(signs: Signs) -> bool:

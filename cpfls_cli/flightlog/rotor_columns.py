@@ -9,12 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, runs
+from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, LogTable, Rival, Sure
 from cpfls_cli.flightlog.settings import SignalMap
 from cpfls_cli.flightlog.stated_vehicle import (
+    AIRPLANE,
     FAST_HZ,
     MOTORS,
+    NO_MULTIROTOR,
     SLOW_HZ,
     VTOL_TYPES,
     Parameters,
@@ -47,6 +50,7 @@ _AT_REST, _DRIVES, _STANDS_S, _AWAY = 0.02, 0.25, 1.0, 0.25
 # Correlation with the others below which an output does not rise with them, and how many times as far as the others it
 # swings then, within s: about one axis, a rotor of a hexarotor does twice as much as another.
 _RISES, _SWINGS, _SWING_S = 0.3, 2.5, 0.25
+_SURFACES = "before take-off one is off and the others stand in their middle"
 _FEWEST_BESIDE = 4  # Rotors of those whose columns hold more.
 _PX4_MOTORS = range(101, 113)  # Values of *_FUNCn of PX4 that are its motors.
 _RANGES = (
@@ -96,6 +100,9 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
             command = None
     warnings = [each for own in (speed, command) if own is not None for each in too_slow(own, system, parameters)]
     if speed is None and command is None:
+        driven = [_connected(own, parameters).others.items() for own in found["rotor_command"]]
+        if surfaces := [column for own in driven for column, why in own if why == _SURFACES]:
+            raise InputError(f"a log of {AIRPLANE} or its like ({joined(surfaces)}: {_SURFACES}), {NO_MULTIROTOR}")
         warnings += [warning for own in found["rotor_command"] for warning in _beyond_commands(own, parameters)][:1]
     shares = None if command is None or command.columns.unit != "1" else command
     beside = {name for named, *_ in found["rotor_command"] for name in named.group.columns}
@@ -220,6 +227,8 @@ def _connected(found: Found, parameters: Parameters) -> _Connected:
     odd |= _driven_apart(time, values, [index for index in moving if index not in odd])
     kept = [index for index in moving if index not in odd]
     others = {named.group.columns[index]: why for index, why in odd.items()}
+    if not parameters and _surfaces(time, values[:, kept]):
+        return _Connected([], True, dict.fromkeys([named.group.columns[index] for index in kept], _SURFACES))
     count = stated_count(parameters) or count_by_form(parameters, len(kept))
     if named.known in (PX4, ARDUPILOT) and count is not None and {*range(count)} <= {*kept}:
         motors = list(range(count))
@@ -228,6 +237,15 @@ def _connected(found: Found, parameters: Parameters) -> _Connected:
     servos = tuple(named.group.columns[index] for index in apart)
     others |= dict.fromkeys(servos, "it does not rise with the others and swings further: a servo?")
     return _Connected([index for index in kept if index not in apart], False, others, doubtful=servos)
+
+
+def _surfaces(time: Array, values: Array) -> bool:
+    """Tell whether all outputs but one, which is off, stand away from their least: surfaces and a throttle."""
+    changed = np.flatnonzero((values != values[:1]).any(axis=1))
+    if values.shape[1] <= _FEWEST or not len(changed) or time[changed[0]] - time[0] < _STANDS_S:
+        return False
+    begins = np.sort((values[0] - values.min(axis=0)) / np.maximum(np.ptp(values, axis=0), 1e-12))
+    return bool(begins[0] <= _AT_REST < begins[1] and np.median(begins[1:]) > _AWAY)
 
 
 def _swung_apart(time: Array, values: Array, kept: Sequence[int]) -> list[int]:

@@ -131,6 +131,7 @@ def lifting_rotors(parameters: Parameters) -> list[int]:
 
 
 AIRPLANE, GROUND, HELICOPTER, VTOL = "an airplane", "a ground vehicle", "a helicopter", "a VTOL"
+NO_MULTIROTOR: Final = "not of a multirotor: only vehicles that rotors carry are modelled"
 
 _HELICOPTER_PARAMETERS: Final = ("H_RSC_MODE", "H_COL_MIN", "H_SWASH_TYPE", "H_SV_MAN", "H_SW_TYPE", "H_SWASH_PLATE")
 VTOL_TYPES: Final = range(20, 26)  # MAV_TYPE of vehicles that hover on three rotors or more.
@@ -167,9 +168,7 @@ def refuse_other_vehicle(topics: Topics, parameters: Parameters, system: str) ->
     """Refuse a log of what no rotors carry, by states, parameters and columns; a VTOL is given back, which hovers."""
     found = next(_evidence(topics, parameters, system), None)
     if found is not None and found.what != VTOL:
-        raise InputError(
-            f"a log of {found.what} ({found.reason}), not of a multirotor: only vehicles that rotors carry are modelled"
-        )
+        raise InputError(f"a log of {found.what} ({found.reason}), {NO_MULTIROTOR}")
     return found
 
 

@@ -173,7 +173,9 @@ def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str
 
 def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
     """List beginnings of names, factors and units, as far as the header states them."""
-    (gyro,) = struct.unpack(">f", int(header.get("gyro_scale", "0x0"), 16).to_bytes(4, "big"))
+    # Betaflight 2.8 to 3.0 write it with a dot.
+    stated = header.get("gyro_scale", header.get("gyro.scale", "0x0"))
+    (gyro,) = struct.unpack(">f", int(stated, 16).to_bytes(4, "big"))
     system = re.match(r"(\w+) (\d+)\.(\d+)", header.get("Firmware revision", ""))
     version = (system[1], (int(system[2]), int(system[3]))) if system else ("", (0, 0))
     finer = 10 if header.get("blackbox_high_resolution") == "1" else 1

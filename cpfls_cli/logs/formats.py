@@ -286,6 +286,7 @@ _FOREIGN: Final = (
     (b"version https://git-lfs", 0, "a pointer of Git LFS", "fetch it with `git lfs pull`"),
     (b"BUILD", 16, "a .DAT of DJI", "convert it to CSV with DatCon or its like"),
     (b"\xa3\x95\x80", 0, "a log of PX4 before ULog (sdlog2)", _CONVERT_SDLOG2),
+    (bytes(64), 0, "a file that begins with zeros alone", "its writing was cut short; take it from the device again"),
     (b"%PDF", 0, "a PDF", "give the log that it shows"),
     (b"\x89PNG", 0, "a picture", "give the log that it shows"),
     (b"\xff\xd8\xff", 0, "a picture", "give the log that it shows"),

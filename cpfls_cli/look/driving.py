@@ -105,16 +105,13 @@ def find_driving(
     if own is not None and spins is not None and output is not None and along_each(own, output)[0][2] < -_FOLLOWS:
         # All propellers turn the other way than is usual.
         spins, own = -spins, own._replace(values=own.values * [1.0, 1.0, -1.0])
-    fast = own is not None and own.rate_hz >= (_SLOWEST_HZ if output is None else _fast_beside(output))
+    least_hz = _SLOWEST_HZ if output is None else max(_OF_OUTPUT * output.rate_hz, _FAST_HZ)
+    fast = own is not None and own.rate_hz >= least_hz
     if own is not None and fast and (output is None or rotors.source == "logged"):
         words = f"{rotors.source} rotors" if rotors.samples is not None else "speeds of rotors"
         return Driving(own, f"{words}, {own.source}", places, spins)
     source = "" if output is None else f"output of the rate loop, {output.source}"
     return Driving(output, source, places, spins)
-
-
-def _fast_beside(output: Samples) -> float:
-    return max(_OF_OUTPUT * output.rate_hz, _FAST_HZ)
 
 
 def _output(log: LookedLog, autopilot: Autopilot | None) -> Samples | None:

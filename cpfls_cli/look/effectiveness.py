@@ -237,8 +237,9 @@ class _Model(NamedTuple):
         equations = _Equations(spectra, passed, _reference(spectra))
         values = _begun(equations, yaw)
         push = passed * PlantModel.of(values, equations.at_hz).push(spectra.frequency)
-        late = float(np.clip(_phase_delay(spectra, push), 0.0, _LATEST_S))
-        return cls(values, equations.at_hz, late)
+        # The slope of its phase over the band.
+        turned, turn = np.unwrap(np.angle(push)), 2 * np.pi * spectra.frequency
+        return cls(values, equations.at_hz, float(np.clip(-(turn @ turned) / (turn @ turn), 0.0, _LATEST_S)))
 
 
 def plant_spectra(
@@ -295,12 +296,6 @@ def _calm(parts: list[Numbers], near: _Model, filters: Numbers, frequency: Array
     return np.asarray(1 / np.maximum((left / usual).mean(axis=1) / _USUAL_LEFT, 1.0))
 
 
-def _phase_delay(spectra: BlockSpectra, torque: Numbers) -> float:
-    """Give the slope of a phase over the band, s."""
-    turned, turn = np.unwrap(np.angle(torque)), 2 * np.pi * spectra.frequency
-    return float(-(turn @ turned) / (turn @ turn))
-
-
 def _window_s(flight: LogFlight) -> tuple[float, float]:
     return _SLOW_WINDOW_S if flight.rate_hz < _SLOW_HZ else _WINDOW_S
 
@@ -314,11 +309,6 @@ def _kept(spectra: Numbers, windows: int) -> Array:
     moves = smoothed(spectra[..., Z, Z].real)
     moves = moves >= _SEEN * moves.max(axis=-1, keepdims=True)
     return np.asarray(np.where(moves, np.maximum(1 - _BY_CHANCE / np.maximum(statistic, _TINY), 0.0), 0.0))
-
-
-def _outer(cross: Numbers, power: Numbers) -> Numbers:
-    """Give what one signal explains of the spectra of others, shape (frequency, signal, signal)."""
-    return np.asarray(cross.conj()[:, :, None] * cross[:, None, :] / np.maximum(power.real, _TINY)[:, None, None])
 
 
 def _terms(values: Array, at_hz: float, filters: Numbers, frequency: Array) -> Numbers:
@@ -348,7 +338,8 @@ class _Equations:
         # Where the instrument moves the command no more than by chance it says nothing.
         kept = _kept(others, self._windows)
         self._predicted = predicted * kept[..., None]
-        rest = spectra.total[:, U:, U:] - _outer(spectra.total[:, Z, U:], spectra.total[:, Z, Z])
+        cross, power = spectra.total[:, Z, U:, None], np.maximum(spectra.total[:, Z, Z].real, _TINY)[:, None, None]
+        rest = spectra.total[:, U:, U:] - cross.conj() * cross.swapaxes(1, 2) / power
         shared = SHARED_BINS / SMOOTHED_BINS / self._windows
         self._chance = rest * (shared * (kept**2).mean(axis=0))[:, None, None]
 

@@ -123,7 +123,8 @@ class _Reader:
         height, climb = self._heights()
         force, gaps = self._force(), _gaps(rate, driving.command)
         on, command = (on_clock(each, clock, 3, cubic=True) for each in (rate, driving.command))
-        whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & self._on_rotors(clock)
+        forward = forward_flight(self.log.table.topics, clock) if self.recognition.winged else None
+        whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & (forward is None or ~forward)
         flown = self._flown(clock)
         felt, reads = _felt(flown, on, on_clock(force, clock, 3), 1 / float(clock[1] - clock[0]))
         voltage, current = self._load(clock, flown)
@@ -316,10 +317,6 @@ class _Reader:
         if not flown.stretches_s or (flown.span_s is None and len(flown.stretches_s) < 2):
             return np.ones(len(clock), dtype=bool)
         return _within(clock, np.array(flown.stretches_s) + self.recognition.counted_from_s, 0.0)
-
-    def _on_rotors(self, clock: Array) -> BoolArray:
-        forward = forward_flight(self.log.table.topics, clock) if self.recognition.winged else None
-        return np.ones(len(clock), dtype=bool) if forward is None else ~forward
 
 
 # Clocks.

@@ -29,9 +29,9 @@ _UNITS: Final = {"gyroscope": "rad/s", "accelerometer": "m/s²"}
 _OF_SCALE, _CLIPPED_ROWS = 0.02, 3
 """Share by which a largest reading may differ from a full scale, and rows in which it stays there, to be clipped."""
 
-_ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S = 1e-4, 0.985, 3, 0.05
-"""Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus at a smaller one
-that make it one; and how long a rotor is there, s."""
+_ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S, _LONG_S = 1e-4, 0.985, 3, 0.05, 2.0
+"""Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus of some rotors at a
+smaller one that make it one; and how long a rotor is there, and at one plateau that alone makes it one, s."""
 
 _LIES, _LIES_S, _HARD_S = -0.7, 1.0, 1.5
 """Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity and
@@ -171,7 +171,7 @@ def timeline(
     # On the ground a failsafe keeps it there.
     found = [
         replace(event, severity="note")
-        if event.kind == "failsafe" and not _near_flight(flight, event.time_s)
+        if event.kind == "failsafe" and not flight.flown[np.abs(flight.time - event.time_s) < _NEAR_S].any()
         else event
         for event in found
     ]
@@ -229,10 +229,6 @@ def _carried_by(flight: LogFlight) -> float:
     """Give the usual collective of flight; NaN where it is not known."""
     flown = flight.collective[flight.flown & np.isfinite(flight.collective)]
     return float(np.median(flown)) if len(flown) else np.nan
-
-
-def _near_flight(flight: LogFlight, at: float) -> bool:
-    return bool(flight.flown[(flight.time > at - _NEAR_S) & (flight.time < at + _NEAR_S)].any())
 
 
 def _rests(flight: LogFlight, part: slice, stopped: bool = False) -> bool:
@@ -383,7 +379,7 @@ def _limits(flight: LogFlight, after_s: float) -> Iterator[Event]:
     scales = tuple(STANDARD_GRAVITY * each for each in _FULL_SCALES_G)
     if flight.accelerometer is not None:
         yield from _clipped(flight.accelerometer, scales, "accelerometer")
-    if len(flight.rotors.time) and flight.rotors_source == "logged" and not flight.relative:
+    if len(flight.rotors.time) and flight.rotors_source and not flight.relative:
         yield from _at_limit(flight, after_s)
 
 
@@ -392,8 +388,10 @@ def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     time, values = flight.rotors.time, flight.rotors.values
     most = min(float(np.nanmax(values)), 1.0)
     full = (values >= most - _ROUNDED) & _flown_or_after(flight, time, after_s)[:, None]
-    plateaus = sum(after - first >= 2 for column in full.T for first, after in runs(column))
-    if most < _FULL and plateaus < _FEWEST_PLATEAUS:
+    # Where all are there together, it is the crest of a climb.
+    plateaus = list(_held(time, np.asarray(full.any(axis=1) & ~full.all(axis=1)), 0.0))
+    limits = len(plateaus) >= _FEWEST_PLATEAUS or any(b - a >= _LONG_S for a, b in plateaus)
+    if most < _FULL and not (limits and flight.rotors_source == "logged"):
         return
     for rotor, column in enumerate(full.T):
         held = list(_held(time, column, _LIMIT_S))

@@ -113,6 +113,7 @@ def test_several_logs_are_a_table_and_a_page_each(cpfls, logs, tmp_path, monkeyp
     own = re.search("<h1>(.*?)</h1>", (tmp_path / "out" / "bf.html").read_text())[1]
     assert own in index
     assert "without a gyroscope" in index
+    assert result.stdout.count("Nothing to look at") == result.stdout.count("blind.csv") == 1
     assert sorted(path.name for path in (tmp_path / "out").glob("*.html")) == [
         "bf.html",
         "blind.html",

@@ -88,6 +88,21 @@ def test_what_does_not_fly_is_said_to(level, height, rate, reason):
     assert (flown.flies, flown.reasons) == (False, (reason,))
 
 
+def test_a_short_idle_on_the_ground_does_not_fly():
+    time, noise = TIME[:500], np.random.default_rng(1).standard_normal((500, 3))
+    found = find_flown(
+        Signs(
+            time=time,
+            rotors=np.full((500, 4), 0.08),
+            height=0.01 * time,
+            body_rate=0.03 * noise,
+            upright=np.full(500, 0.999),
+            force=9.81 * (np.array([0.04, 0.0, -1.0]) + 0.02 * noise),
+        )
+    )
+    assert (found.flies, found.reasons) == (False, ("no flight in it: the vehicle neither turns nor moves",))
+
+
 @pytest.mark.parametrize("turns_rad_s", [4.0, 4 * np.pi])
 def test_a_stand_feels_the_weight_turn_and_a_flight_does_not(turns_rad_s):
     """Also where it swings at 2 Hz, of which a mean over half a second holds nothing."""

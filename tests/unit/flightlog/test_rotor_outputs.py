@@ -14,6 +14,7 @@ from tests.builders.topic_logs import ardupilot, maps, proposed, topic
 from tests.builders.unknown_logs import FLIP, flat_log, flight, named, quaternion, with_ground
 
 X = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0}
+PWM = tuple(f"pwm{number}" for number in range(1, 5))
 
 
 @pytest.fixture(scope="module")
@@ -73,8 +74,21 @@ def test_a_landing_gear_of_a_log_of_unknown_kind_is_no_rotor(own):
     gear = np.where(own.time < 8, 1100.0, 1900.0)
     columns = named(pulses(own, gear), *(f"pwm{number}" for number in range(1, 6)))
     recognition = recognise(flat_log(own, speed=columns).topics, {}, {}, "")
-    assert recognition.signal("rotor_command").columns.columns == ("pwm1", "pwm2", "pwm3", "pwm4")
+    assert recognition.signal("rotor_command").columns.columns == PWM
     assert any(words.startswith("pwm5: it moves, but changes in") for words in recognition.left_out)
+
+
+def test_outputs_that_stand_in_their_middle_before_take_off_are_no_rotors(own):
+    swings = [300 * np.sin(rate * own.time) * (own.time > 5) for rate in (1.0, 0.7, 0.4)]
+    throttle = np.where(own.time > 4, 1600 + 50 * np.sin(own.time), 1000.0)
+    plane = named(np.column_stack([1500 + swings[0], 1500 + swings[1], throttle, 1500 + swings[2]]), *PWM)
+    with pytest.raises(InputError, match=r"of an airplane or its like \(pwm1, pwm2, pwm3 and pwm4: before take-off"):
+        recognise(flat_log(own, speed=plane).topics, {}, {}, "")
+    # So do sticks; the motors of a log are found all the same.
+    sticks = named(np.column_stack(list(plane.values())), *(f"servo{number}" for number in range(1, 5)))
+    motors = named(pulses(own), *PWM)
+    recognition = recognise(flat_log(own, speed={**sticks, **motors}).topics, {}, {}, "")
+    assert recognition.signal("rotor_command").columns.columns == PWM
 
 
 @pytest.mark.parametrize(

@@ -89,10 +89,10 @@ def test_the_real_part_of_an_attitude_is_what_is_left(read):
 
 
 def test_older_and_other_programs_have_other_units(read):
-    def factors(revision, gyro_scale):
+    def factors(revision, gyro_scale, name="gyro_scale"):
         rows = flight()
         scale = f"0x{struct.pack('>f', gyro_scale).hex()}"
-        changes = {"Firmware revision": revision, "gyro_scale": scale, "motor_poles": None}
+        changes = {"Firmware revision": revision, "gyro_scale": None, name: scale, "motor_poles": None}
         columns = read(header(**changes) + b"".join(frames(rows))).topics[""]
         assert "rpm[0]" not in columns
         return [columns[name][3] / rows[3, NAMES.index(name)] for name in ("gyroADC[0]", "vbatLatest")]
@@ -100,6 +100,7 @@ def test_older_and_other_programs_have_other_units(read):
     assert factors("Betaflight 3.1.5 (4646f9d) OMNIBUSF4", 1.0) == pytest.approx([1.0, 0.1])
     radians = np.deg2rad(1 / 16.4)
     assert factors("INAV 2.6.1 (2d5d3b1) MATEKF405", 1e-6 * radians) == pytest.approx([1 / 16.4, 0.01])
+    assert factors("Betaflight 3.0.0 (ea67304) MOTOLAB", 1 / 16.4, "gyro.scale")[0] == pytest.approx(1 / 16.4)
     assert factors("Cleanflight 2.0", 1e-6 * radians) == pytest.approx([1 / 16.4, 1.0])
 
 

@@ -248,6 +248,8 @@ def test_dates_and_times_of_day_are_stamps_in_seconds(tmp_path: Path, first: str
 def test_a_log_without_names_says_where_they_go(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"has no line of column names, line 1 holds 3 numbers: put a line above it"):
         contents(_written(tmp_path / "log.csv", _rows(",")))
+    with pytest.raises(InputError, match="line 1 holds 3 numbers"):
+        contents(_written(tmp_path / "log.csv", "1008.24,10901,acc.z,0.01\n1008.25,10902,acc.z,0.02\n"))
 
 
 def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
@@ -471,6 +473,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
     ("name", "content", "what", "way"),
     [
         ("a.bag", b"#ROSBAG V2.0\n" + bytes(99), "a bag of ROS 1", "rosbags-convert"),
+        ("a.bin", bytes(999), "a file that begins with zeros alone", "take it from the device again"),
         ("a.tlog", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
         ("a.bin", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
         ("a.rlog", TELEMETRY[8:], "telemetry of MAVLink", "the log that the autopilot writes itself"),

@@ -160,8 +160,15 @@ def test_a_rotor_at_its_limit():
     motors["control[2]"] = np.where((OWN.time > 6.0) & (OWN.time < 6.4), 1.0, motors["control[2]"])
     (limit,) = of(events(contents), "limit")
     assert limit[1].startswith("M3 at its upper limit once, 0.38 s")
-    # The largest of commands that have no limit is none.
+    # The largest of commands that have no limit is none, nor is the crest of a climb, where all are alike.
     assert not of(events(logs.px4(OWN)), "limit")
+    crest = (OWN.time > 6.0) & (OWN.time < 6.4)
+    for number in range(4):
+        motors[f"control[{number}]"] = np.where(crest, 0.9, np.minimum(motors[f"control[{number}]"], 0.89))
+    assert not of(events(contents), "limit")
+    # Where one alone stays at its largest for seconds, something limits it, as MOT_SPIN_MAX does.
+    motors["control[1]"] = np.where((OWN.time > 8.0) & (OWN.time < 11.0), 0.9, motors["control[1]"])
+    assert any(text.startswith("M2 at its upper limit 2 times, 3.") for _, text in of(events(contents), "limit"))
 
 
 def test_clipping_gaps_and_the_battery():
