@@ -141,11 +141,7 @@ class Node:
     def _no_number(self, text: str, attribute: str | None, count: int = 1) -> InputError:
         of = "" if attribute is None else f"{attribute} = "
         wanted = "a number" if count == 1 else f"{count} numbers"
-        template = (
-            f"; it is {TEMPLATE}"
-            if any(mark in text for mark in ("{{", "${"))
-            else f"; write {wanted} there"
-        )
+        template = f"; it is {TEMPLATE}" if any(mark in text for mark in ("{{", "${")) else f"; write {wanted} there"
         return self.error(f"{of}{text!r} is not {wanted}{template}")
 
     @property
