@@ -20,6 +20,7 @@ _HUGE = 1e30
 """No number of a model is as large, and products of smaller ones are numbers."""
 _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(/?)>")
 _ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+TEMPLATE = "a template; render it first (xacro FILE > uav.urdf, or jinja), and give what comes out"
 _WORD = re.compile(rb"\S+")
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 
@@ -140,11 +141,7 @@ class Node:
     def _no_number(self, text: str, attribute: str | None, count: int = 1) -> InputError:
         of = "" if attribute is None else f"{attribute} = "
         wanted = "a number" if count == 1 else f"{count} numbers"
-        template = (
-            "; it is a template: render it first (xacro FILE, or jinja), and give what comes out"
-            if any(mark in text for mark in ("{{", "${"))
-            else f"; write {wanted} there"
-        )
+        template = f"; it is {TEMPLATE}" if any(mark in text for mark in ("{{", "${")) else f"; write {wanted} there"
         return self.error(f"{of}{text!r} is not {wanted}{template}")
 
     @property
@@ -255,4 +252,7 @@ def read_xml(file: Path) -> Node:
     if builder.deepest > _DEEPEST:
         raise InputError(f"{file}: has {builder.deepest} elements in each other, which no model has; correct it there")
     assert isinstance(root, Node), "a file without an element is no XML"
+    macro = next((each for each in root.walk() if re.match(r"\{http.*xacro\}", each.tag)), None)
+    if macro is not None:
+        raise InputError(f"{file}, line {macro.line}: is {TEMPLATE}")
     return root

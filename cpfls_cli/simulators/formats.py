@@ -10,7 +10,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.simulators.ardupilot import KEYS, read_ardupilot
 from cpfls_cli.simulators.crazyflie import read_crazyflie
 from cpfls_cli.simulators.crazyflow import read_crazyflow
-from cpfls_cli.simulators.document import read_bytes, read_xml
+from cpfls_cli.simulators.document import TEMPLATE, read_bytes, read_xml
 from cpfls_cli.simulators.mjcf import read_mjcf
 from cpfls_cli.simulators.model import SimulatorModel, checked
 from cpfls_cli.simulators.rotorpy import read_rotorpy
@@ -163,7 +163,7 @@ def as_stated(path: Path) -> SimulatorModel:
     if of_text is not None:
         return replace(of_text.read(path, name), section=name)
     if path.suffix.lower() in (".xacro", ".jinja"):
-        raise InputError(f"{path}: is a template; render it first (xacro {path.name} > {path.stem}), and give that")
+        raise InputError(f"{path}: is {TEMPLATE}")
     root = read_xml(path)
     found = next((each for each in FORMATS if each.root == root.tag), None)
     if found is None:

@@ -198,7 +198,7 @@ def read_sdf(file: Path) -> SimulatorModel:
     parts, notes = _Parts(model), list[str]()
     if not parts.motors:
         raise no_motor(file, parts.plugins)
-    motors = sorted(parts.motors, key=lambda each: motor_number(each[1]))
+    motors = in_order(parts.motors)
     spinning = {scope + text_of(plugin, "jointName"): scope for scope, plugin in motors}
     base = _base(parts, motors[0][0], motors[0][1])
     held = _rigid(parts, base, set(spinning), notes)
@@ -218,18 +218,37 @@ def no_motor(file: Path, plugins: Sequence[Node]) -> InputError:
     )
 
 
-def motor_number(plugin: Node) -> int:
-    """Give the number of the motor of a plugin; raises InputError where it has none."""
-    node = plugin.first("motorNumber")
-    if node is None:
-        raise plugin.error("has no <motorNumber>; write which motor it is, from 0")
-    return int(node.number().value)
+def in_order(motors: Sequence[tuple[str, Node]]) -> list[tuple[str, Node]]:
+    """Sort motor plugins, each with the scope of the names in it, by the numbers of their motors.
+
+    Raises
+    ------
+    InputError
+        If one has none, or that of another.
+    """
+    numbered: dict[float, tuple[str, Node]] = {}
+    for scope, plugin in motors:
+        node = plugin.first("motorNumber")
+        if node is None:
+            raise plugin.error("has no <motorNumber>; write which motor it is, from 0")
+        number = node.number().value
+        if number in numbered:
+            raise node.error(
+                f"motor {number:g} is that of the plugin in line {numbered[number][1].line}, too; write another number"
+            )
+        numbered[number] = scope, plugin
+    return [numbered[number] for number in sorted(numbered)]
+
+
+def not_in_file(plugin: Node) -> InputError:
+    """Make the error of a motor plugin whose joint is not there."""
+    return plugin.error(f"its joint {text_of(plugin, 'jointName')!r} is not in the file; correct <jointName>")
 
 
 def _base(parts: _Parts, scope: str, plugin: Node) -> str:
     joint = parts.joints.get(scope + text_of(plugin, "jointName"))
     if joint is None:
-        raise plugin.error(f"its joint {text_of(plugin, 'jointName')!r} is not in the file; correct <jointName>")
+        raise not_in_file(plugin)
     parent = scope + text_of(joint, "parent")
     if parent not in parts.links:
         raise joint.error(f"its parent {parent!r} is not in the file; correct <parent>")

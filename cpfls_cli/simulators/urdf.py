@@ -21,7 +21,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.simulators.document import Node, Stated, read_xml
 from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, part_of, pose, rotated, turning
 from cpfls_cli.simulators.sdf import CANNOT as CANNOT_OF_PLUGINS
-from cpfls_cli.simulators.sdf import MOTOR, motor_number, no_motor, rotor_of, text_of
+from cpfls_cli.simulators.sdf import MOTOR, in_order, no_motor, not_in_file, rotor_of, text_of
 
 RPM = 30 / np.pi
 GRAVITY = 9.8
@@ -47,11 +47,12 @@ def read_urdf(file: Path) -> SimulatorModel:
     if not links:
         raise root.error("has no <link>; give the file of a vehicle")
     plugins = [node for own in root.all("gazebo") for node in own.all("plugin")]
-    motors = sorted((each for each in plugins if MOTOR.search(each.attributes.get("filename", ""))), key=motor_number)
+    found = [("", each) for each in plugins if MOTOR.search(each.attributes.get("filename", ""))]
+    motors = [each for _, each in in_order(found)]
     # Other plugins of ROS name joints too.
     if not motors and any(text_of(each, "jointName") and each.first("motorNumber") for each in plugins):
         raise no_motor(file, plugins)
-    placed = _placed(root, links, [text_of(each, "jointName") for each in motors])
+    placed = _placed(root, links, motors)
     bodies = tuple(_body(links[name], placed[name], notes) for name in placed)
     if motors:
         # Gazebo, too, counts a link without inertial as none.
@@ -71,9 +72,14 @@ def read_urdf(file: Path) -> SimulatorModel:
     return SimulatorModel(root.name, "urdf", bodies, rotors, CANNOT, tuple(notes), (file,))
 
 
-def _placed(root: Node, links: dict[str, Node], spinning: Sequence[str]) -> dict[str, Array]:
-    """Give the pose of each link in that of the first, shape (4, 4); joints of rotors may turn."""
+def _placed(root: Node, links: dict[str, Node], motors: Sequence[Node]) -> dict[str, Array]:
+    """Give the pose of each link in that which the rotors hang on, or in the first, shape (4, 4)."""
     joints = root.all("joint")
+    own = {joint.name: joint for joint in joints}
+    spinning = [text_of(each, "jointName") for each in motors]
+    for motor, name in zip(motors, spinning, strict=True):
+        if name not in own:
+            raise not_in_file(motor)
     children = {_link_of(joint, "child"): joint for joint in joints}
     first = next((name for name in links if name not in children), None)
     if first is None:
@@ -94,7 +100,8 @@ def _placed(root: Node, links: dict[str, Node], spinning: Sequence[str]) -> dict
     loose = [name for name in links if name not in found]
     if loose:
         raise links[loose[0]].error(f"the link {loose[0]} hangs on no joint; add one, or remove it")
-    return found
+    base = found.get(_link_of(own[spinning[0]], "parent"), np.eye(4)) if spinning else np.eye(4)
+    return {name: np.linalg.inv(base) @ place for name, place in found.items()}
 
 
 def _turns(joint: Node) -> bool:

@@ -49,13 +49,17 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
     sources = _sources(at, given)
     if not sources:
         return found
-    moved = np.zeros(len(found.values), dtype=bool)
+    moved, before = np.zeros(len(found.values), dtype=bool), None
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
         values, left_out = _stepped(at, sources)
+        now = np.any([numbers for _, numbers in sources], axis=0)
+        if before is not None:
+            # A number that no source identifies where it has come to is as uncertain as when one did.
+            left_out[:, ~now] = before[:, ~now]
+        moved, before = moved | now, left_out
         step, error, shapes = np.abs(values - at.values), jackknife_error(left_out), values[len(at.estimates.linear) :]
         hypothesis = at.hypothesis.with_shapes(shapes) if len(shapes) else at.hypothesis
-        moved = np.any([numbers for _, numbers in sources], axis=0)
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error) or not (sources := _sources(at, given)):
             break

@@ -10,6 +10,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.extended import extend, plain
+from cpfls_cli.gap.naming import by_instruments as by_instruments_module
 from cpfls_cli.gap.naming.by_instruments import _windows_of_runs, by_instruments
 from cpfls_cli.gap.naming.estimate import fitted
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
@@ -151,6 +152,26 @@ def test_what_instruments_identify_hangs_on_no_inertia_that_a_loop_gave_a_fit(fl
     x, y, z, *couplings = own.parameters[:6]
     assert all(each.low < 0 < each.high for each in (x, y))
     assert all(each.value == 0 for each in (z, *couplings))
+
+
+def test_a_number_that_instruments_moved_has_the_error_that_it_was_moved_with(flown, monkeypatch):
+    """The past predicts innovations of a residual that a wrong inertia makes, and none of what is left without it."""
+    recordings = recorded(flown["asked"], heavier(TRUE.vehicle), setpoints=True)
+    windows = common_windows(recordings, FEW)
+    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    found = fitted(flights, [], best_floor(system(flights)), FEW)
+    calls = []
+
+    def once(at, given, own=by_instruments_module._sources):
+        calls.append(at)
+        x = np.arange(len(at.values)) == 0
+        return [each._replace(numbers=each.numbers & ~(x & (len(calls) > 2))) for each in own(at, given)]
+
+    monkeypatch.setattr(by_instruments_module, "_sources", once)
+    number = by_instruments(found, known_motion(recordings)).estimates.parameters[0]
+    assert len(calls) > 2
+    assert number.low < 1 / HEAVY - 1 < number.high < 0
+    assert 0 < number.high - number.low < 0.2
 
 
 @pytest.mark.parametrize("kind", ["asked", "again"])

@@ -188,13 +188,30 @@ def test_urdf_with_motor_plugins_is_the_vehicle_of_the_sdf(tmp_path):
         assert (rotor.name, rotor.spin) == (its.name, its.spin)
 
 
+def test_urdf_is_read_in_the_frame_of_the_link_that_its_rotors_hang_on(tmp_path):
+    path, turned = tmp_path / "mine.urdf", tmp_path / "turned.urdf"
+    path.write_text(urdf_of(SMALL))
+    footprint = """<link name="footprint"/><joint name="up" type="fixed"><parent link="footprint"/>
+    <child link="base_link"/><origin xyz="0 0 0.1" rpy="0 0.5 1.5707963"/></joint>"""
+    turned.write_text(urdf_of(SMALL).replace('<link name="base_link"/>', f'{footprint}<link name="base_link"/>'))
+    own, wanted = read_model(turned), read_model(path)
+    np.testing.assert_allclose(own.hubs, wanted.hubs, atol=1e-12)
+    np.testing.assert_allclose(own.inertia, wanted.inertia, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         (("<linkName>rotor_2<", "<linkName>rotor_9<"), "its link 'rotor_9' is not a part of the vehicle"),
-        (("<jointName>rotor_2_joint<", "<jointName>none<"), "the joint rotor_2_joint turns, and a study has one rigid"),
+        (("<jointName>rotor_2_joint<", "<jointName>none<"), "its joint 'none' is not in the file; correct <jointName>"),
+        (('<joint name="rotor_2_joint"', '<joint name="gimbal"'), "its joint 'rotor_2_joint' is not in the file"),
         (('lower="0" upper="0"', 'lower="0" upper="1"'), "the joint frame_joint turns"),
         (("<motorNumber>2</motorNumber>", ""), "has no <motorNumber>"),
+        (("<motorNumber>2</motorNumber>", "<motorNumber>1</motorNumber>"), "motor 1 is that of the plugin in line"),
+        (
+            ('<robot name="mine">', '<robot name="mine" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arm/>'),
+            "is a template; render it first",
+        ),
         (("multicopter-motor-model", "lift-drag"), "none of its plugins is a motor model that is known here"),
         (('<origin xyz="0.0325269 -', '<origin rpy="0 1 0" xyz="0.0325269 -'), "not along z of the body"),
     ],
@@ -409,7 +426,7 @@ def test_a_bad_file_is_refused_in_one_sentence(tmp_path, name):
 def test_what_is_there_not_or_a_template_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         read_model(tmp_path / "none.sdf")
-    with pytest.raises(InputError, match=r"render it first \(xacro uav\.xacro > uav\)"):
+    with pytest.raises(InputError, match=r"uav\.xacro: is a template; render it first \(xacro FILE > uav\.urdf"):
         read_model(Path("uav.xacro"))
     mesh = tmp_path / "mesh.xml"
     mesh.write_text(
