@@ -13,6 +13,7 @@ from scipy.optimize import lsq_linear, minimize_scalar
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.catalogue.parameter_error import Change, physical, too_light
 from cpfls_cli.effects.effect import Shape
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, has_force, is_free, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.settings import VISIBLE
@@ -282,6 +283,13 @@ def _exact(hypothesis: System, weight: Array) -> System:
             values = {known.name: float(value) for known, value in zip(effect.coefficients, numbers, strict=True)}
             shapes = {s.name: float(np.clip(values[s.name], s.grid[0], s.grid[-1])) for s in exact.shapes}
             chosen[effect.name] = Candidate(exact, shapes)
+    there = system(hypothesis.flights, tuple(chosen.values()))
+    for candidate, place in there.places:
+        plain = CATALOGUE.get(candidate.effect.name, candidate.effect)
+        added = slice(place.start + len(plain.coefficients), place.stop)
+        # A number of the exact form alone that ends on a bound is noise, or the loop's: the effect goes without it.
+        if added.start < added.stop and fit_within_bounds(there, weight)[1][added].any():
+            chosen[plain.name] = candidate._replace(effect=plain)
     listed = tuple(chosen.values())
     return hypothesis if listed == hypothesis.chosen else system(hypothesis.flights, listed)
 

@@ -131,13 +131,6 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     return replace(bounded, parameters=free.parameters) if wrong else bounded
 
 
-def free_estimates(found: NamedFit) -> Estimates:
-    """Fit alike without any bounds, which says what the flights ask for."""
-    weight = channel_weight(found.hypothesis, found.floor)
-    linear = equations(found.hypothesis, weight).solve()
-    return _estimated(found.hypothesis, weight, found.block, linear, np.zeros(len(linear), dtype=bool))
-
-
 def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array, held: BoolArray) -> Estimates:
     """Add confidence intervals to a fit: without each block all numbers change by one Gauss-Newton step."""
     shapes = hypothesis.shape_values
@@ -291,7 +284,10 @@ def on_bound(found: NamedFit) -> Refusal | None:
         }
         if not bounds:
             continue
-        free = free_estimates(found)
+        weight = channel_weight(found.hypothesis, found.floor)
+        # What the flights ask for without any bounds.
+        linear = equations(found.hypothesis, weight).solve()
+        free = _estimated(found.hypothesis, weight, found.block, linear, np.zeros(len(linear), dtype=bool))
         beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
         says = "would surely be beyond" if beyond else "sits on the bound of"
         name = next(iter(beyond or bounds))

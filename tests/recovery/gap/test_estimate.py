@@ -7,10 +7,11 @@ import pytest
 
 from cpfls_cli.effects.effect import Columns, hub_wrench, stack
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap.balance import refine
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import equations, fit
 from cpfls_cli.gap.diagnose import diagnose
-from cpfls_cli.gap.naming.estimate import estimates, fitted
+from cpfls_cli.gap.naming.estimate import earned, estimates, fitted
 from cpfls_cli.gap.naming.open_questions import with_unnamed
 from cpfls_cli.gap.naming.ranking import best_floor, block_index, rank_effects
 from cpfls_cli.gap.naming.search import forward_selection
@@ -206,16 +207,37 @@ def test_wind_blows_on_all_that_the_air_acts_on():
     assert after < 1.5 < before
 
 
-def test_the_height_of_the_centre_of_mass_is_no_flapping():
-    """An offset to all sides, with a drag that has a lever by it: nothing is left for a moment of the hubs."""
-    offset = {"c_x": 0.004, "c_y": -0.003, "c_z": 0.01}
+HIGH = {"c_x": 0.004, "c_y": -0.003, "c_z": 0.01}
+
+
+def of_the_centre_of_mass(effect):
+    """An offset to all sides, with a drag that has a lever by it."""
     noise = {"body_rate": 0.001, "velocity": 0.01, "acceleration": 0.02, "rotor_speed": 0.3}
-    flight = signals_of(flown(8.0, noise=noise, effects={"com_offset": offset, "rotor_drag": [1.5e-3]}))
-    flights, names = [weak(flight, force=True)], ("rotor_drag", "com_offset", "flapping_moment")
-    chosen, _ = forward_selection(flights, [CATALOGUE[name] for name in names], SETTINGS, np.random.default_rng(0))
-    numbers = numbers_of(fitted(flights, chosen, best_floor(system(flights, chosen)), SETTINGS))
+    flight = signals_of(flown(8.0, noise=noise, effects={"com_offset": HIGH, "rotor_drag": [1.5e-3]}))
+    flights, names = [weak(flight, force=True)], ("rotor_drag", "flapping_moment")
+    effects = [*(CATALOGUE[name] for name in names), effect]
+    chosen, _ = forward_selection(flights, effects, SETTINGS, np.random.default_rng(0))
+    found, refusals = earned(flights, chosen, best_floor(system(flights, chosen)), SETTINGS)
+    assert not refusals
+    return numbers_of(found)
+
+
+def test_the_height_of_the_centre_of_mass_is_no_flapping():
+    """Nothing is left for a moment of the hubs."""
+    numbers = of_the_centre_of_mass(CATALOGUE["com_offset"])
     assert numbers.keys() == {"rotor_drag", "com_offset"}
-    assert numbers["com_offset"] == pytest.approx(offset, rel=0.1)
+    assert numbers["com_offset"] == pytest.approx(HIGH, rel=0.1)
+
+
+def test_a_height_that_ends_on_its_bound_takes_no_offset_with_it(monkeypatch):
+    """In gusts the loop gives the centre of mass any height; it is where it is to the front and to the side."""
+    effect = CATALOGUE["com_offset"]
+    *aside, height = effect.exact.coefficients
+    exact = replace(effect.exact, coefficients=(*aside, replace(height, low=-0.02, high=0.02)))
+    bounded = replace(effect, exact=exact)
+    monkeypatch.setattr(refine, "CATALOGUE", {bounded.name: bounded})
+    numbers = of_the_centre_of_mass(bounded)
+    assert numbers["com_offset"] == pytest.approx({name: HIGH[name] for name in ("c_x", "c_y")}, rel=0.1)
 
 
 def test_noise_of_the_height_does_not_weaken_the_ground():
