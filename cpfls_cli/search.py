@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -30,10 +30,6 @@ from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structur
 from cpfls_cli.result import about, part, result
 from cpfls_cli.store import Origin, format_name, read, write
 from cpfls_cli.workers.workforce import WorkerError, Workforce, employ, require_address
-
-if TYPE_CHECKING:
-    from cpfls_cli.artifacts.vehicle_model import Vehicle
-
 
 T = TypeVar("T")
 Genes = np.ndarray[Any, np.dtype[np.uint16]]

@@ -2,7 +2,7 @@
 
 A model of one function of roll whose rules have the coefficients 0, 1, 0, 1 ... gives the memberships themselves:
 with the Euler rates (0, 2, 0) and the accelerations (0, 1, 0) its torque is minus twice their slope about roll, and
-their value about pitch. Derivatives by the breakpoints are compared in `tests/unit/regressor/test_kernels.py`.
+their value about pitch.
 """
 
 import re
