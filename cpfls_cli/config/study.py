@@ -1,4 +1,4 @@
-"""One study: the settings of every section, validated together, written out again, and named in messages."""
+"""One study and its YAML: the settings of every section, read, validated together, written again, named in messages."""
 
 from __future__ import annotations
 

@@ -227,7 +227,7 @@ def _connected(found: Found, parameters: Parameters) -> _Connected:
     odd |= _driven_apart(time, values, [index for index in moving if index not in odd])
     kept = [index for index in moving if index not in odd]
     others = {named.group.columns[index]: why for index, why in odd.items()}
-    if not parameters and _surfaces(time, values[:, kept]):
+    if not parameters and named.signal == "rotor_command" and _surfaces(time, values[:, kept]):
         return _Connected([], True, dict.fromkeys([named.group.columns[index] for index in kept], _SURFACES))
     count = stated_count(parameters) or count_by_form(parameters, len(kept))
     if named.known in (PX4, ARDUPILOT) and count is not None and {*range(count)} <= {*kept}:
@@ -244,8 +244,11 @@ def _surfaces(time: Array, values: Array) -> bool:
     changed = np.flatnonzero((values != values[:1]).any(axis=1))
     if values.shape[1] <= _FEWEST or not len(changed) or time[changed[0]] - time[0] < _STANDS_S:
         return False
-    begins = np.sort((values[0] - values.min(axis=0)) / np.maximum(np.ptp(values, axis=0), 1e-12))
-    return bool(begins[0] <= _AT_REST < begins[1] and np.median(begins[1:]) > _AWAY)
+    begins = (values[0] - values.min(axis=0)) / np.maximum(np.ptp(values, axis=0), 1e-12)
+    # A throttle that is off is below all surfaces; an output that only rises from a hover is not.
+    off = values[0, np.argmin(begins)] - values.min() <= _AT_REST * np.ptp(values)
+    begins = np.sort(begins)
+    return bool(off and begins[0] <= _AT_REST < begins[1] and np.median(begins[1:]) > _AWAY)
 
 
 def _swung_apart(time: Array, values: Array, kept: Sequence[int]) -> list[int]:

@@ -108,10 +108,12 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         # What writes numbers only has its column names in the last remark.
         header, lines, line = remark, chain([header], lines), line - 1
     names = [name.strip() for name in _fields(header)]
-    numbers = sum(bool(name) and _kind(name) == "number" for name in names)
-    if len(names) > 1 and 2 * numbers > len(names):
+    numbers = [name for name in names if name and _kind(name) == "number"]
+    # Columns may be numbered, and a row of data may hold words.
+    numbered = len(set(numbers)) == len(numbers) < len(names) and all(map(str.isdecimal, numbers))
+    if len(names) > 1 and 2 * len(numbers) > len(names) and not numbered:
         raise InputError(
-            f"{path}: has no line of column names, line {line} holds {numbers} numbers: put a line above it that"
+            f"{path}: has no line of column names, line {line} holds {len(numbers)} numbers: put a line above it that"
             " names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
         )
     begun = []

@@ -9,6 +9,7 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from importlib import import_module
+from itertools import chain
 from math import nan
 from pathlib import Path
 from types import ModuleType
@@ -219,10 +220,14 @@ def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
     try:
         with path.open("rb") as stream:
             first = stream.read(_FIRST_BYTES)
+            parts = chain([first], iter(lambda: stream.read(_PART_BYTES), b""))
+            zeros = bool(first) and not any(part.strip(bytes(1)) for part in parts)
     except OSError:
         return None
     if not first:
         return "an empty file: nothing was logged, or the copy failed"
+    if zeros:
+        return "a file of zeros alone, and no log: its writing was cut short; take it from the device again"
     found = _by_bytes(first, path.suffix.lower())
     return None if found is None else f"{found[0]}, and no log that can be read: {found[1]}"
 
@@ -257,7 +262,7 @@ def _is_header(line: bytes) -> bool:
     )
 
 
-_FIRST_BYTES = 1024
+_FIRST_BYTES, _PART_BYTES = 1024, 1 << 20
 
 
 _UNPACK: Final = "unpack it first, and give the log inside"
@@ -286,7 +291,6 @@ _FOREIGN: Final = (
     (b"version https://git-lfs", 0, "a pointer of Git LFS", "fetch it with `git lfs pull`"),
     (b"BUILD", 16, "a .DAT of DJI", "convert it to CSV with DatCon or its like"),
     (b"\xa3\x95\x80", 0, "a log of PX4 before ULog (sdlog2)", _CONVERT_SDLOG2),
-    (bytes(64), 0, "a file that begins with zeros alone", "its writing was cut short; take it from the device again"),
     (b"%PDF", 0, "a PDF", "give the log that it shows"),
     (b"\x89PNG", 0, "a picture", "give the log that it shows"),
     (b"\xff\xd8\xff", 0, "a picture", "give the log that it shows"),

@@ -390,7 +390,9 @@ def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     full = (values >= most - _ROUNDED) & _flown_or_after(flight, time, after_s)[:, None]
     # Where all are there together, it is the crest of a climb.
     plateaus = list(_held(time, np.asarray(full.any(axis=1) & ~full.all(axis=1)), 0.0))
-    limits = len(plateaus) >= _FEWEST_PLATEAUS or any(b - a >= _LONG_S for a, b in plateaus)
+    long = (values[(time >= a) & (time <= b)] for a, b in plateaus if b - a >= _LONG_S)
+    # Where nothing moves at all, as in a hover without noise, a rotor is at no limit.
+    limits = len(plateaus) >= _FEWEST_PLATEAUS or any(np.ptp(each, axis=0).max() > _ROUNDED for each in long)
     if most < _FULL and not (limits and flight.rotors_source == "logged"):
         return
     for rotor, column in enumerate(full.T):

@@ -17,17 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cpfls_cli.gap.naming.results import GapChange
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    # Names of effects are given of models that are read without a gap.
-    from cpfls_cli.arrays import Array
-    from cpfls_cli.gap.naming.results import Estimate, NamedEffect
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from cpfls_cli.gap.naming.results import Estimate, GapChange, NamedEffect
 
 
 AXES = ("x (roll)", "y (pitch)", "z (yaw)")

@@ -1,4 +1,4 @@
-"""Reduce a training set, held in memory or read in chunks: by a criterion, or at random as the baseline."""
+"""Reduce a training set, held in memory or read in chunks: by a criterion from where it has to begin, or at random."""
 
 from __future__ import annotations
 

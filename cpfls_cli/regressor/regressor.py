@@ -1,4 +1,4 @@
-"""The regressor Q(q, qd, qdd), which gives the torque from the linear parameters, and its slopes by the breakpoints."""
+"""The regressor Q(q, qd, qdd) of a motion, which gives the torque from the linear parameters; slopes by breakpoints."""
 
 from __future__ import annotations
 

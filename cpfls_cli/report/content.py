@@ -1,4 +1,4 @@
-"""What a command has to say: text, facts, tables, figures and details for people, a summary for machines."""
+"""What a command has to say: text, facts, tables, figures, a summary for machines; and how numbers are written."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 A vehicle under an autopilot flies in a loop: its rotors answer what disturbs its motion. The usual estimate
 ``S_uy / S_uu`` then shows a mixture of vehicle and autopilot. An instrument z moves the vehicle and knows nothing of
 the disturbance, such as a logged setpoint or the same path flown again: ``S_zy / S_zu`` is of the vehicle alone.
+`mismatch` is how far the response of a model is from that.
 """
 
 from __future__ import annotations
@@ -115,7 +116,7 @@ def mismatch(response: FrequencyResponse) -> Mismatch:
         return Mismatch(cost=np.nan, band=band)
     ratio = response.model[part] / response.gain[part]
     # Squared differences in decibels and degrees.
-    apart = _decibels(ratio) ** 2 + _PHASE * np.degrees(np.angle(ratio)) ** 2
+    apart = _floored_decibels(ratio) ** 2 + _PHASE * np.degrees(np.angle(ratio)) ** 2
     chosen = np.unique(np.linspace(0, len(frequency) - 1, _MOST_POINTS).round().astype(int))
     weight = (1.58 * (1 - np.exp(-response.clearness[part][chosen]))) ** 2
     cost = 20.0 * float((weight * apart[chosen]).mean())
@@ -123,13 +124,13 @@ def mismatch(response: FrequencyResponse) -> Mismatch:
     return Mismatch(cost=cost, band=band, deviations=tuple(_deviations(frequency, ratio, off)))
 
 
-def _decibels(ratio: ComplexArray) -> Array:
+def _floored_decibels(ratio: ComplexArray) -> Array:
     return np.asarray(20 * np.log10(np.maximum(np.abs(ratio), _LEAST)))
 
 
 def _deviations(frequency: Array, ratio: ComplexArray, off: BoolArray) -> list[Deviation]:
     """Cut a band into stretches in which a model is right, too strong, too weak, late or early."""
-    gain, phase = _decibels(ratio), np.degrees(np.angle(ratio))
+    gain, phase = _floored_decibels(ratio), np.degrees(np.angle(ratio))
     # 1 too strong, -1 too weak, 2 early, -2 late.
     kinds = np.where(gain**2 >= _PHASE * phase**2, np.sign(gain), 2 * np.sign(phase)).astype(int)
     kind = _without_scatter(np.where(off, kinds, 0))
@@ -151,7 +152,7 @@ def _without_scatter(kind: Array) -> Array:
 
 
 def _deviation(frequency: Array, ratio: ComplexArray, right: bool) -> Deviation:
-    gain = float(10 ** (_decibels(ratio).mean() / 20))
+    gain = float(10 ** (_floored_decibels(ratio).mean() / 20))
     # Angles are averaged as directions: those at half a turn have either sign.
     phase = float(np.degrees(np.angle(np.exp(1j * np.angle(ratio)).mean())))
     return Deviation(low=float(frequency[0]), high=float(frequency[-1]), right=right, gain=gain, phase=phase)

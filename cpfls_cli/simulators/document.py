@@ -20,7 +20,7 @@ _HUGE = 1e30
 """No number of a model is as large, and products of smaller ones are numbers."""
 _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*(/?)>")
 _ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
-TEMPLATE = "a template; render it first (xacro FILE > uav.urdf, or jinja), and give what comes out"
+TEMPLATE = "a template; render it first (xacro FILE > rendered.urdf, or jinja), and give what comes out"
 _WORD = re.compile(rb"\S+")
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 

@@ -11,7 +11,7 @@ speeds in rad/s.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +73,7 @@ def read_urdf(file: Path) -> SimulatorModel:
 
 
 def _placed(root: Node, links: dict[str, Node], motors: Sequence[Node]) -> dict[str, Array]:
-    """Give the pose of each link in that which the rotors hang on, or in the first, shape (4, 4)."""
+    """Give the pose of each link in the one that all rotors hang on, or in the first, shape (4, 4)."""
     joints = root.all("joint")
     own = {joint.name: joint for joint in joints}
     spinning = [text_of(each, "jointName") for each in motors]
@@ -100,8 +100,17 @@ def _placed(root: Node, links: dict[str, Node], motors: Sequence[Node]) -> dict[
     loose = [name for name in links if name not in found]
     if loose:
         raise links[loose[0]].error(f"the link {loose[0]} hangs on no joint; add one, or remove it")
-    base = found.get(_link_of(own[spinning[0]], "parent"), np.eye(4)) if spinning else np.eye(4)
-    return {name: np.linalg.inv(base) @ place for name, place in found.items()}
+    chains = [[*_up(children, _link_of(own[name], "parent"))] for name in spinning]
+    # Arms that are links of their own hang on one.
+    base = next((link for link in chains[0] if all(link in each for each in chains)), first) if chains else first
+    return {name: np.linalg.inv(found[base]) @ place for name, place in found.items()}
+
+
+def _up(children: Mapping[str, Node], link: str) -> Iterator[str]:
+    """Give a link, and those that it hangs on, the nearest first."""
+    while link:
+        yield link
+        link = _link_of(children[link], "parent") if link in children else ""
 
 
 def _turns(joint: Node) -> bool:

@@ -1,4 +1,4 @@
-"""Legs of a path in space: the profiles of one rest-to-rest move, and the moves one after the other."""
+"""Legs of a path in space: the shortest move under limits, from rest to rest, and the moves one after the other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Evidence that the verdict on a model rests on, and the facts that follow from it."""
+"""Evidence that the verdict on a model rests on: facts that follow from it, and models compared on the same blocks."""
 
 from __future__ import annotations
 

@@ -114,6 +114,7 @@ def test_several_logs_are_a_table_and_a_page_each(cpfls, logs, tmp_path, monkeyp
     assert own in index
     assert "without a gyroscope" in index
     assert result.stdout.count("Nothing to look at") == result.stdout.count("blind.csv") == 1
+    assert "- blind.csv: " in result.stdout
     assert sorted(path.name for path in (tmp_path / "out").glob("*.html")) == [
         "bf.html",
         "blind.html",

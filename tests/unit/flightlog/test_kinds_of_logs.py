@@ -63,17 +63,19 @@ def test_a_blackbox_log_is_known_by_its_header(own):
 
 def test_what_no_gyroscope_reads_in_degrees_is_in_its_counts(own):
     # Cleanflight wrote what the sensor gives, 16.4 for each deg/s.
-    rate = 16.4 * np.degrees(own.rate) * 300 / np.degrees(np.abs(own.rate)).max()
+    rate = 16.4 * np.degrees(own.rate) * 600 / np.degrees(np.abs(own.rate)).max()
+    # One damaged sample says nothing of the others.
+    damaged = rate / 16.4 * np.where(np.arange(len(rate)) == 100, 16.4, 1.0)[:, None]
     columns = {
         "time": own.time,
         **named(own.specific_force / 9.80665 * 4096, *(f"accSmooth[{axis}]" for axis in range(3))),
         **named(own.speed * 1.9 + 1000, *(f"motor[{motor}]" for motor in range(4))),
     }
     found = [
-        maps(proposed({"": columns | named(size * rate, *(f"gyroADC[{axis}]" for axis in range(3)))}, ""))["body_rate"]
-        for size in (1.0, 1 / 16.4)
+        maps(proposed({"": columns | named(values, *(f"gyroADC[{axis}]" for axis in range(3)))}, ""))["body_rate"]
+        for values in (rate, rate / 16.4, damaged)
     ]
-    assert [(each.unit, round(each.scale, 4)) for each in found] == [("deg/s", 0.061), ("deg/s", 1.0)]
+    assert [(each.unit, round(each.scale, 4)) for each in found] == [("deg/s", 0.061), ("deg/s", 1.0), ("deg/s", 1.0)]
 
 
 def test_messages_of_ros_are_known_by_their_fields(own):

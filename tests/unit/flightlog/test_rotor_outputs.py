@@ -9,6 +9,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import stated_airframe, usual_airframe
 from cpfls_cli.flightlog.proposal import known_log, propose
 from cpfls_cli.flightlog.recognition import recognise
+from cpfls_cli.flightlog.rotor_columns import _surfaces
 from cpfls_cli.flightlog.stated_vehicle import LAYOUTS
 from tests.builders.topic_logs import ardupilot, maps, proposed, topic
 from tests.builders.unknown_logs import FLIP, flat_log, flight, named, quaternion, with_ground
@@ -89,6 +90,15 @@ def test_outputs_that_stand_in_their_middle_before_take_off_are_no_rotors(own):
     motors = named(pulses(own), *PWM)
     recognition = recognise(flat_log(own, speed={**sticks, **motors}).topics, {}, {}, "")
     assert recognition.signal("rotor_command").columns.columns == PWM
+
+
+def test_outputs_that_begin_in_a_hover_are_no_surfaces(own):
+    rising, falling = np.minimum(0.5, 0.1 * (own.time - 3)), np.maximum(-0.45, -0.1 * (own.time - 3))
+    swings = [0.2 * np.sin(rate * (own.time - 3)) for rate in (1.0, 0.7)]
+    moves = np.column_stack([rising, falling, *swings]) * (own.time > 3)[:, None]
+    assert not _surfaces(own.time, 0.5 + moves)
+    # A throttle that is off is the least of all outputs.
+    assert _surfaces(own.time, 0.5 + moves - [0.5, 0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -250,6 +250,9 @@ def test_a_log_without_names_says_where_they_go(tmp_path: Path) -> None:
         contents(_written(tmp_path / "log.csv", _rows(",")))
     with pytest.raises(InputError, match="line 1 holds 3 numbers"):
         contents(_written(tmp_path / "log.csv", "1008.24,10901,acc.z,0.01\n1008.25,10902,acc.z,0.02\n"))
+    # Columns may be numbered.
+    numbered = contents(_written(tmp_path / "log.csv", "time,0,1,2,3\n0.5,4,3,2,1\n0.6,5,4,3,2\n"))
+    assert [*numbered.topics[""]] == ["time", "0", "1", "2", "3"]
 
 
 def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
@@ -473,7 +476,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
     ("name", "content", "what", "way"),
     [
         ("a.bag", b"#ROSBAG V2.0\n" + bytes(99), "a bag of ROS 1", "rosbags-convert"),
-        ("a.bin", bytes(999), "a file that begins with zeros alone", "take it from the device again"),
+        ("a.bin", bytes(999), "a file of zeros alone", "take it from the device again"),
         ("a.tlog", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
         ("a.bin", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
         ("a.rlog", TELEMETRY[8:], "telemetry of MAVLink", "the log that the autopilot writes itself"),

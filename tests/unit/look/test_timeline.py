@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -5,12 +7,14 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.look.columns import LookedLog
+from cpfls_cli.look.flight import Samples
 from cpfls_cli.look.logged import what_is_logged
 from cpfls_cli.look.reading import read_flight
-from cpfls_cli.look.timeline import timeline
+from cpfls_cli.look.timeline import _at_limit, timeline
 from tests.builders import ended_flights as ended
 from tests.builders import looked_logs as logs
 from tests.builders.dataflash_logs import dataflash
+from tests.builders.look_flights import still_flight
 from tests.builders.ulogs import message, ulog
 from tests.builders.unknown_logs import flight, with_ground
 
@@ -288,3 +292,12 @@ def test_errors_that_come_again_are_one_line_and_a_crash_is_no_note():
         ("thrust loss", "2 times", "danger"),
         ("crash check", "crashed", "danger"),
     ]
+
+
+def test_a_rotor_that_is_steady_where_nothing_moves_is_at_no_limit():
+    speeds = np.full((3000, 4), 0.4)
+    speeds[:, 1:3] = 0.45
+    still = still_flight(rotors=Samples(np.arange(3000) / 50, speeds, "rotors"))
+    assert not list(_at_limit(still, np.inf))
+    moving = np.where(np.arange(4) == 1, 0.45, 0.4 + 0.02 * np.sin(np.arange(3000) / 50)[:, None])
+    assert list(_at_limit(replace(still, rotors=Samples(np.arange(3000) / 50, moving, "rotors")), np.inf))

@@ -1,5 +1,6 @@
 """Simulators' files read: what they state, in whose units, and what is refused with its line and a remedy."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -197,6 +198,22 @@ def test_urdf_is_read_in_the_frame_of_the_link_that_its_rotors_hang_on(tmp_path)
     own, wanted = read_model(turned), read_model(path)
     np.testing.assert_allclose(own.hubs, wanted.hubs, atol=1e-12)
     np.testing.assert_allclose(own.inertia, wanted.inertia, atol=1e-12)
+
+
+def test_rotors_of_urdf_on_arms_of_their_own_are_in_the_axes_of_what_these_hang_on(tmp_path):
+    path, arms = tmp_path / "mine.urdf", tmp_path / "arms.urdf"
+    text = urdf_of(SMALL)
+    path.write_text(text)
+    for index in range(4):
+        joint = f'<joint name="rotor_{index}_joint"'
+        begin = text.index(joint)
+        place = re.search(r'<origin xyz="([^"]+)"/>', text[begin:])[1]
+        arm = f"""<link name="arm_{index}"/><joint name="fixed_{index}" type="fixed"><parent link="base_link"/>
+        <child link="arm_{index}"/><origin xyz="{place}" rpy="0 0 {0.7 * index + 0.7}"/></joint>"""
+        own = text[begin:].replace(f'xyz="{place}"', 'xyz="0 0 0"', 1).replace("base_link", f"arm_{index}", 1)
+        text = text[:begin] + arm + own
+    arms.write_text(text)
+    np.testing.assert_allclose(read_model(arms).hubs, read_model(path).hubs, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -426,7 +443,7 @@ def test_a_bad_file_is_refused_in_one_sentence(tmp_path, name):
 def test_what_is_there_not_or_a_template_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         read_model(tmp_path / "none.sdf")
-    with pytest.raises(InputError, match=r"uav\.xacro: is a template; render it first \(xacro FILE > uav\.urdf"):
+    with pytest.raises(InputError, match=r"uav\.xacro: is a template; render it first \(xacro FILE > rendered\.urdf"):
         read_model(Path("uav.xacro"))
     mesh = tmp_path / "mesh.xml"
     mesh.write_text(

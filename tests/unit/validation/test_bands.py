@@ -1,4 +1,4 @@
-"""Bands, curves, timelines and physical checks of a validation."""
+"""Bands, curves and timelines of a validation."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Replays of a model and the verdict on it."""
+"""Replays of a model, physical checks of it, and the verdict on it."""
 
 from dataclasses import replace
 from types import SimpleNamespace
