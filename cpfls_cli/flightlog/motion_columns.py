@@ -25,7 +25,7 @@ _TOLERANCE, _TEN = 1.4, 10.0
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 # Rate beyond which no gyroscope reads, deg/s, and the counts that one deg/s is to those of 16 bits for 2000 deg/s.
 _FASTEST_DEG_S, _COUNTS = 4100.0, 16.4
-_USUAL = 0.99  # Share of a flight in which a gyroscope reads what it can.
+_USUAL = 0.999  # Share of a flight in which no sample is damaged.
 # Ratios to gravity of columns that are known to hold it, also where the sensor reads wrong; and of what is no more.
 _BY_NAME, _WEIGHT = 2.0, 1.15
 # Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
@@ -110,7 +110,7 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
     unit = stated or ("deg/s" if spread > _DEGREES_FROM else "rad/s")
     rivals = (Rival("unit: deg/s", f"a spread of {spread:.2g} fits both"),) if between and not stated else ()
     size_in_words = f"a spread of {spread:.2g} in flight" if stated is None else f"which is in {stated}"
-    # One sample may be damaged.
+    # A few samples may be damaged.
     fastest, scale = float(np.quantile(np.abs(values).max(axis=1), _USUAL)), 1.0
     of_log = seen.log.stated_unit(named.group.columns[0], "body_rate")
     if of_log is None and unit == "deg/s" and fastest > _FASTEST_DEG_S:

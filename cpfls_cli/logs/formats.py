@@ -9,7 +9,6 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from importlib import import_module
-from itertools import chain
 from math import nan
 from pathlib import Path
 from types import ModuleType
@@ -220,14 +219,14 @@ def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
     try:
         with path.open("rb") as stream:
             first = stream.read(_FIRST_BYTES)
-            parts = chain([first], iter(lambda: stream.read(_PART_BYTES), b""))
-            zeros = bool(first) and not any(part.strip(bytes(1)) for part in parts)
+            # Some logs have as many bytes before they begin.
+            zeros = not (first + stream.read(_BEGINS_WITHIN)).strip(bytes(1))
     except OSError:
         return None
     if not first:
         return "an empty file: nothing was logged, or the copy failed"
     if zeros:
-        return "a file of zeros alone, and no log: its writing was cut short; take it from the device again"
+        return "a file that begins with zeros, and no log: its writing was cut short; take it from the device again"
     found = _by_bytes(first, path.suffix.lower())
     return None if found is None else f"{found[0]}, and no log that can be read: {found[1]}"
 
@@ -262,7 +261,7 @@ def _is_header(line: bytes) -> bool:
     )
 
 
-_FIRST_BYTES, _PART_BYTES = 1024, 1 << 20
+_FIRST_BYTES, _BEGINS_WITHIN = 1024, 1 << 16
 
 
 _UNPACK: Final = "unpack it first, and give the log inside"
