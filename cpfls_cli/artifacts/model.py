@@ -51,7 +51,7 @@ def as_inputs(role: str, flights: Sequence[LearnedFlight]) -> dict[str, InputFil
 
 
 def joined_flights(*groups: Iterable[LearnedFlight]) -> tuple[LearnedFlight, ...]:
-    """List flights once each; of one that stands in several groups what was learned from most."""
+    """List flights once each; of one that is in several groups what was learned from most."""
     kept: dict[str, LearnedFlight] = {}
     for flight in (flight for group in groups for flight in group):
         known = kept.get(flight.sha256)

@@ -214,7 +214,7 @@ MODEL, RIGID_BODY, ZERO = "model", "rigid-body", "torque-zero"
 
 Winner = Literal["model", "rigid-body", "tie"]
 
-# A mean squared error that is smaller by less than a hundredth, or beside that of no torque at all, decides nothing.
+# A mean squared error that is smaller by less than a hundredth, or negligible to that of no torque, decides nothing.
 _TIE, _ROUNDING = 0.01, 1e-12
 _MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")
 
@@ -286,7 +286,7 @@ class Judged:
 
     @property
     def baselines(self) -> tuple[str, ...]:
-        """Models that were judged beside the model itself."""
+        """Models that were judged together with the model itself."""
         return tuple(name for name in self.models if name != MODEL)
 
     def samples_of(self, part: str) -> int:

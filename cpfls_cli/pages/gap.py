@@ -159,7 +159,7 @@ def number_words(effect: NamedEffect) -> str:
 
 
 def _coefficient(coefficient: Estimate) -> str:
-    """Write a value with its interval and unit; a power of ten that is that of all three stands once."""
+    """Write a value with its interval and unit; a power of ten that all three share is written once."""
     unit = unit_words(coefficient.unit)
     words = with_interval(coefficient.value, coefficient.low, coefficient.high)
     powers = {text.partition("e")[2] for text in words}

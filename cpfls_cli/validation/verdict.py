@@ -196,7 +196,7 @@ def _beside_rigid_body(evidence: Evidence) -> Iterator[Reason]:
 
 
 def _constant(evidence: Evidence) -> Iterator[Reason]:
-    """Name a constant torque that is large beside the noise, and not negligible beside the torque."""
+    """Name a constant torque that is large against the noise, and not negligible against the torque."""
     axes = evidence.identification.axes
     constant, noise = np.abs(axes.constant), axes.torque * np.sqrt(np.clip(1.0 - axes.r2, 0.0, None))
     for axis in np.flatnonzero((constant > _LARGE_BESIDE_NOISE * noise) & (constant > _SMALL * axes.torque)):
