@@ -81,6 +81,9 @@ _ALONE = {
 _ALIKE = {"delay": 0.3, "lag": 0.5, "gusts": 0.5, "unbalance": 0.5}
 """Kinds of which all numbers change at once, and the share of that by which each does so by itself."""
 
+_BY_LOOP = ("gain", "delay")
+"""Kinds whose numbers hold how the loop answers gusts, which it does otherwise with other motors."""
+
 _ONE_TOO = ("unbalance",)
 """Of these the kinds of which one number can change as well: rotors that turn alike are hardly separated."""
 
@@ -202,6 +205,12 @@ def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:
     together = np.sum(each, axis=0)
     if kind in _ALIKE:
         columns = [together, *(_ALIKE[kind] * column for column in each)]
+        if kind == "lag":
+            columns += [
+                _ALONE[other][0] * numbers.direction({name: 1.0})
+                for other in _BY_LOOP
+                for name in numbers.of_kind(other)
+            ]
         yield Cause(kind, np.stack(columns, axis=1), usual, unit)
     elif kind in _AT_ONCE:
         yield Cause(kind, np.stack(each, axis=1), usual, unit, reported=len(each))

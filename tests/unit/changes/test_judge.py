@@ -297,6 +297,22 @@ def test_two_changes_at_once_hide_each_other_and_are_found():
     assert {"torque about z", "hover"} <= {found.name for found in change.causes}
 
 
+def test_a_lag_that_makes_the_loop_answer_gusts_otherwise_is_no_second_change():
+    """Rotors 20 ms slower, and a body that seems to follow them 20 ms sooner; the second alone is a delay."""
+    names = [*LOADS, *(f"{kind} {axis}" for kind in ("gain", "delay") for axis in ("roll", "pitch", "yaw"))]
+    names += [f"lag M{index}" for index in range(1, 5)]
+    slower = np.array([0.02 * name.startswith("lag") for name in names])
+    answered = np.array([-0.02 * name.startswith("delay") for name in names])
+    rng = np.random.default_rng(21)
+    before = flights(6, rng, names=names)
+    today = flights(3, rng, slower + answered, names)
+    found = changed(today, before, QUAD, rng)
+    assert [each.name for each in found.causes if each.named] == ["lag"]
+    assert found.causes[0].sizes[0].low < 0.02 < found.causes[0].sizes[0].high
+    alone = changed(flights(3, rng, answered, names), before, QUAD, rng)
+    assert [each.name for each in alone.causes if each.named] == ["delay"]
+
+
 @pytest.mark.parametrize("names", [LOADS, NAMES])
 def test_a_number_beyond_its_limit_is_never_unchanged(names):
     """In whatever numbers flights are off, alone or with others, and however many flights tell what they differ by."""
