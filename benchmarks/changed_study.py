@@ -45,7 +45,7 @@ FASTER = 2.0
 USUAL = 5
 """Reference flights of changes."""
 
-Told = dict[str, FlightNumbers]
+ByLog = dict[str, FlightNumbers]
 """By instrument."""
 
 SIZES = {
@@ -72,7 +72,7 @@ SIZES = {
 
 
 LOGARITHMS = ("inertia about x", "gyroscope scale", "gusts")
-"""Changes whose cause is told by the logarithm."""
+"""Changes whose cause is given by the logarithm."""
 
 
 Right = dict[str, tuple[float, ...]]
@@ -146,7 +146,7 @@ class Fleet(NamedTuple):
     """Vehicles of a type, and the flights of days on which nobody changed them."""
 
     vehicles: list[tuple[VehicleSettings, Body]]
-    days: list[list[list[Told]]]
+    days: list[list[list[ByLog]]]
     """By vehicle, day and flight."""
 
 
@@ -158,34 +158,34 @@ class Case(NamedTuple):
     vehicle: int
     draw: int
     right: Right
-    told: Told
+    by_log: ByLog
 
 
-def _told(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int], pace: float = 1.0) -> Told:
+def _numbers_by_log(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int], pace: float = 1.0) -> ByLog:
     return {name: flight_numbers(each, kind.volts) for name, each in flown(kind, vehicle, body, seed, pace).items()}
 
 
 def _fleet(kind: Kind, trim: Trim, series: int) -> Fleet:
     numbers = range(series * VEHICLES, (series + 1) * VEHICLES)
     vehicles = [vehicle_of(kind, np.random.default_rng([kind.rotors, index])) for index in numbers]
-    days: list[list[list[Told]]] = []
+    days: list[list[list[ByLog]]] = []
     for index, (vehicle, body) in zip(numbers, vehicles, strict=True):
         days.append([])
         for day in range(DAYS):
             own = day_of(kind, body, trim, np.random.default_rng([kind.rotors, index, day]))
             flights = A_DAY if day < THRICE else 1
-            days[-1].append([_told(kind, vehicle, own, [index, day, flight]) for flight in range(flights)])
+            days[-1].append([_numbers_by_log(kind, vehicle, own, [index, day, flight]) for flight in range(flights)])
     return Fleet(vehicles, days)
 
 
-def _faster(kind: Kind, trim: Trim, fleet: Fleet, series: int) -> list[list[Told]]:
+def _faster(kind: Kind, trim: Trim, fleet: Fleet, series: int) -> list[list[ByLog]]:
     """Fly once more on each day, legs in half of the time: by vehicle and day."""
-    made: list[list[Told]] = []
+    made: list[list[ByLog]] = []
     for index, (vehicle, body) in enumerate(fleet.vehicles, series * VEHICLES):
         made.append([])
         for day in range(DAYS):
             own = day_of(kind, body, trim, np.random.default_rng([kind.rotors, index, day]))
-            made[-1].append(_told(kind, vehicle, own, [index, day, A_DAY], FASTER))
+            made[-1].append(_numbers_by_log(kind, vehicle, own, [index, day, A_DAY], FASTER))
     return made
 
 
@@ -198,15 +198,15 @@ def _cases(kind: Kind, trim: Trim, fleet: Fleet, names: Sequence[str], series: i
             seed = [kind.rotors, 1000 * (series + 1) + draw, number, step]
             now = altered(name, size, kind, day_of(kind, body, trim, np.random.default_rng(seed)), draw)
             try:
-                told = _told(kind, vehicle, now.body, seed)
+                by_log = _numbers_by_log(kind, vehicle, now.body, seed)
             except InputError as error:
                 print(f"{name} {size:g}, draw {draw}: {error}", file=sys.stderr)
                 continue
-            cases.append(Case(name, size, index, draw, now.right, told))
+            cases.append(Case(name, size, index, draw, now.right, by_log))
     return cases
 
 
-def _judged(fleet: Fleet, vehicle: int, instrument: str, today: Sequence[Told], count: int, draw: int) -> Changed:
+def _judged(fleet: Fleet, vehicle: int, instrument: str, today: Sequence[ByLog], count: int, draw: int) -> Changed:
     """Hold flights against those of so many other days, one each."""
     rng = np.random.default_rng([vehicle, count, draw])
     others = [day[0] for day in fleet.days[vehicle] if day[0] is not today[0]]
@@ -250,7 +250,7 @@ def _alarms(runs: Sequence[Changed]) -> list[object]:
     return [len(runs), len(said), sum(run.p <= 0.05 for run in runs), ", ".join(said) or "—"]
 
 
-def _otherwise(fleet: Fleet, faster: list[list[Told]]) -> Iterator[list[object]]:
+def _otherwise(fleet: Fleet, faster: list[list[ByLog]]) -> Iterator[list[object]]:
     """Hold each day's flight against those of other days that are flown otherwise, or some so and some so."""
     usual = [[day[0] for day in days] for days in fleet.days]
     sides = {"slow": (faster, usual), "fast": (usual, faster), "both": (faster, usual)}
@@ -338,16 +338,16 @@ def _changes(fleet: Fleet, cases: Sequence[Case], instrument: str) -> tuple[list
 def _judge_case(fleet: Fleet, case: Case, instrument: str) -> Changed:
     """Ask what would show in the first draws alone, for it takes long."""
     with contextlib.nullcontext() if case.draw < _SHOWN else _WITHOUT_SHOWS:
-        return _judged(fleet, case.vehicle, instrument, [case.told], USUAL, case.draw)
+        return _judged(fleet, case.vehicle, instrument, [case.by_log], USUAL, case.draw)
 
 
 def _shows(case: Case, run: Changed) -> float:
     """Give the smallest size that is said to show, as sizes are listed; NaN where no cause is right."""
     shows = {each.cause: each.smallest for each in run.shows}
-    told = [(shows[name], truth) for name, truth in case.right.items() if name in shows and truth]
+    sizes = [(shows[name], truth) for name, truth in case.right.items() if name in shows and truth]
     if case.name in LOGARITHMS:
-        return float(np.expm1(told[0][0])) if told else np.nan
-    return min((case.size * shows / np.abs(truth).max() for shows, truth in told), default=np.nan)
+        return float(np.expm1(sizes[0][0])) if sizes else np.nan
+    return min((case.size * shows / np.abs(truth).max() for shows, truth in sizes), default=np.nan)
 
 
 WRONG: dict[str, Callable[[Signals], Signals]] = {

@@ -111,8 +111,8 @@ def local_search(training, learned, settings: IdentificationSettings) -> tuple[f
         ends.append(mse[1] / mse[0])
     timed, (many, few) = Ratio.of(times), np.median(passes, axis=0)
     quality = f"{np.median(ends):.3g} ({min(ends):.3g} to {max(ends):.3g})"
-    told = f"{many:.0f} and {few:.0f}", many / few, timed.ratio * few / many
-    return 1e3 * timed.slow_s, 1e3 * timed.fast_s, timed.range, *told, quality
+    per_pass = f"{many:.0f} and {few:.0f}", many / few, timed.ratio * few / many
+    return 1e3 * timed.slow_s, 1e3 * timed.fast_s, timed.range, *per_pass, quality
 
 
 def counted(work, where, *names: str) -> tuple[Any, float, int]:

@@ -30,7 +30,7 @@ from tests.builders.hostile_files import FAULTS, KINDS, Good, tried
 
 PATIENCE_S = 60.0
 LIMIT_BYTES = 6 << 30
-TOLD, NO_END = "case ", "HDF5 did not finish reading"
+CASE, NO_END = "case ", "HDF5 did not finish reading"
 PREPARING_S = 600.0
 
 
@@ -58,7 +58,7 @@ def counted(kind: str, cases: int, seed: int) -> Counter[str]:
     counts: Counter[str] = Counter()
     first = 0
     while first < cases:
-        for number, fault, what in told(kind, first, cases, seed):
+        for number, fault, what in reported(kind, first, cases, seed):
             first = number + 1
             if fault:
                 counts[fault] += 1
@@ -66,7 +66,7 @@ def counted(kind: str, cases: int, seed: int) -> Counter[str]:
     return counts
 
 
-def told(kind: str, first: int, cases: int, seed: int) -> Iterator[tuple[int, str, str]]:
+def reported(kind: str, first: int, cases: int, seed: int) -> Iterator[tuple[int, str, str]]:
     words = [sys.executable, "-m", "benchmarks.fuzz", "--seed", str(seed), "--cases", f"{kind},{first},{cases}"]
     lines: Queue[str | None] = Queue()
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
@@ -87,11 +87,11 @@ def told(kind: str, first: int, cases: int, seed: int) -> Iterator[tuple[int, st
             if line is None:
                 fault = "" if NO_END in said else "traceback"
                 break
-            if not line.startswith(TOLD):
+            if not line.startswith(CASE):
                 said = line
                 continue
             longest_s, said = PATIENCE_S, ""
-            number, *found = json.loads(line.removeprefix(TOLD))
+            number, *found = json.loads(line.removeprefix(CASE))
             yield number, *found
         process.kill()
     if number + 1 < cases:
@@ -107,10 +107,10 @@ def run_cases(kind: str, first: int, cases: int, seed: int) -> None:
             resource.setrlimit(resource.RLIMIT_DATA, (LIMIT_BYTES, LIMIT_BYTES))
         patience.longest_read_s = matrices.longest_read_s = lambda _: PATIENCE_S / 4
         patience.end_what_hangs()
-        print(TOLD + json.dumps([first - 1, "", ""]), flush=True)
+        print(CASE + json.dumps([first - 1, "", ""]), flush=True)
         for number in range(first, cases):
             fault, what = tried(good.case(kind, [seed, number])) or ("", "")
-            print(TOLD + json.dumps([number, fault, what]), flush=True)
+            print(CASE + json.dumps([number, fault, what]), flush=True)
 
 
 if __name__ == "__main__":

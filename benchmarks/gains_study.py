@@ -89,8 +89,8 @@ def judge(case: Case, gains: TunedGains, rng: np.random.Generator) -> list[tuple
     for axis in changed:
         assert axis.after is not None
         own = AXES.index(axis.axis)
-        told, true = axis.after, true_margins(case, law, own, axis.attitude)
-        rows.append((case.autopilot, case.vehicle, axis.axis, told.gain_db, told.phase_deg, *true, *flown[own]))
+        said, true = axis.after, true_margins(case, law, own, axis.attitude)
+        rows.append((case.autopilot, case.vehicle, axis.axis, said.gain_db, said.phase_deg, *true, *flown[own]))
     return rows
 
 

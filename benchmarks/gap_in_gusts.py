@@ -54,7 +54,7 @@ def _hidden() -> Iterator[Hidden]:
 
 
 def main(draws: int = 3) -> None:
-    rows, told = [], []
+    rows, identified = [], []
     for level, gusts in LEVELS.items():
         for instrument in INSTRUMENTS:
             found: list[tuple[Hidden, list[DiagnosisRun]]] = []
@@ -64,11 +64,11 @@ def main(draws: int = 3) -> None:
                 found.append((hidden, runs))
                 rows.append([level, instrument, hidden.name or "nothing", *_names(hidden, runs)])
                 progress(rows[-1])
-            told.append([level, instrument, *_gusts(found, gusts)])
+            identified.append([level, instrument, *_gusts(found, gusts)])
     table("gap_in_gusts", "gusts | instrument | hidden | right | wrong name | verdicts | holds the truth", rows)
     print()
-    header = f"gusts | instrument | told | size over true | within {SIZE:.0%} | memory over true | within 2"
-    table("gusts_in_gap", header, told)
+    header = f"gusts | instrument | identified | size over true | within {SIZE:.0%} | memory over true | within 2"
+    table("gusts_in_gap", header, identified)
 
 
 def _flown(hidden: Hidden, gusts: tuple[float, float, float], instrument: str, draw: int) -> list[PlaybackFlight]:
@@ -107,19 +107,19 @@ def _names(hidden: Hidden, runs: Sequence[DiagnosisRun]) -> Iterator[str]:
 
 
 def _gusts(found: Sequence[tuple[Hidden, Sequence[DiagnosisRun]]], gusts: tuple[float, float, float]) -> Iterator[str]:
-    """Hold what is told of gusts about the axes against the truth."""
+    """Hold what is identified of gusts about the axes against the truth."""
     every = [run.air for _, runs in found for run in runs]
     airs = [air for air in every if air is not None]
-    told = np.array([air.gusts_only[:3] for air in airs]).reshape(-1, 3)
-    yield f"{int(told.sum())} of {3 * len(every)}"
-    if gusts == CALM or not told.any():
+    identified = np.array([air.gusts_only[:3] for air in airs]).reshape(-1, 3)
+    yield f"{int(identified.sum())} of {3 * len(every)}"
+    if gusts == CALM or not identified.any():
         yield from ["—"] * 4
         return
     sizes = np.array([air.found.size[:3] for air in airs]) / (np.array(TRUE.inertia) * gusts)
     memories = np.array([air.found.memory[:3] for air in airs]) / MEMORY_S
     for values, near in ((sizes, np.abs(sizes - 1) <= SIZE), (memories, np.abs(np.log(memories)) <= np.log(MEMORY))):
-        yield mean_and_ends(values[told], 2)
-        yield count(near[told])
+        yield mean_and_ends(values[identified], 2)
+        yield count(near[identified])
 
 
 if __name__ == "__main__":

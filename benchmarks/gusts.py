@@ -30,7 +30,7 @@ def main(draws: int = 2) -> None:
                 sets = flown_sets(flown, kind, draws, 20.0, repeated=1)
                 drawn = [each for own in sets if (each := find_gusts(model, instruments_of(kind, own)))]
                 rows += [[name, words(gusts), kind, part, *_cells(flown, axes, drawn)] for part, axes in PARTS.items()]
-    table("gusts", "vehicle | gusts | instrument | axes | size | holds | memory | holds | told | bound", rows)
+    table("gusts", "vehicle | gusts | instrument | axes | size | holds | memory | holds | identified | bound", rows)
 
 
 def _cells(flown: Flight, axes: slice, drawn: list[FoundGusts]) -> list[str]:
@@ -41,13 +41,13 @@ def _cells(flown: Flight, axes: slice, drawn: list[FoundGusts]) -> list[str]:
     sizes = bodies * np.array([*flown.gusts, *[SHOVE * max(flown.gusts)] * 3])[axes]
     memories = np.array([*MEMORY_S, *[SHOVE_MEMORY_S] * 3])[axes]
     values = {key: np.array([getattr(each, key)[axes] for each in drawn]) for key in RANGES}
-    told, cells = np.isfinite(values["size"]), []
+    identified, cells = np.isfinite(values["size"]), []
     for what, low, high, true in (("size", "low", "high", sizes), ("memory", "memory_low", "memory_high", memories)):
-        inside = ((values[low] <= true) & (true <= values[high]))[told]
-        known = told.any() and flown.gusts != CALM
-        cells += [mean_and_ends((values[what] / true)[told], 2), count(inside)] if known else ["—"] * 2
-    bounds = (values["high"] / bodies)[~told & np.isfinite(values["high"])]
-    return [*cells, count(told), f"{bounds.max():.2g}" if len(bounds) else "—"]
+        inside = ((values[low] <= true) & (true <= values[high]))[identified]
+        known = identified.any() and flown.gusts != CALM
+        cells += [mean_and_ends((values[what] / true)[identified], 2), count(inside)] if known else ["—"] * 2
+    bounds = (values["high"] / bodies)[~identified & np.isfinite(values["high"])]
+    return [*cells, count(identified), f"{bounds.max():.2g}" if len(bounds) else "—"]
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ class Found(NamedTuple):
     again: Array
     least: Array
     half: Array
-    told: bool
+    identified: bool
 
 
 def main(*, setpoints: bool = False, past: bool = False) -> None:
@@ -81,7 +81,7 @@ def _past() -> None:
 def _table(name: str, of: str, rows: list[list[str]]) -> None:
     columns = " | ".join(f"{{0}} {by}" for by in ("by instruments", "by least squares"))
     moments, hold, yaw = (columns.replace("{0}", what) for what in ("Ixx, Iyy, %,", "95 % hold,", "Izz, %,"))
-    table(name, f"{of} | told | {moments} | {hold} | Izz told | {yaw}", rows)
+    table(name, f"{of} | identified | {moments} | {hold} | Izz identified | {yaw}", rows)
 
 
 def _found(truth: Truth, source: TorqueSource, *, past: bool = False) -> Found | None:
@@ -92,12 +92,12 @@ def _found(truth: Truth, source: TorqueSource, *, past: bool = False) -> Found |
         np.log(fit_baselines(data, 1 / axis_scale(data), 3e-7)[0].parameters[:3] / truth.inertia)
         for data in (freed.learned, source)
     )
-    return Found(again, least, freed.half, bool(freed.told[2]))
+    return Found(again, least, freed.half, bool(freed.identified[2]))
 
 
 def _cells(sets: Sequence[Found | None]) -> list[str]:
     known = [each for each in sets if each is not None]
-    yaw = [each for each in known if each.told]
+    yaw = [each for each in known if each.identified]
     cells = [f"{len(known)} of {len(sets)}"]
     if not known:
         return [*cells, *["—"] * 4, "0", "—", "—"]

@@ -136,12 +136,12 @@ def ambiguous(name: str, rival: str, rng: np.random.Generator) -> OpenSet | None
     logging = Logging(LOGGED, False, floor, SETTINGS)
     weak = logging.weak(planned_signals(short.planned(first), short, logging))
     hidden = usual(CATALOGUE[name], vehicle)
-    told, seen = (
+    apart, seen = (
         float(logging.gathered(Question(hidden, other), [weak]).left.sum()) for other in (CATALOGUE[rival], None)
     )
     size = rng.uniform(1.5, 5.0) * np.sqrt(len(weak) * weak.known.sum() / 6 / max(seen, 1e-9))
     # Flights that cannot carry the effect, or that tell it from the rival without doubt, are no open sets.
-    if size > 2.0 or told * size**2 > 60 or hidden.candidate.effect.unit_coefficient:
+    if size > 2.0 or apart * size**2 > 60 or hidden.candidate.effect.unit_coefficient:
         return None
     hidden = replace(hidden, linear=hidden.linear * size)
     paths = {"training": first, "held out": gentle()}

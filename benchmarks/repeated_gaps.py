@@ -45,14 +45,14 @@ def main(draws: int = 6) -> None:
         off = np.abs(there.explained - truth.explained) < half_width(there.explained_error, there.blocks)
         passed.append(off[MODELLED])
         shares.append([there.share, expected, there.explained, truth.explained])
-    told = np.array(shares).transpose(1, 2, 3, 0)
+    measured = np.array(shares).transpose(1, 2, 3, 0)
     rows = []
     for channel, name in enumerate(CHANNELS):
         for band, (low, high) in enumerate(zip(gusty[0].low, gusty[0].high, strict=True)):
-            spans = [_span(values[channel, band]) for values in told]
+            spans = [_span(values[channel, band]) for values in measured]
             rows.append([name, f"{low:g} to {high:g}", *spans, f"{np.mean([i[channel, band] for i in inside]):.2f}"])
     table("repeated_gaps", "axis | Hz | repeatable | truth of it | explained | in still air | inside", rows)
-    known = np.isfinite(told[2] + told[3])[MODELLED]
+    known = np.isfinite(measured[2] + measured[3])[MODELLED]
     print(f"\nshares within their intervals: {np.mean(inside):.3f} of {np.size(inside)}")
     print(f"explained within theirs: {np.sum(passed) / known.sum():.3f} of {known.sum()}")
     sure = np.array([one.sure for one in alone])

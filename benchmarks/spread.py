@@ -212,10 +212,10 @@ def simulated(count: int) -> None:
         training = gusty_flights(
             [Flight(truth, GUSTS, 0, run, reach=REACH_HZ, swing=SWING) for run in range(RUNS)], SECONDS
         )
-        told = found(unknown(truth), [replace(flight, setpoints={}) for flight in training])
+        result = found(unknown(truth), [replace(flight, setpoints={}) for flight in training])
         aside = [Flight(truth, GUSTS, 7, 100 + run, reach=REACH_HZ, swing=SWING) for run in range(HELD_OUT)]
         measured = np.stack([flight.motion.rate for flight in gusty_flights(aside, SECONDS)])
-        for kind, own in fleets(told, truth, count).items():
+        for kind, own in fleets(result, truth, count).items():
             flown = closed_loop(truth, own, aside[0])
             low, high = np.percentile(flown[~tumbled(flown)], ENDS, axis=0)
             wide = ", ".join(f"{value:.2g}" for value in (high - low).mean(axis=0))
@@ -239,13 +239,13 @@ def unknown(truth: Truth) -> VehicleSettings:
     return replace(vehicle, inertia_kg_m2=moments)
 
 
-def fleets(told: Found, truth: Truth, count: int) -> dict[str, Fleet]:
+def fleets(result: Found, truth: Truth, count: int) -> dict[str, Fleet]:
     """Make what is flown: the spread, and what it has to be better than."""
-    alone = replace(told.known, correlation=np.eye(len(told.known.numbers)))
-    by_itself = drawn(told.model, alone, count, np.random.default_rng(1))
+    alone = replace(result.known, correlation=np.eye(len(result.known.numbers)))
+    by_itself = drawn(result.model, alone, count, np.random.default_rng(1))
     true = VehicleModel(vehicle=truth.vehicle, gusts=true_gusts(truth))
-    return kinds_of(told, count) | {
-        "each number by itself": fleet(told.model, by_itself.models, told.known.lack),
+    return kinds_of(result, count) | {
+        "each number by itself": fleet(result.model, by_itself.models, result.known.lack),
         "the true vehicle, true gusts": fleet(true, [true] * count),
     }
 
@@ -323,15 +323,15 @@ def real(folder: Path, count: int) -> None:
     judged(found(VEHICLE, training), instruments(training), test, count)
 
 
-def judged(told: Found, given: Instruments, aside: Sequence[PlaybackFlight], count: int) -> None:
+def judged(result: Found, given: Instruments, aside: Sequence[PlaybackFlight], count: int) -> None:
     """Fly the spread, and what it has to be better than, along flights kept aside; print how often they hold them."""
-    law = law_of(told.model, given)
+    law = law_of(result.model, given)
     print(f"  law: {law}", file=sys.stderr)
-    kinds = kinds_of(told, count)
+    kinds = kinds_of(result, count)
     # Side by side, so that they are compiled once.
     columns = zip(*(own[2:] for own in kinds.values()), strict=True)
     whole = Fleet(*kinds["spread"][:2], *map(np.concatenate, columns))
-    fly = twins(told.model, whole, law, given.flown[0].motion.period)
+    fly = twins(result.model, whole, law, given.flown[0].motion.period)
     rows: dict[str, list[tuple[Array, ...]]] = {kind: [] for kind in kinds}
     for flight in aside:
         turned, measured = np.split(fly(flight), len(kinds)), flight.motion.rate[1:]
@@ -350,14 +350,14 @@ def judged(told: Found, given: Instruments, aside: Sequence[PlaybackFlight], cou
     table("spread_nano-drone", columns, listed)
 
 
-def kinds_of(told: Found, count: int) -> dict[str, Fleet]:
+def kinds_of(result: Found, count: int) -> dict[str, Fleet]:
     """Draw the spread, and leave out of it what it has more than others."""
-    models = drawn(told.model, told.known, count, np.random.default_rng(1)).models
+    models = drawn(result.model, result.known, count, np.random.default_rng(1)).models
     return {
-        "spread": fleet(told.model, models, told.known.lack),
-        "spread without what the model lacks": fleet(told.model, models),
-        "the estimate, in gusts": fleet(told.model, [told.model] * count),
-        "spread in still air, nothing lacking": fleet(told.model, models, still=True),
+        "spread": fleet(result.model, models, result.known.lack),
+        "spread without what the model lacks": fleet(result.model, models),
+        "the estimate, in gusts": fleet(result.model, [result.model] * count),
+        "spread in still air, nothing lacking": fleet(result.model, models, still=True),
     }
 
 

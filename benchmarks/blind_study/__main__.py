@@ -26,38 +26,38 @@ _QUICK_IN_GUSTS = {"single": 8, "none": 2, "outside": 4}
 
 def main():
     """Fly, judge or score a study, or all of it."""
-    told = _arguments()
-    size = _size(told, {})
-    if told.command == "fly":
+    options = _arguments()
+    size = _size(options, {})
+    if options.command == "fly":
         for own in sets(size):
-            fly([own], told.out)
-    if told.command == "judge":
-        judge_all(told.out, told.processes)
-    if told.command == "run":
-        run(sets(size), told.out, told.processes, told.keep)
-    if told.command == "quick":
-        _quick(told)
-    if told.command in ("run", "score", "quick"):
-        judged = scored(told.out)
+            fly([own], options.out)
+    if options.command == "judge":
+        judge_all(options.out, options.processes)
+    if options.command == "run":
+        run(sets(size), options.out, options.processes, options.keep)
+    if options.command == "quick":
+        _quick(options)
+    if options.command in ("run", "score", "quick"):
+        judged = scored(options.out)
         text = tables(judged, air_tables(judged))
-        (told.out / "tables.md").write_text(text, encoding="utf-8")
+        (options.out / "tables.md").write_text(text, encoding="utf-8")
         print(text)
 
 
-def _size(told, usual, **fixed):
-    each = usual if told.sets is None else dict.fromkeys(told.groups, told.sets)
+def _size(options, usual, **fixed):
+    each = usual if options.sets is None else dict.fromkeys(options.groups, options.sets)
     names = ("seed", "draws", "levels", "kinds", "groups", "none", "vehicles", "gusts", "instruments", "in_turn")
-    return Size(**{name: getattr(told, name) for name in names} | {"each": each} | fixed)
+    return Size(**{name: getattr(options, name) for name in names} | {"each": each} | fixed)
 
 
-def _quick(told):
+def _quick(options):
     """Judge a few cases of each group with the code as it is; their flights are flown once and kept."""
-    usual = dict.fromkeys(told.groups, 0) | _QUICK_IN_GUSTS if any(told.gusts) else _QUICK
-    chosen = sets(_size(told, usual, draws=2, levels=("mid",), kinds=("white",), none=None))
-    left = [own for own in chosen if not flown(own[0], told.out)]
+    usual = dict.fromkeys(options.groups, 0) | _QUICK_IN_GUSTS if any(options.gusts) else _QUICK
+    chosen = sets(_size(options, usual, draws=2, levels=("mid",), kinds=("white",), none=None))
+    left = [own for own in chosen if not flown(own[0], options.out)]
     for start in range(0, len(left), CASES_AT_ONCE):
-        fly(left[start : start + CASES_AT_ONCE], told.out)
-    judge_all(told.out, told.processes, [own[0].name for own in chosen])
+        fly(left[start : start + CASES_AT_ONCE], options.out)
+    judge_all(options.out, options.processes, [own[0].name for own in chosen])
 
 
 def _arguments():

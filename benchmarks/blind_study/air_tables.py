@@ -49,13 +49,13 @@ def air_by_channel(judged):
     """Write what was found of the gusts of a channel over what is there: medians, then the range."""
     rows = []
     for name, own in _airs(judged).items():
-        for channel, told in enumerate(_CHANNELS):
+        for channel, channel_name in enumerate(_CHANNELS):
             found = [one for one in _channels(own) if one[1] == channel]
             sized = [one for one in found if _is_sized(*one)]
             ratios = [[_ratio(*one, what, what) for one in sized] for what in ("size", "memory")]
             cells = (f"{np.median(each):.2f}, {min(each):.2f} to {max(each):.2f}" for each in ratios if each)
-            rows += [(name, told, f"{len(sized)} of {len(found)}", *cells)] if sized else []
-    return table("air | channel | told how large | size, found over true | memory, found over true", rows)
+            rows += [(name, channel_name, f"{len(sized)} of {len(found)}", *cells)] if sized else []
+    return table("air | channel | size identified | size, found over true | memory, found over true", rows)
 
 
 def _airs(judged):
@@ -68,21 +68,21 @@ def _channels(own):
     return [(each, channel) for each in own if each.key.get("gusts") for channel in range(len(_CHANNELS))]
 
 
-def _is_told(each, channel):
-    return bool(each.said.get("air")) and each.said["air"]["told"][channel]
+def _is_gusts_only(each, channel):
+    return bool(each.said.get("air")) and each.said["air"]["gusts_only"][channel]
 
 
 def _is_sized(each, channel):
     return bool(each.said.get("air")) and each.said["air"]["size"][channel] is not None
 
 
-def _told_in_vain(own):
+def _gusts_where_none_are(own):
     still = [each for each in own if not each.key.get("gusts") and "gust_turbulence" not in each.key["hidden"]]
-    return [_is_told(each, channel) for each in still for channel in range(len(_CHANNELS))]
+    return [_is_gusts_only(each, channel) for each in still for channel in range(len(_CHANNELS))]
 
 
 def _ratio(each, channel, said, what):
-    """Give a number over the true one; what is told with no bound is infinite."""
+    """Give a number over the true one; what has no bound is infinite."""
     found = each.said["air"][said][channel]
     return np.inf if found is None else found / each.key["air"][what][channel]
 
@@ -110,13 +110,13 @@ _MEASURES = (
     ("two or three effects: all named", "92 %", lambda own: [e.outcome == RIGHT for e in several(own)]),
     ("95 % intervals that hold the hidden value", "90 to 98 %",
      lambda own: [number.inside for number in coefficients_of(own) if exact(number)]),
-    ("channels in gusts: told to be all that is left", "", lambda own: [_is_told(*one) for one in _channels(own)]),
-    ("channels in gusts: told how large", "", lambda own: [_is_sized(*one) for one in _channels(own)]),
+    ("channels in gusts: residual is gusts alone", "", lambda own: [_is_gusts_only(*one) for one in _channels(own)]),
+    ("channels in gusts: size identified", "", lambda own: [_is_sized(*one) for one in _channels(own)]),
     (f"of these: size within {100 * _SIZE:.0f} %", "all", lambda own: _near(own, "size", 1 - _SIZE, 1 + _SIZE)),
     (f"of these: memory within a factor of {_MEMORY:.0f}", "all",
      lambda own: _near(own, "memory", 1 / _MEMORY, _MEMORY)),
     ("of these: size in its interval", "90 to 98 %", lambda own: _within(own, "size", "")),
     ("of these: memory in its interval", "90 to 98 %", lambda own: _within(own, "memory", "memory_")),
-    ("channels without gusts: told to be all that is left", "0", _told_in_vain),
+    ("channels without gusts: residual is gusts alone", "0", _gusts_where_none_are),
 )  # fmt: skip
 """Name, target, and what gives the flags of sets in one air."""

@@ -42,31 +42,31 @@ def flown(each, folder):
     key = Path(folder) / "keys" / each.name / "key.json"
     if not key.exists() or not (Path(folder) / "flights" / each.name / "study.yaml").exists():
         return False
-    told, wanted = json.loads(key.read_text(encoding="ascii")), json.loads(json.dumps(each.case.key()))
-    return all(told.get(name) == value for name, value in wanted.items())
+    stated, wanted = json.loads(key.read_text(encoding="ascii")), json.loads(json.dumps(each.case.key()))
+    return all(stated.get(name) == value for name, value in wanted.items())
 
 
 def config(vehicle_file, asked=()):
     """Describe a vehicle and the columns of its logs as YAML, what was asked of it among them."""
-    told = json.loads(vehicle_file.read_text(encoding="utf-8"))
+    stated = json.loads(vehicle_file.read_text(encoding="utf-8"))
     factors = {
-        "drag_factor_n_m_s2": told["torque_factor"],
-        "radius_m": told["rotor_radius"],
+        "drag_factor_n_m_s2": stated["torque_factor"],
+        "radius_m": stated["rotor_radius"],
     }
-    hover = (told["mass"] * told["gravity"] / sum(told["thrust_factors"])) ** 0.5
+    hover = (stated["mass"] * stated["gravity"] / sum(stated["thrust_factors"])) ** 0.5
     vehicle = {
-        "gravity_m_s2": told["gravity"],
-        "mass_kg": told["mass"],
-        "inertia_kg_m2": told["inertia"],
+        "gravity_m_s2": stated["gravity"],
+        "mass_kg": stated["mass"],
+        "inertia_kg_m2": stated["inertia"],
         "rotor_speed_max_rad_s": round(3 * hover),
         "rotors": [
             {"position_m": place, "spin": spin, "thrust_factor_n_s2": thrust, **factors}
-            for place, spin, thrust in zip(told["rotors"], told["spin"], told["thrust_factors"], strict=True)
+            for place, spin, thrust in zip(stated["rotors"], stated["spin"], stated["thrust_factors"], strict=True)
         ],
     }
     logged = yaml.safe_load(_COLUMNS_OF.read_text(encoding="utf-8"))["import"]
     for signal, prefix in (("rotor_speed", "om"), ("rotor_command", "omcmd")):
-        logged["signals"][signal]["columns"] = [f"{prefix}{number + 1}" for number in range(len(told["spin"]))]
+        logged["signals"][signal]["columns"] = [f"{prefix}{number + 1}" for number in range(len(stated["spin"]))]
     for name in asked:
         columns, unit = ASKED[name]
         logged["signals"][name] = {"columns": list(columns), "unit": unit}

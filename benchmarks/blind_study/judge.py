@@ -18,10 +18,10 @@ def judge(folder):
     folder = Path(folder)
     started = time.monotonic()
     try:
-        told = _judged(folder)
+        answer = _judged(folder)
     except CpflsError as error:
-        told = {"verdict": "ERROR", "error": str(error), "effects": []}
-    return {"set": folder.name, **plain(told), "seconds": round(time.monotonic() - started, 2)}
+        answer = {"verdict": "ERROR", "error": str(error), "effects": []}
+    return {"set": folder.name, **plain(answer), "seconds": round(time.monotonic() - started, 2)}
 
 
 def _judged(folder):
@@ -51,7 +51,7 @@ def _judged(folder):
 def _air(air):
     """Tell gusts by channel, N m, N and s, and of which channels they are all that is left."""
     names = ("size", "low", "high", "memory", "memory_low", "memory_high")
-    return {"told": air.gusts_only.tolist()} | {name: getattr(air.found, name).tolist() for name in names}
+    return {"gusts_only": air.gusts_only.tolist()} | {name: getattr(air.found, name).tolist() for name in names}
 
 
 def _effect(effect):

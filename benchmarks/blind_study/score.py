@@ -90,8 +90,8 @@ class Scored:
 
     def _says_what_to_log(self):
         """Tell whether a signal that the log lacks is named where the rivals are."""
-        told = [rival["separated_by"] for rival in self.said["alternatives"] if rival["name"] in self.truth]
-        text = " ".join(told)
+        separated = [rival["separated_by"] for rival in self.said["alternatives"] if rival["name"] in self.truth]
+        text = " ".join(separated)
         return any(signal in text for signal, columns in LACKING.items() if {*columns} <= {*self.key["left_out"]})
 
     @property
@@ -120,8 +120,8 @@ class Scored:
     @property
     def noise(self):
         """Size and kind of the noise, and the air unless it is still."""
-        told = f"{self.key['level']} {self.key['kind']}"
-        return told if self.usual else f"{told}, {self.air}"
+        noise = f"{self.key['level']} {self.key['kind']}"
+        return noise if self.usual else f"{noise}, {self.air}"
 
     @property
     def over_air(self):

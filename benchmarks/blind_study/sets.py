@@ -55,10 +55,10 @@ class Set:
     @property
     def name(self):
         """Name of its folder, from which nobody can guess what is hidden."""
-        told = f"{self.seed} {self.case.name} {self.level} {self.kind}"
+        described = f"{self.seed} {self.case.name} {self.level} {self.kind}"
         if not self.case.usual:
-            told += f" {self.case.gusts} {self.case.instruments}"
-        return hashlib.sha256(told.encode()).hexdigest()[:16]
+            described += f" {self.case.gusts} {self.case.instruments}"
+        return hashlib.sha256(described.encode()).hexdigest()[:16]
 
     def generator(self):
         """Give the random numbers of its noise."""

@@ -84,7 +84,7 @@ def totals(judged):
         ("nothing hidden: a gap without a name", percent(each.outcome == score.REFUSED for each in none), ""),
         ("outside the catalogue: NAMED", percent(each.verdict == "NAMED" for each in outside), "at most 2 %"),
         ("two or three effects: all named", _right(several(judged)), "92 %"),
-        *((told, percent(each.good for each in of(judged, group)), "all") for group, told in _AS_ASKED.items()),
+        *((label, percent(each.good for each in of(judged, group)), "all") for group, label in _AS_ASKED.items()),
         ("any group: numbers at bounds or effects that cancel", percent(each.unphysical for each in judged), "0"),
         ("coefficients within 5 % at mid noise", percent(close), "all"),
         ("95 % intervals that hold the hidden value", percent(number.inside for number in known), "90 to 98 %"),
@@ -224,8 +224,8 @@ def _coefficients(judged):
     for (effect, name), own in sorted(grouped(coefficients_of(judged), lambda n: (n.effect, n.name)).items()):
         errors = {level: [n.error for n in own if n.level == level] for level in _LEVELS}
         close = percent(abs(error) <= _CLOSE for error in errors["mid"])
-        told = effect if exact(own[0]) else f"{effect} (another form)"
-        rows.append((told, name, *map(_spread, errors.values()), close, percent(n.inside for n in own)))
+        label = effect if exact(own[0]) else f"{effect} (another form)"
+        rows.append((label, name, *map(_spread, errors.values()), close, percent(n.inside for n in own)))
     heads = " | ".join(f"{level}: median, largest error" for level in _LEVELS)
     return table(f"effect | coefficient | {heads} | within 5 % at mid | in the interval", rows)
 
@@ -263,8 +263,8 @@ def _likely(judged):
     rows = []
     for low, high in pairwise(_LIKELY if pairs else ()):
         own = [(likely, true) for likely, true in pairs if low <= likely < high]
-        told = f"{sum(likely for likely, _ in own):.1f}"
-        rows.append((f"{low:.0%} to {min(high, 1):.0%}", len(own), told, sum(true for _, true in own)))
+        label = f"{sum(likely for likely, _ in own):.1f}"
+        rows.append((f"{low:.0%} to {min(high, 1):.0%}", len(own), label, sum(true for _, true in own)))
     return table("said to be likely | sets | of them right, as said | right", rows)
 
 
@@ -282,5 +282,5 @@ def _miss(each):
     gap, hidden = "", ""
     if "gap_before" in each.said:
         gap, hidden = f"{each.floors('before'):.2f} -> {each.floors('after'):.2f}", f"{each.visible:.2f}"
-    told = each.said.get("error", named)
-    return each.key["set"], each.key["case"], each.noise, each.outcome, each.verdict, told, rivals, hidden, gap
+    label = each.said.get("error", named)
+    return each.key["set"], each.key["case"], each.noise, each.outcome, each.verdict, label, rivals, hidden, gap

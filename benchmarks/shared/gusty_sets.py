@@ -79,10 +79,10 @@ def found_moments(vehicle: VehicleSettings, kind: str, flights: list[PlaybackFli
 def cells_of_moments(vehicle: VehicleSettings, kind: str, sets: Sequence[list[PlaybackFlight]]) -> list[str]:
     """Summarise the moments of several sets in the columns of `MOMENTS`."""
     found = [found_moments(vehicle, kind, flights) for flights in sets]
-    ratio, half, told = (np.array([each[part] for each in found]) for part in range(3))
+    ratio, half, identified = (np.array([each[part] for each in found]) for part in range(3))
     return [
-        *(mean_and_ends(ratio[told[:, axis], axis]) for axis in range(2)),
-        f"{100 * np.median(half[told]):.1f}" if told.any() else "—",
-        count((np.abs(np.log(ratio)) <= half)[told]),
-        count(told),
+        *(mean_and_ends(ratio[identified[:, axis], axis]) for axis in range(2)),
+        f"{100 * np.median(half[identified]):.1f}" if identified.any() else "—",
+        count((np.abs(np.log(ratio)) <= half)[identified]),
+        count(identified),
     ]

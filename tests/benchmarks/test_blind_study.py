@@ -233,12 +233,12 @@ def test_numbers_that_nobody_believes_are_counted(effects, unphysical):
 def in_gusts(group, level, verdict="UNEXPLAINED", **air):
     """Judge a set that has gusts of size 2 N m and memory 0.5 s in all channels, or none."""
     found = {"size": 2.2, "low": 1.8, "high": 2.5, "memory": 1.1, "memory_low": 0.4, "memory_high": None} | air
-    told = {"told": [True, *[False] * 5]} | {name: [value, *[None] * 5] for name, value in found.items()}
+    air = {"gusts_only": [True, *[False] * 5]} | {name: [value, *[None] * 5] for name, value in found.items()}
     key = {"group": group, "gusts": level, "instruments": "setpoints", "level": "mid", "kind": "white"}
     key["air"] = {"size": [2.0] * 6, "memory": [0.5] * 6} if level else {}
     by_flight = {"held_out_1": [1.0, 0.1, 0.1]}
     key |= {"averaged_n_m": by_flight, "gusts_averaged_n_m": {"held_out_1": [0.9] * 3}} if level else {}
-    return answered(said(verdict) | {"air": told}, **key)
+    return answered(said(verdict) | {"air": air}, **key)
 
 
 def test_what_was_said_in_gusts_is_counted_by_air():
@@ -246,12 +246,12 @@ def test_what_was_said_in_gusts_is_counted_by_air():
     rows = {row.split(" | ")[0].strip("| "): row.split(" | ")[1:] for row in text.splitlines()}
     assert rows[""][:2] == ["gusts 0, setpoints", "gusts 1, setpoints"]
     assert rows["one effect above the air's share: exactly right"][1] == "0 of 1 (0.0 %)"
-    assert rows["channels in gusts: told to be all that is left"][1] == "2 of 12 (16.7 %)"
-    assert rows["channels in gusts: told how large"][1] == "2 of 12 (16.7 %)"
+    assert rows["channels in gusts: residual is gusts alone"][1] == "2 of 12 (16.7 %)"
+    assert rows["channels in gusts: size identified"][1] == "2 of 12 (16.7 %)"
     assert rows["of these: size within 30 %"][1] == "2 of 2 (100.0 %)"
     assert rows["of these: memory within a factor of 2"][1] == "0 of 2 (0.0 %)"
     assert rows["of these: size in its interval"][1] == "1 of 2 (50.0 %)"
     assert rows["of these: memory in its interval"][1] == "2 of 2 (100.0 %)"
-    assert rows["channels without gusts: told to be all that is left"][0] == "1 of 6 (16.7 %)"
+    assert rows["channels without gusts: residual is gusts alone"][0] == "1 of 6 (16.7 %)"
     assert "| torque x | 2 of 2 | 1.10, 1.10 to 1.10 |" in air_by_channel([in_gusts("none", 1), in_gusts("none", 1)])
     assert not air_totals([answered(said("NO_GAP"))])
