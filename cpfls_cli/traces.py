@@ -7,13 +7,14 @@ import json
 import zlib
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from markupsafe import escape
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import visible
+from cpfls_cli.look.timeline import Event
 from cpfls_cli.page import TEMPLATES
 from cpfls_cli.report.canvas import BASELINE, Drawn, legend_above, stacked, style_of
 from cpfls_cli.trace import Track, thinned
@@ -36,31 +37,7 @@ _WIDE, _PANEL = 10.0, 1.5
 _SEVERITIES = ("note", "warning", "danger")
 
 
-class Happening(Protocol):
-    """Something that happens in a log, such as `look.timeline.Event`."""
-
-    @property
-    def time_s(self) -> float:
-        """When it begins."""
-        ...
-
-    @property
-    def until_s(self) -> float:
-        """When it ends; NaN of a moment."""
-        ...
-
-    @property
-    def text(self) -> str:
-        """What happens."""
-        ...
-
-    @property
-    def severity(self) -> str:
-        """A ``note``, a ``warning`` or a ``danger``."""
-        ...
-
-
-def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Happening] = ()) -> str:
+def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Event] = ()) -> str:
     """Show signals in panels over one axis of time, with a marker for each event.
 
     Parameters
@@ -143,7 +120,7 @@ def _deflated(whole: np.ndarray[Any, Any]) -> str:
     return base64.b64encode(zlib.compress(planes.tobytes(), 6)).decode()
 
 
-def _event(own: Happening) -> str:
+def _event(own: Event) -> str:
     until = own.until_s if np.isfinite(own.until_s) else own.time_s
     severity = own.severity if own.severity in _SEVERITIES else _SEVERITIES[0]
     words = escape(visible(own.text))
@@ -151,7 +128,7 @@ def _event(own: Happening) -> str:
 
 
 def _still(
-    panels: Mapping[str, Sequence[Track]], ends: tuple[float, float], events: Sequence[Happening], figure: Figure
+    panels: Mapping[str, Sequence[Track]], ends: tuple[float, float], events: Sequence[Event], figure: Figure
 ) -> None:
     """Draw all panels for print and for who runs no scripts."""
     rows = stacked(figure, len(panels))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from cpfls_cli.artifacts.gate import InputFile, Origin, format_name, read_origin
 from cpfls_cli.artifacts.output import check_output
@@ -88,26 +88,7 @@ def check_outputs(job: Job, *paths: Path, replaceable: bool = False) -> None:
         check_output(path, job.force or replaceable, job.inputs)
 
 
-class Taking(Protocol):
-    """What takes note of the files that it reads."""
-
-    @property
-    def reads(self) -> Callable[[Path], None]:
-        """Takes note of every input file."""
-        ...
-
-    @property
-    def inputs(self) -> list[Path]:
-        """What was taken so far."""
-        ...
-
-    @property
-    def cautions(self) -> dict[str, None]:
-        """What speaks against what the inputs hold."""
-        ...
-
-
-def take_inputs(job: Taking, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
+def take_inputs(job: Any, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
     """Check inputs, and take note of what they hold."""
     for path in inputs.values():
         _check_input(path)

@@ -28,34 +28,24 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class _Words(dict[str, Any]):
-    """Words by name; templates are kept by what they know, so that it has to have a hash."""
-
-    __hash__ = object.__hash__  # type: ignore[assignment]
-
-
-WHO = _Words(
-    {
-        MODEL: "the model",
-        AFTER: "with the effects",
-        NOTHING_MOVES: "nothing moves",
-        RATE_STAYS: "rate stays",
-        RATE_FADES: "rate fades",
-        STATED: "stated vehicle",
-        BEFORE: "as given",
-        WITH_PAST: "with the past",
-    }
-)
+WHO: Mapping[str, str] = {
+    MODEL: "the model",
+    AFTER: "with the effects",
+    NOTHING_MOVES: "nothing moves",
+    RATE_STAYS: "rate stays",
+    RATE_FADES: "rate fades",
+    STATED: "stated vehicle",
+    BEFORE: "as given",
+    WITH_PAST: "with the past",
+}
 """What is said of predictions, in the order in which they are shown."""
 
-SIGNALS = _Words(
-    {
-        "body_rate": ("body rate", "rad/s", 1.0),
-        "attitude": ("attitude", "°", 180.0 / np.pi),
-        "velocity": ("velocity", "m/s", 1.0),
-        "position": ("position", "m", 1.0),
-    }
-)
+SIGNALS: Mapping[str, tuple[str, str, float]] = {
+    "body_rate": ("body rate", "rad/s", 1.0),
+    "attitude": ("attitude", "°", 180.0 / np.pi),
+    "velocity": ("velocity", "m/s", 1.0),
+    "position": ("position", "m", 1.0),
+}
 """Of each signal its name, the unit that people read, and by what errors in SI are multiplied for it."""
 
 _JUDGED: dict[str, Any] = {**style_of(0), "linewidth": 2.0, "zorder": 3}

@@ -18,6 +18,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.simulators.document import Node, Stated, read_xml
 from cpfls_cli.simulators.model import (
     ENTRIES,
@@ -27,7 +28,6 @@ from cpfls_cli.simulators.model import (
     of_quaternion,
     part_of,
     pose,
-    rotated,
     turning,
     unit,
 )
@@ -165,7 +165,7 @@ def _pose(node: Node | None) -> Array:
         return pose(of_quaternion(unit(node, "its quaternion", [turn[3], *turn[:3]])), (x, y, z))
     x, y, z, *rpy = (each.value for each in node.numbers(count=6))
     degrees = node.attributes.get("degrees", "false") in ("true", "1")
-    return pose(rotated([angle * (np.pi / 180 if degrees else 1.0) for angle in rpy]), (x, y, z))
+    return pose(rotation_matrix(np.array([rpy]) * (np.pi / 180 if degrees else 1.0))[0], (x, y, z))
 
 
 def _model_of(root: Node) -> Node:
