@@ -22,7 +22,7 @@ from cpfls_cli.export.mcap_form import TIME, View, csv_text, mcap_bytes
 from cpfls_cli.export.registry import FORMS, exported
 from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.viewed import view_of
-from cpfls_cli.result import about, part, plain, result
+from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.stages._sheets import sheet_of
 
@@ -72,49 +72,6 @@ _IMPORTED = ("casadi", "jax", "numpy", "pegasus", "rotorpy")
 
 
 @result
-class Model:
-    """A model in another form."""
-
-    name: str = about("prefix of its names")
-    complete: bool = about("whether its search came to its end")
-    verdict: str | None = about("on the model, in a word")
-    cautions: tuple[str, ...] = about("what speaks against it", "caution")
-    impossible: str | None = about("its numbers that no vehicle has")
-    rotors: int = about("count of them")
-    weights: int = about("numbers of torque and force that are not zero")
-    effects: tuple[str, ...] = about("that it holds", "effect")
-    learned: bool = about("whether a part of it has no name")
-    parameters: int | None = about("of an identified model")
-    fuzzy: bool = about("whether its inertia depends on the attitude")
-    rigid_body: bool = about("whether it has an inertia")
-    region_share: float | None = about("share of the attitudes that training visited")
-    said: tuple[str, ...] = about("what it is, and what the form does not hold", "sentence", brief=False)
-    warnings: tuple[str, ...] = about("what speaks against using it", "warning", brief=False)
-
-
-@result
-class Track:
-    """A quantity over time."""
-
-    name: str = about("with its flight")
-    unit: str = about("of its values")
-    frame: str = about("of its components")
-    samples: int = about("count of them")
-    first_s: float = about("time of the first", unit="s")
-    values: tuple[str, ...] = about("measured, of a model, ...", "value")
-    axes: tuple[str, ...] = about("names of its components", "component")
-
-
-@result
-class Viewed:
-    """What programs draw of an artifact."""
-
-    on_log_clock: bool = about("whether times are those of the log")
-    tracks: tuple[Track, ...] = part()
-    curves: tuple[str, ...] = about("over something else than time", "curve")
-
-
-@result
 class Written:
     """Files for other programs."""
 
@@ -123,7 +80,8 @@ class Written:
     output: tuple[str, ...] = about("their names", "file")
     bytes: int = about("in all of them")
     sizes: Mapping[str, int] = about("bytes of each", brief=False)
-    model: Model | None = part(default=None, brief=False)
+    said: tuple[str, ...] = about("what a model is, and what the form does not hold", "sentence", brief=False)
+    warnings: tuple[str, ...] = about("what speaks against using it", "warning", brief=False)
     view: View | None = None
 
 
@@ -152,25 +110,23 @@ def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: boo
     made = exported(sheet, form, run.output.name)
     run.texts |= zip(outputs, made.texts.values(), strict=True)
     identified = sheet.identified
-    found = Model(
-        name=sheet.name,
-        complete=sheet.complete,
-        verdict=sheet.verdict,
-        cautions=sheet.cautions,
-        impossible=sheet.impossible or None,
-        rotors=sheet.model.rotors,
-        weights=len(sheet.numbers),
-        effects=tuple(effect.name for effect in sheet.model.effects),
-        learned=sheet.model.remainder is not None,
-        parameters=None if identified is None else identified.structure.parameters,
-        fuzzy=sheet.rules is not None,
-        rigid_body=bool(sheet.rigid_body.any()),
-        region_share=None if identified is None else float(np.mean(identified.visited)),
-        said=(*sheet.remarks, *made.remarks),
-        warnings=sheet.warnings,
-    )
-    run.also = plain(found) | {"missing": [asdict(each) for each in made.missing]}
-    return _written(run, form, model=found)
+    run.also = {
+        "name": sheet.name,
+        "complete": sheet.complete,
+        "verdict": sheet.verdict,
+        "cautions": sheet.cautions,
+        "impossible": sheet.impossible or None,
+        "rotors": sheet.model.rotors,
+        "weights": len(sheet.numbers),
+        "effects": [effect.name for effect in sheet.model.effects],
+        "learned": sheet.model.remainder is not None,
+        "parameters": None if identified is None else identified.structure.parameters,
+        "fuzzy": sheet.rules is not None,
+        "rigid_body": bool(sheet.rigid_body.any()),
+        "region_share": None if identified is None else float(np.mean(identified.visited)),
+        "missing": [asdict(each) for each in made.missing],
+    }
+    return _written(run, form, (*sheet.remarks, *made.remarks), sheet.warnings)
 
 
 def _drawn(run: Run, artifact: Path, form: str) -> Written:
@@ -179,24 +135,25 @@ def _drawn(run: Run, artifact: Path, form: str) -> Written:
     given, origin = store.read(artifact, kind_of(artifact))
     view = view_of(artifact, given, origin.config)
     run.texts[run.output] = mcap_bytes(view) if form == "mcap" else csv_text(view)
-    tracks = (
-        Track(
-            name=each.path,
-            unit=each.unit,
-            frame=each.frame,
-            samples=len(each.time),
-            first_s=float(np.min(each.time, initial=np.inf)),
-            values=tuple(each.values),
-            axes=each.axes,
-        )
+    tracks = [
+        {
+            "name": each.path,
+            "unit": each.unit,
+            "frame": each.frame,
+            "samples": len(each.time),
+            "first_s": float(np.min(each.time, initial=np.inf)),
+            "values": list(each.values),
+            "axes": each.axes,
+        }
         for each in view.tracks
-    )
-    curves = tuple(curve.name for curve in view.curves)
-    run.also = plain(Viewed(on_log_clock=view.on_log_clock, tracks=tuple(tracks), curves=curves))
+    ]
+    run.also = {"on_log_clock": view.on_log_clock, "tracks": tracks, "curves": [curve.name for curve in view.curves]}
     return _written(run, form, view=view)
 
 
-def _written(run: Run, form: str, model: Model | None = None, view: View | None = None) -> Written:
+def _written(
+    run: Run, form: str, said: tuple[str, ...] = (), warnings: tuple[str, ...] = (), view: View | None = None
+) -> Written:
     sizes = {str(path): len(each if isinstance(each, bytes) else each.encode()) for path, each in run.texts.items()}
     return Written(
         dry_run=run.dry_run,
@@ -204,7 +161,8 @@ def _written(run: Run, form: str, model: Model | None = None, view: View | None 
         output=tuple(sizes),
         bytes=sum(sizes.values()),
         sizes=sizes,
-        model=model,
+        said=said,
+        warnings=warnings,
         view=view,
     )
 
