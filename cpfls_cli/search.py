@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -146,33 +146,18 @@ class StoppedSearch:
     unfinished: Unfinished
 
 
-class Written(NamedTuple):
-    """The output of a command that was stopped, or was not: whether it is complete, and where it comes from."""
-
-    complete: bool
-    origin: Origin
-
-
-def _same_origin(one: Origin, other: Origin) -> bool:
-    """Tell whether two outputs come from the same config and inputs."""
-    names = ("version", "seed", "config", "inputs", "cautions")
-    return all(getattr(one, name) == getattr(other, name) for name in names)
-
-
 @dataclass(frozen=True)
 class KeptFile:
     """A file next to the output from which a stopped command can go on; `origin` is of the command run now."""
 
     path: Path
     header: Origin
-    WORK: ClassVar[str]
-    SUFFIX: ClassVar[str]
     OUTPUT: ClassVar[type[IdentifiedModel | Vehicle]]
 
     @classmethod
     def beside(cls, output: Path, header: Origin) -> Self:
         """Name what is left of an output, such as ``model.h5.checkpoint`` of ``model.h5``."""
-        return cls(output.with_name(f"{output.name}{cls.SUFFIX}"), header)
+        return cls(output.with_name(f"{output.name}.checkpoint"), header)
 
     @property
     def output(self) -> Path:
@@ -181,25 +166,22 @@ class KeptFile:
 
     def require_permission(self, *, force: bool) -> None:
         """Refuse to give up what is left, unless that is allowed, and what is not left by this program in any case."""
-        self.require_own()
-        if self.path.exists() and not force:
+        if not self.path.exists():
+            return
+        if not (self.path.is_file() and is_hdf5(self.path)):
             raise InputError(
-                f"{self.path}: a {self.WORK} for {self.output} was stopped here; --resume continues it, --force "
-                "starts again"
+                f"{self.path}: has the name of what a stopped search leaves, but is none; move it away, or name "
+                "another output"
             )
-
-    def require_own(self) -> None:
-        """Refuse a file of the user that happens to have the name of what is left."""
-        if self.path.exists() and not (self.path.is_file() and is_hdf5(self.path)):
+        if not force:
             raise InputError(
-                f"{self.path}: has the name of what a stopped {self.WORK} leaves, but is none; move it away, or "
-                "name another output"
+                f"{self.path}: a search for {self.output} was stopped here; --resume continues it, --force starts again"
             )
 
     def output_may_be_replaced(self) -> bool:
         """Tell whether the output is what the stopped command left: incomplete, or complete and not tidied up."""
-        written = self._written()
-        return written is not None and (not written.complete or _same_origin(written.origin, self.header))
+        complete, origin = self._written() or (True, None)
+        return origin is not None and (not complete or replace(origin, stage=self.header.stage) == self.header)
 
     def remove(self) -> None:
         """Remove what is left, if there is anything."""
@@ -218,8 +200,7 @@ class KeptFile:
     def _read(self, wanted: type[T]) -> tuple[T, Origin]:
         """Read what is left."""
         if not self.path.exists():
-            written = self._written()
-            if written is not None and written.complete:
+            if (self._written() or (False,))[0]:
                 raise InputError(f"{self.output}: is complete; nothing to resume")
             raise InputError(f"{self.path}: no such file, so nothing to resume; start without --resume")
         try:
@@ -235,19 +216,19 @@ class KeptFile:
         except (ValueError, LookupError, TypeError) as error:
             raise InputError(f"{self.path}: damaged: {error}; {_START_AGAIN}") from None
 
-    def _written(self) -> Written | None:
-        """Read the output; None where there is none, or another file."""
+    def _written(self) -> tuple[bool, Origin] | None:
+        """Tell whether the output is complete, and where it comes from; None where there is none, or another file."""
         if not self.output.is_file() or format_name(self.output) != self.OUTPUT.FORMAT:
             return None
         given, origin = read(self.output, self.OUTPUT)
-        return Written(given.complete, origin)
+        return given.complete, origin
 
     def _require_same(self, differing: Iterable[str]) -> None:
         """Refuse what is left of another command."""
         listed = "; ".join(differing)
         if listed:
             raise InputError(
-                f"{self.path}: belongs to another {self.WORK}: {listed}. Repeat the original command with --resume, or "
+                f"{self.path}: belongs to another search: {listed}. Repeat the original command with --resume, or "
                 "start again with --force alone"
             )
 
@@ -256,8 +237,6 @@ class KeptFile:
 class Checkpoint(KeptFile):
     """Where a search leaves its state after every generation."""
 
-    WORK: ClassVar = "search"
-    SUFFIX: ClassVar = ".checkpoint"
     OUTPUT: ClassVar = IdentifiedModel
 
     def write(self, state: EvolutionState) -> None:
@@ -432,10 +411,6 @@ class Resumable:
             should_stop=watch.should_stop,
         )
 
-    def kept(self) -> AbstractContextManager[None]:
-        """Add to whatever fails inside that the search can go on nevertheless."""
-        return self.checkpoint.kept()
-
     def end(self, reason: StopReason) -> None:
         """Remove the checkpoint of a search that came to its end, after what it found is written."""
         if is_end(reason):
@@ -518,8 +493,6 @@ class KeptStructures:
 class VehicleCheckpoint(KeptFile):
     """Where a search for the structure of a vehicle leaves what it has judged."""
 
-    WORK: ClassVar = "search"
-    SUFFIX: ClassVar = ".checkpoint"
     OUTPUT: ClassVar = Vehicle
 
     def write(self, judged: Sequence[Judged]) -> None:

@@ -91,11 +91,6 @@ class AnyModel:
         return ()
 
     @property
-    def chosen_on(self) -> frozenset[str]:
-        """Hashes of the flights that it was chosen on, among several."""
-        return frozenset()
-
-    @property
     def trust(self) -> str:
         """How far to trust it, a word of `Trust`; of a file by a newer program possibly another."""
         return Trust.NOT_JUDGED

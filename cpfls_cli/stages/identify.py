@@ -29,7 +29,7 @@ from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.flights.training import (
-    TrainingData,
+    SplitFlights,
     check_file,
     choosing_source,
     flight_roles,
@@ -90,7 +90,7 @@ def identify(
     if run.dry_run:
         return None
     clock, watch = time.perf_counter(), Watch(run, time_limit)
-    run.until_written.enter_context(search.kept())
+    run.until_written.enter_context(search.checkpoint.kept())
     found = _identified(run, flights, data, held_out, kept, search.run(options, watch, _shown(run)))
     if isinstance(found, NothingFoundError):
         search.end(found.stop_reason)
@@ -129,7 +129,7 @@ def _contradictions(flights: Sequence[Path], study: Study) -> tuple[str, ...]:
 def _identified(
     job: Run,
     flights: Sequence[Path],
-    data: TrainingData,
+    data: SplitFlights,
     held_out: dict[str, TorqueSource],
     kept: TorqueSource | None,
     search: SearchRun,
@@ -155,7 +155,7 @@ def _identified(
         raise _of(flights, error) from None
 
 
-def _with_length(result: Identification, flights: Sequence[Path], data: TrainingData) -> Identification:
+def _with_length(result: Identification, flights: Sequence[Path], data: SplitFlights) -> Identification:
     """Add a warning of short flights, where all were recorded: a planned one may be exact."""
     if not all("log" in read_origin(path).inputs for path in flights):
         return result
@@ -184,7 +184,7 @@ def _note(step: SearchStep) -> str:
 def _evidence(
     job: Run,
     result: Identification,
-    data: TrainingData,
+    data: SplitFlights,
     held_out: Mapping[str, TorqueSource],
     wrong: Sequence[str],
     signal: int | None,
