@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from cpfls_cli.playback.gusts import GustAxis
-from cpfls_cli.report.content import Text, number
+from cpfls_cli.report.content import number
 from cpfls_cli.words import joined
 
-
-def still_air_text() -> Text:
-    """Say of a flight that the gusts which its model holds were not played."""
-    return Text("flown in still air; the model holds the gusts of its flights: --gusts plays them")
+STILL_AIR = "flown in still air; the model holds the gusts of its flights: --gusts plays them"
+"""Of a flight in which the gusts that its model holds were not played."""
 
 
 def gust_words(axes: list[GustAxis], instrument_kind: str) -> str:

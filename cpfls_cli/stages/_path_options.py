@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
 from math import radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -115,22 +114,39 @@ def option_overrides(
     box: str | None,
     height: float | None,
     duration: float | None,
+    hover: float | None,
+    repeat: int | None,
+    excite: str | None,
+    signal: Signal | None,
+    band: str | None,
+    size: float | None,
+    **_: Any,
 ) -> list[str]:
-    """Write the options as overrides of the config, so that the artifact's config has them too."""
+    """Write the options as overrides of the config, ``section.key=value`` each, so that the file's config has them."""
     settles = to_tell is not None or diagnosis is not None
     if settles and waypoints is not None:
         raise InputError(f"--waypoints {waypoints}: --to-tell and --for choose the path themselves; leave it out")
-    next_flight = {
-        "to_tell": None if to_tell is None else f"[{to_tell}]",
-        "box_m": None if box is None else f"[{box}]",
-        "height_m": None if height is None else repr(float(height)),
+    others = {
+        f"--waypoints {waypoints}": waypoints is not None,
+        "--to-tell and --for": settles,
+        f"--duration {duration or 0:g}": duration is not None,
     }
-    path = "next-flight" if settles else "waypoints" if waypoints is not None else None
-    return [
-        *([] if path is None else [f"trajectory.path={path}"]),
-        *(f"trajectory.next_flight.{key}={value}" for key, value in next_flight.items() if value is not None),
-        *([] if duration is None else [f"trajectory.duration_s={float(duration)!r}"]),
-    ]
+    for other, given in others.items():
+        if given and hover is not None:
+            raise InputError(f"--hover {hover:g}: stays at one place for so long; leave out {other}")
+    length = duration if hover is None else hover
+    paths = {"next-flight": settles, "waypoints": waypoints is not None, "hover": hover is not None}
+    lists = {"next_flight.to_tell": to_tell, "next_flight.box_m": box, "excite.axes": excite, "excite.band_hz": band}
+    values = {
+        "path": next((path for path, asked in paths.items() if asked), None),
+        **{key: None if text is None else f"[{text}]" for key, text in lists.items()},
+        "next_flight.height_m": None if height is None else repr(float(height)),
+        "duration_s": None if length is None else repr(float(length)),
+        "repeat": repeat,
+        "excite.signal": None if signal is None else signal.value,
+        "excite.size_rad": None if size is None else repr(radians(size)),
+    }
+    return [f"trajectory.{key}={value}" for key, value in values.items() if value is not None]
 
 
 def require_no_room(box: str | None, height: float | None) -> None:
@@ -143,41 +159,8 @@ def require_no_room(box: str | None, height: float | None) -> None:
             )
 
 
-@dataclass(frozen=True)
-class Added:
-    """Options of repeats and excitations, None where one is not given: band in Hz, size in degrees, hover in s."""
-
-    repeat: int | None = None
-    axes: str | None = None
-    signal: str | None = None
-    band: str | None = None
-    size: float | None = None
-    hover: float | None = None
-
-    def overrides(self, waypoints: Path | None, settles: bool, duration: float | None) -> list[str]:
-        """Write the options as overrides of the config, ``section.key=value`` each."""
-        others = {
-            f"--waypoints {waypoints}": waypoints is not None,
-            "--to-tell and --for": settles,
-            f"--duration {duration or 0:g}": duration is not None,
-        }
-        for other, given in others.items():
-            if given and self.hover is not None:
-                raise InputError(f"--hover {self.hover:g}: stays at one place for so long; leave out {other}")
-        values = {
-            "repeat": self.repeat,
-            "excite.axes": None if self.axes is None else f"[{self.axes}]",
-            "excite.signal": self.signal,
-            "excite.band_hz": None if self.band is None else f"[{self.band}]",
-            "excite.size_rad": None if self.size is None else repr(radians(self.size)),
-            "duration_s": None if self.hover is None else repr(float(self.hover)),
-            "path": None if self.hover is None else "hover",
-        }
-        return [f"trajectory.{key}={value}" for key, value in values.items() if value is not None]
-
-    def require_axes(self, study: Study) -> None:
-        """Refuse what describes an excitation where there is none."""
-        given = {"--signal": self.signal, "--band": self.band, "--size": self.size}
-        for option, value in given.items():
-            if value is not None and not study.trajectory.excite.axes:
-                raise InputError(f"{option} {value}: describes an excitation; say which axes with --excite AXES")
+def require_axes(study: Study, **given: object) -> None:
+    """Refuse what describes an excitation where there is none."""
+    for option, value in given.items():
+        if value is not None and not study.trajectory.excite.axes:
+            raise InputError(f"--{option} {value}: describes an excitation; say which axes with --excite AXES")

@@ -21,7 +21,7 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.flight import MOTION, Flight, Infeasible, Simulated, Tracking, values_of
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
-from cpfls_cli.pages.disturbance import still_air_text
+from cpfls_cli.pages.disturbance import STILL_AIR
 from cpfls_cli.report.content import Outcome
 from cpfls_cli.simulation.inverse import simulate as fly_exactly
 from cpfls_cli.simulation.measured import measure
@@ -187,6 +187,6 @@ def _closed_loop(run: Run, time: Array, planned: dict[str, Array], model: Vehicl
     study, rng = run.study, generator(run.study, "simulate")
     flight = measure(time, planned, study.vehicle, study.simulation, rng, run.progress, model)
     if model is not None and model.gusts is not None and not study.simulation.closed_loop.gusts:
-        run.say(still_air_text().text)
+        run.say(STILL_AIR)
     run.go_on("gap", run.output, output=run.beside("gap"))
     return replace(Simulated.of(time, flight), effects=values_of(flight.effects), tracking=Tracking.of(flight))

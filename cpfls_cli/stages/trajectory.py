@@ -8,7 +8,7 @@ from importlib import import_module
 from math import inf
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import demand_sentences, draw_attitude, draw_rotation
 from cpfls_cli.stages._mission import mission_of, mission_paths, mission_texts, mission_words
 from cpfls_cli.stages._path_options import (
-    Added,
     BandOption,
     BoxOption,
     DurationOption,
@@ -46,6 +45,7 @@ from cpfls_cli.stages._path_options import (
     ToTellOption,
     WaypointsOption,
     option_overrides,
+    require_axes,
     require_no_room,
 )
 from cpfls_cli.trajectory.consistency import check_waypoints
@@ -109,28 +109,13 @@ FIGURES = {
 }
 
 
-def _overrides(**given: Any) -> list[str]:
-    """Write the options as overrides of the config, which the file holds with them."""
-    settles = given["to_tell"] is not None or given["diagnosis"] is not None
-    asked = option_overrides(
-        *(given[key] for key in ("waypoints", "to_tell", "diagnosis", "box", "height", "duration"))
-    )
-    return [*asked, *_added(given).overrides(given["waypoints"], settles, given["duration"])]
-
-
-def _added(given: dict[str, Any]) -> Added:
-    signal = given["signal"]
-    asked = (None if signal is None else signal.value, given["band"], given["size"], given["hover"])
-    return Added(given["repeat"], given["excite"], *asked)
-
-
 @stage(
     PlannedPath,
     title="Training path",
     figures=FIGURES,
     words={"plain": plain, "axes": AXES, "effect_title": effect_title},
     study=True,
-    overrides=_overrides,
+    overrides=option_overrides,
 )
 def trajectory(
     run: Run,
@@ -140,9 +125,9 @@ def trajectory(
     box: BoxOption = None,
     height: HeightOption = None,
     duration: DurationOption = None,  # noqa: ARG001  # the config has it
-    hover: HoverOption = None,
-    repeat: RepeatOption = None,
-    excite: ExciteOption = None,
+    hover: HoverOption = None,  # noqa: ARG001
+    repeat: RepeatOption = None,  # noqa: ARG001
+    excite: ExciteOption = None,  # noqa: ARG001
     signal: SignalOption = None,
     band: BandOption = None,
     size: SizeOption = None,
@@ -155,7 +140,7 @@ def trajectory(
     settles = run.study.trajectory.path == "next-flight"
     if not settles:
         require_no_room(box, height)
-        Added(repeat, excite, None if signal is None else signal.value, band, size, hover).require_axes(run.study)
+        require_axes(run.study, signal=signal, band=band, size=size)
     settings = run.study.trajectory if settles else _settings(run.study, waypoints)
     names = () if not plot else ("rotation",) if settings.held else ("derivatives", "attitude")
     figures = [run.output.with_name(f"{run.output.stem}-{name}.svg") for name in names]
