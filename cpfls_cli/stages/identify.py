@@ -45,7 +45,7 @@ from cpfls_cli.identification.search import NothingFoundError, SearchRun, Search
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.identification import WORDS
 from cpfls_cli.pages.identified_figures import FIGURES
-from cpfls_cli.pages.sensors import tell_before_search
+from cpfls_cli.pages.trust import tell_before_search
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command, Text
 from cpfls_cli.search import SearchOptions, Watch, begin_search

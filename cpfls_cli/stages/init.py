@@ -29,7 +29,7 @@ from cpfls_cli.flights.models import found_vehicle, is_found
 from cpfls_cli.flights.recordings import check_flight, imported, read_import, seen_twice
 from cpfls_cli.logs.formats import log_contents, suffixes_in_words
 from cpfls_cli.page import TEMPLATES
-from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.pages.trust import contradicted
 from cpfls_cli.report.content import Command, number
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result

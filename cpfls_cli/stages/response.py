@@ -19,8 +19,7 @@ from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.pages.gap import MEASURED
-from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.pages.trust import contradicted, seen_warnings
 from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.settings import VEHICLE

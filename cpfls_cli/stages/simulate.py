@@ -21,7 +21,7 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.flight import MOTION, Flight, Infeasible, Simulated, Tracking, values_of
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
-from cpfls_cli.pages.disturbance import STILL_AIR
+from cpfls_cli.pages.playback import STILL_AIR
 from cpfls_cli.report.content import Outcome
 from cpfls_cli.simulation.inverse import simulate as fly_exactly
 from cpfls_cli.simulation.measured import measure

@@ -20,10 +20,9 @@ from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_m
 from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.flights.training import known_by
 from cpfls_cli.logs.formats import is_log, log_contents
-from cpfls_cli.pages.disturbance import STILL_AIR
 from cpfls_cli.pages.gap import MEASURED
-from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.pages.playback import STILL_AIR
+from cpfls_cli.pages.trust import contradicted, seen_warnings
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import VehicleModel
