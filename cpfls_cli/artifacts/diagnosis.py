@@ -53,8 +53,25 @@ class LargestGap:
     share_of_time: float = about("in which the first channel is above noise")
 
 
+class _OfGap:
+    """What has a gap before and after."""
+
+    if TYPE_CHECKING:
+        gap: GapChange
+
+    @property
+    def gap_before(self) -> dict[str, Any]:
+        """The gap of the model as given, for machines: lists over x, y, z."""
+        return GapSize(self.gap.before, self.gap.before_floors).as_summary
+
+    @property
+    def gap_after(self) -> dict[str, Any]:
+        """The gap with the effects, for machines: lists over x, y, z."""
+        return GapSize(self.gap.after, self.gap.after_floors).as_summary
+
+
 @result
-class Diagnosis(Conclusion):
+class Diagnosis(Conclusion, _OfGap):
     """Which physical effect a model misses, judged on flights that the fit did not see."""
 
     FORMAT: ClassVar = "cpfls/diagnosis"
@@ -145,16 +162,6 @@ class Diagnosis(Conclusion):
             floors=np.nan if worst is None else worst.rms_floors,
             share_of_time=float((np.abs(windows) > CLEAR).mean()),
         )
-
-    @property
-    def gap_before(self) -> dict[str, Any]:
-        """The gap of the model as given, for machines: lists over x, y, z."""
-        return GapSize(self.gap.before, self.gap.before_floors).as_summary
-
-    @property
-    def gap_after(self) -> dict[str, Any]:
-        """The gap with the effects, for machines: lists over x, y, z."""
-        return GapSize(self.gap.after, self.gap.after_floors).as_summary
 
     @property
     def repeatability(self) -> dict[str, Repeatability] | None:
@@ -280,7 +287,7 @@ class Disagreement(Comparison):
 
 
 @result
-class Extended(AnyModel):
+class Extended(AnyModel, _OfGap):
     """A model with the effects that it missed in it, refitted together."""
 
     FORMAT: ClassVar = "cpfls/extended"
@@ -340,16 +347,6 @@ class Extended(AnyModel):
     def impossible(self) -> tuple[str, ...]:
         """Moments of inertia that are more than the other two together; others are as stated, or as they were found."""
         return tuple(f"inertia.{name}" for name in more_than_others(self.inertia.tolist()))
-
-    @property
-    def gap_before(self) -> dict[str, Any]:
-        """The gap of the model as given, for machines: lists over x, y, z."""
-        return GapSize(self.gap.before, self.gap.before_floors).as_summary
-
-    @property
-    def gap_after(self) -> dict[str, Any]:
-        """The gap with the effects, for machines: lists over x, y, z."""
-        return GapSize(self.gap.after, self.gap.after_floors).as_summary
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -290,19 +290,20 @@ def _toned(text: str, tone: Tone) -> Markup:
 
 
 def _block(block: Block) -> dict[str, Any]:
+    kind = type(block).__name__.lower()
     match block:
         case Table():
-            return _table(block)
+            return {"kind": kind, **_table(block)}
         case Folded():
-            return {"kind": block.kind, "summary": block.summary, "blocks": [_block(inner) for inner in block.blocks]}
+            return {"kind": kind, "summary": block.summary, "blocks": [_block(inner) for inner in block.blocks]}
         case Facts():
-            return {"kind": block.kind, "rows": [[_bare(term), _bare(value)] for term, value in block.rows]}
+            return {"kind": kind, "rows": [[_bare(term), _bare(value)] for term, value in block.rows]}
         case Text():
-            return {"kind": block.kind, "text": block.text, "tone": block.tone}
+            return {"kind": kind, "text": block.text, "tone": block.tone}
         case Plot():
             return {"kind": "figure", "name": block.name, "caption": block.caption, "description": block.description}
         case _:
-            return {"kind": block.kind, **asdict(block)}
+            return {"kind": kind, **asdict(block)}
 
 
 def _bare(text: str) -> str:
@@ -319,7 +320,6 @@ def _table(table: Table) -> dict[str, Any]:
         if cell.tone != "plain"
     ]
     return {
-        "kind": table.kind,
         "name": table.name,
         "caption": table.explained,
         "header": list(table.header),
