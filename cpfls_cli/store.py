@@ -225,12 +225,6 @@ def read(path: Path, kind: type[T]) -> tuple[T, Origin]:
     return given, origin
 
 
-def read_first(path: Path, kind: type[T]) -> tuple[T, Origin]:
-    """Read a result as if it had two rows along ``STREAMED``: all else that it holds, in little memory."""
-    given, origin, _ = examine(path, kind, 2)
-    return given, origin
-
-
 def is_long(path: Path, kind: Any) -> bool:
     """Tell whether a result has more rows than are held in memory."""
     axis = getattr(kind, "STREAMED", "")

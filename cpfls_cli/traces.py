@@ -66,6 +66,8 @@ def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Event] = ()) 
             for title, tracks in shown.items()
         ],
     }
+    # No text of it ends the script that it is in.
+    written = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     vendor = {name: (TEMPLATES / "vendor" / name).read_text(encoding="utf-8") for name in _VENDOR}
     licence, style, script = vendor.values()
     still = Drawn(
@@ -75,17 +77,12 @@ def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Event] = ()) 
         f'<div class="traces"><ol class="events" aria-label="Events">{"".join(map(_event, events))}</ol>'
         f'<div class="moving"></div><div class="still plot">{still(events)}</div></div>'
         f"<style>{style}</style><script>/*! uPlot 1.6.32 (https://github.com/leeoniya/uPlot)\n{licence}*/\n{script}</script>"
-        f'<script type="application/json" id="traces-data">{_in_script(data)}</script>'
+        f'<script type="application/json" id="traces-data">{written}</script>'
         f"<script>{(TEMPLATES / 'traces.js').read_text(encoding='utf-8')}</script>"
     )
 
 
 _VENDOR = ("uPlot.LICENSE.txt", "uPlot.min.css", "uPlot.iife.min.js")
-
-
-def _in_script(data: Any) -> str:
-    """Write data as JSON that cannot end the script it is in."""
-    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def _packed(own: Track, share: float, begin: float, tick: float) -> dict[str, Any]:

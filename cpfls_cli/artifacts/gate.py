@@ -90,7 +90,7 @@ def opened_file(path: Path) -> Iterator[h5py.File]:
                 _refuse_links(file)
             yield file
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
-        raise InputError(f"{path}: damaged: {one_line(error)}") from None
+        raise InputError(f"{path}: damaged: {' '.join(str(error.args[0] if error.args else error).split())}") from None
 
 
 def _require_sealed(path: Path) -> None:
@@ -285,8 +285,3 @@ def read_origin(path: Path) -> Origin:
         return known.origin
     with opened_file(path) as file, patient(path):
         return identified(path, file).origin
-
-
-def one_line(error: Exception) -> str:
-    """Word an error of a library in one line."""
-    return " ".join(str(error.args[0] if error.args else error).split())

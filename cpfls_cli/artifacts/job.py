@@ -29,10 +29,6 @@ Interrupted = Callable[[], int | None]
 """Gives the number of the signal that asks to stop, or None."""
 
 
-def _uninterrupted() -> AbstractContextManager[Interrupted]:
-    return nullcontext(lambda: None)
-
-
 @dataclass
 class Job:
     """One run of a stage.
@@ -51,7 +47,7 @@ class Job:
     dry_run: bool
     progress: Progress
     reads: Callable[[Path], None]
-    deferred_interrupts: Callable[[], AbstractContextManager[Interrupted]] = _uninterrupted
+    deferred_interrupts: Callable[[], AbstractContextManager[Interrupted]] = lambda: nullcontext(lambda: None)
     inputs: list[Path] = field(default_factory=list)
     config: Path = Path("CONFIG")
     open_numbers: Literal["refused", "guessed", "found"] = "refused"

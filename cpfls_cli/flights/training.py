@@ -144,12 +144,8 @@ def _enough_of(path: Path, study: Study) -> ReadFlight:
         return read_flight(path, study)
     names, first = held_rows(path, Flight), (samples - ENOUGH) // 2
     units = units_of(path, read_origin(path), study)
-    return ReadFlight(path.name, _rows_in(path, names, first, first + ENOUGH), units, ())
-
-
-def _rows_in(path: Path, names: Sequence[str], start: int, stop: int) -> Mapping[str, Array]:
-    (read,) = read_rows(path, names, start, stop, max(stop - start, 1))
-    return dict(zip(names, read, strict=True))
+    (rows,) = read_rows(path, names, first, first + ENOUGH, ENOUGH)
+    return ReadFlight(path.name, dict(zip(names, rows, strict=True)), units, ())
 
 
 REST = "held-out rest"

@@ -155,11 +155,6 @@ class _Found(NamedTuple):
 _ONE = _Found(1.0, 1.0, 1.0)
 
 
-def _significant(factor: _Found, wider: float) -> _Found:
-    """Give a factor, or 1 with as wide an interval where it may be that."""
-    return factor if factor.contradicts(1.0, wider) else factor.plus(1.0 - factor.value)
-
-
 def _part(number: Estimate | None, times: float) -> _Found:
     return _Found(0.0, 0.0, 0.0) if number is None else _Found.of(number).times(float(times))
 
@@ -472,7 +467,10 @@ def _not_held(made: _Corrections, each: NamedEffect) -> None:
 
 def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     """Correct thrust, yaw torque and inertia by wrong numbers, rotors that differ, and a wrong drag factor together."""
-    scale = _significant(_factor(numbers.get("thrust_scale")), made.wider)
+    scale = _factor(numbers.get("thrust_scale"))
+    if not scale.contradicts(1.0, made.wider):
+        # 1 with as wide an interval, where it may be that.
+        scale = scale.plus(1.0 - scale.value)
     lifts, drags = (numbers.get(f"{what}_imbalance") for what in ("lift", "drag"))
     modes, spins = gain_modes(made.vehicle), [rotor.spin for rotor in made.vehicle.rotors]
     patterns = [
@@ -769,9 +767,6 @@ def _comment(lines: Sequence[str], raw: bytes) -> bytes:
 def _diff(name: str, before: bytes, after: bytes) -> str:
     given, found = (each.decode("utf-8", "replace").splitlines(keepends=True) for each in (before, after))
     return "".join(
-        _ended(line) for line in difflib.unified_diff(given, found, f"given/{name}", f"corrected/{name}", n=1)
+        line if line.endswith("\n") else f"{line}\n"
+        for line in difflib.unified_diff(given, found, f"given/{name}", f"corrected/{name}", n=1)
     )
-
-
-def _ended(line: str) -> str:
-    return line if line.endswith("\n") else f"{line}\n"

@@ -24,7 +24,7 @@ from cpfls_cli.arguments import (
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel, identified_model
 from cpfls_cli.artifacts.model import LearnedFlight
-from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.flights.same_vehicle import other_vehicles
@@ -83,8 +83,11 @@ def identify(
     with settings_of("identification", run.study):
         require_flights(run.study.identification.choice, given=kept is not None)
     held_out = held_out_parts(run.study, data.rests, inputs, others)
-    wrong = _contradictions([*flights, *choosing, *others], run.study)
-    for sentence in other_vehicles([*flights, *choosing, *others], run.study):
+    every = [*flights, *choosing, *others]
+    # A simulated flight cannot contradict itself.
+    recorded = (path for path in every if "log" in read_origin(path).inputs)
+    wrong = contradictions(finding.of(path.name) for path in recorded for finding in check_file(path, run.study))
+    for sentence in other_vehicles(every, run.study):
         run.said.append(Text(sentence, "warning", always=True))
     tell_before_search(wrong)
     if run.dry_run:
@@ -118,12 +121,6 @@ def _next(run: Run, made: IdentifiedModel, flights: Sequence[Path]) -> Command:
     if made.trust in (Trust.SIMULATION, Trust.CONTROL, Trust.INSIDE):
         return "cpfls", "export", run.output, "-o", run.output.with_suffix(".c")
     return "cpfls", "report", run.config, *flights, run.output, "-o", run.beside("report.html")
-
-
-def _contradictions(flights: Sequence[Path], study: Study) -> tuple[str, ...]:
-    """Say what of recorded flights contradicts itself; a simulated one cannot."""
-    recorded = (path for path in flights if "log" in read_origin(path).inputs)
-    return contradictions(finding.of(path.name) for path in recorded for finding in check_file(path, study))
 
 
 def _identified(

@@ -51,7 +51,7 @@ def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown:
     long = store.is_long(file, own.kind)
     if long:
         store.check_rows(file, own.kind, store.held_rows(file, own.kind))
-    given, origin = store.read_first(file, own.kind) if long else store.read(file, own.kind)
+    given, origin = store.examine(file, own.kind, 2)[:2] if long else store.read(file, own.kind)
     source = source_of_result(given, origin, file, file.name, "")
     held = {
         "file": str(file),

@@ -507,7 +507,12 @@ def config_text(made: Proposed) -> str:
         loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     plain.filters.update(flow=_flow, comment=_comment, number=number)
-    known = {"ASK": ASK, "DECIDES_ROTORS": DECIDES_ROTORS, "capitalised": capitalised, "signal_lines": _signal_lines}
+    known = {
+        "ASK": ASK,
+        "DECIDES_ROTORS": DECIDES_ROTORS,
+        "capitalised": capitalised,
+        "signal_lines": lambda guess: "\n".join(_signal(guess)),
+    }
     usual = [(kind, own) for kind in USUAL if (own := usual_airframe(kind, 4)) is not None]
     return plain.get_template("init.yaml.j2").render(r=made, usual_airframes=usual, **known)
 
@@ -516,10 +521,6 @@ def _comment(text: str, indent: int) -> str:
     start = f"{' ' * indent}# "
     lines = textwrap.wrap(text, _WIDTH - len(start), break_long_words=False, break_on_hyphens=False)
     return "".join(f"{start}{line}\n" for line in lines)
-
-
-def _signal_lines(guess: Guess) -> str:
-    return "\n".join(_signal(guess))
 
 
 def _rotor(rotor: RotorPlace | None, airframe: Airframe | None, stated: Stated) -> str:

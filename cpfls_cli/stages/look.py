@@ -183,10 +183,6 @@ def _spectra(r: Look, figure: Figure) -> None:
     _over_frequency(axes)
 
 
-def _shaped(r: Look) -> bool:
-    return r.hover is not None and r.hover.shape is not None and len(r.hover.shape.collective) > 0
-
-
 def _thrust(r: Look, figure: Figure) -> None:
     """Draw specific force over the collective command."""
     shape = None if r.hover is None else r.hover.shape
@@ -233,7 +229,11 @@ FIGURES = {
         "Power of the gyroscope over frequency and throttle: the darker, the stronger", _map, _mapped
     ),
     "spectra": _drawn("Spectrum of the gyroscope, mean of its axes", _spectra, _of_gyroscope),
-    "thrust": _drawn("Specific force along the rotors' axis over the collective command", _thrust, _shaped),
+    "thrust": _drawn(
+        "Specific force along the rotors' axis over the collective command",
+        _thrust,
+        lambda r: r.hover and r.hover.shape and len(r.hover.shape.collective),
+    ),
 }
 
 

@@ -15,7 +15,7 @@ from cpfls_cli.arguments import FlownArgument
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.job import require_numbers
-from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.flight import MOTION, Flight, Infeasible, Simulated, Tracking, values_of
@@ -130,7 +130,9 @@ def simulate(
             raise InputError(f"{trajectory}: --mode {mode}: along a flight all is flown in closed loop; leave it out")
         return stage_named("twin").run(run, path=trajectory, model=model)
     if model is not None and mode is None:
-        run.study = _in_closed_loop(run.study)
+        with settings_of("simulation", run.study):
+            closed_loop = replace(run.study.simulation, mode="closed-loop")
+        run.study = run.study.model_copy(update={"simulation": closed_loop})
     _take_numbers(run, model)
     closed = run.study.simulation.mode == "closed-loop"
     if model is not None and not closed:
@@ -152,12 +154,6 @@ def _take_numbers(run: Run, model: Path | None) -> None:
         require_numbers(run, "simulate", whole=False)
         return
     import_module("cpfls_cli.stages._numbers").with_numbers(run, "simulate", model)
-
-
-def _in_closed_loop(study: Study) -> Study:
-    """Take the mode in which a model is flown, where nothing else is said."""
-    with settings_of("simulation", study):
-        return study.model_copy(update={"simulation": replace(study.simulation, mode="closed-loop")})
 
 
 def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:

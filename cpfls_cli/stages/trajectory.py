@@ -278,7 +278,7 @@ def trajectory(
     settings = run.study.trajectory if settles else _settings(run.study, waypoints)
     names = () if not plot else ("rotation",) if settings.held else ("derivatives", "attitude")
     figures = [run.output.with_name(f"{run.output.stem}-{name}.svg") for name in names]
-    texts = _next_flight().waypoints_path(run) if settles else mission_paths(run, mission)
+    texts = {run.beside(f"{run.output.stem}-waypoints.csv"): "csv"} if settles else mission_paths(run, mission)
     check_outputs(run, *figures, *texts)
     planned = _next_flight().planned(run, diagnosis) if settles else _planned(run, settings, waypoints)
     written = None if planned is None else mission_texts(run, mission, planned, texts)

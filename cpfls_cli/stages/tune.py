@@ -149,11 +149,6 @@ def _noise(r: Gains, figure: Figure) -> None:
     legend_over(figure, axes)
 
 
-def _general(value: float) -> str:
-    """Write a parameter with as many digits as it has."""
-    return f"{value:.6g}" if np.isfinite(value) else UNKNOWN
-
-
 def _drawn(description: str, height: float, draw: Callable[[Any, Figure], None], part: str = "parameters") -> Drawn:
     return Drawn(description, height, draw, lambda r: getattr(r, part, None))
 
@@ -176,7 +171,12 @@ FIGURES = {
     Gains,
     title="Gains for an autopilot",
     figures=FIGURES,
-    words={"HOLDS": HOLDS, "TOO_SLOW": TOO_SLOW, "general": _general, "finite": np.isfinite},
+    words={
+        "HOLDS": HOLDS,
+        "TOO_SLOW": TOO_SLOW,
+        "general": lambda value: f"{value:.6g}" if np.isfinite(value) else UNKNOWN,
+        "finite": np.isfinite,
+    },
     study=lambda given: given["model"] is not None,
     output=Annotated[
         Path | None,
