@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -58,11 +58,6 @@ def joined_flights(*groups: Iterable[LearnedFlight]) -> tuple[LearnedFlight, ...
         if known is None or (known.samples or 0) < (flight.samples or 0):
             kept[flight.sha256] = flight
     return tuple(kept.values())
-
-
-def part_learned(learned: Iterable[LearnedFlight], hashes: Collection[str]) -> LearnedFlight | None:
-    """Find what was learned from a flight of these hashes, its file's and its log's; None where nothing was."""
-    return next((flight for flight in learned if flight.sha256 in hashes), None)
 
 
 def of_no_body(model: VehicleModel) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from cpfls_cli.artifacts.model import AnyModel, LearnedFlight, part_learned
+from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
 from cpfls_cli.consistency.findings import as_contradiction
 from cpfls_cli.report.content import Tone, sentence
 from cpfls_cli.validation.trust import Trust
@@ -92,7 +92,7 @@ def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy)
         Of each flight its file name, and the SHA-256 of the file and of the log that it was imported from.
     """
     for name, hashes in judged:
-        flight = part_learned(learned, hashes)
+        flight = next((each for each in learned if each.sha256 in hashes), None)
         if flight is not None:
             what, it = ("it", "it") if flight.whole else (_part(flight), "that")
             yield f"{name}: {model} has learned from {what}, so {it} says nothing about unseen flights"

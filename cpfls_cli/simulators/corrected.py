@@ -323,13 +323,16 @@ def corrected(
     files = _written(made, changes, [each.name for each in flights])
     names = of.model.output_names
     texts = {names[file]: text for file, text in files.items()}
-    diff = "".join(_diff(names[file], raw_bytes(file), text) for file, text in files.items())
+    diff = []
+    for file, text in files.items():
+        given, after = (each.decode("utf-8", "replace").splitlines(keepends=True) for each in (raw_bytes(file), text))
+        diff += difflib.unified_diff(given, after, f"given/{names[file]}", f"corrected/{names[file]}", n=1)
     said = Corrected(
         files=tuple(texts),
         changes=changes,
         unchanged=tuple(made.unchanged),
         elsewhere=tuple(made.elsewhere),
-        diff=visible(diff),
+        diff=visible("".join(line if line.endswith("\n") else f"{line}\n" for line in diff)),
     )
     return said, texts
 
@@ -762,11 +765,3 @@ def _comment(lines: Sequence[str], raw: bytes) -> bytes:
     # Two hyphens end a comment, and files are in many encodings.
     text = re.sub("-(?=-)", "- ", end.join(map(visible, lines)))
     return f"<!-- {text} -->{end}".encode("ascii", "xmlcharrefreplace")
-
-
-def _diff(name: str, before: bytes, after: bytes) -> str:
-    given, found = (each.decode("utf-8", "replace").splitlines(keepends=True) for each in (before, after))
-    return "".join(
-        line if line.endswith("\n") else f"{line}\n"
-        for line in difflib.unified_diff(given, found, f"given/{name}", f"corrected/{name}", n=1)
-    )

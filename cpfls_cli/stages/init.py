@@ -281,7 +281,12 @@ def init(
     file = None
     if model is not None:
         file = taken(run, model, "model")
-        _refuse_stated(file, inertia, *((arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()))
+        given = (inertia, *((arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()))
+        if any(each is not None for each in given):
+            raise InputError(
+                f"{file.file}: states inertia{', rotors and their factors' if file.rotors else ''}, so leave out "
+                f"--inertia{', --arm and the factors' if file.rotors else ''}; --mass takes the mass as it flew"
+            )
     stated = Stated(mass, arm, inertia, thrust_factor, drag_factor, file)
     _require_possible(stated)
     made, given, text = proposed(run, logs or (), stated, scale_to_arm=scale_to_arm)
@@ -303,14 +308,6 @@ def taken(run: Run, model: Path, role: str) -> SimulatorModel:
     read = read_model(model)
     run.take({f"{role}-include-{at}": file for at, file in enumerate(read.files[1:], start=1)})
     return read
-
-
-def _refuse_stated(file: SimulatorModel, *given: object) -> None:
-    if any(each is not None for each in given):
-        raise InputError(
-            f"{file.file}: states inertia{', rotors and their factors' if file.rotors else ''}, so leave out "
-            f"--inertia{', --arm and the factors' if file.rotors else ''}; --mass takes the mass as it flew"
-        )
 
 
 def proposed(
