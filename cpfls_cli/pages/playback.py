@@ -115,10 +115,6 @@ ERRORS = "Mean error by horizon, of the model and of what it has to beat"
 """What the figure of errors shows."""
 
 
-STILL_AIR = "flown in still air; the model holds the gusts of its flights: --gusts plays them"
-"""Of a flight in which the gusts that its model holds were not played."""
-
-
 def gust_words(axes: list[GustAxis], instrument_kind: str) -> str:
     """Tell sizes and memories by axis, and what no gust exceeds."""
     known = [axis_words(axis) for axis in axes if np.isfinite(axis.size)]

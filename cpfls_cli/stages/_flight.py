@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 
 _TURN = 360.0
+STILL_AIR = "flown in still air; the model holds the gusts of its flights: --gusts plays them"
+"""Of a flight in which the gusts that its model holds were not played."""
 
 
 def demand_sentences(demand: Flyability, planned: PlannedRotation) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from cpfls_cli.config.check import why_no_body
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.models import any_model, is_found, is_model, is_vehicle, with_found_numbers
 from cpfls_cli.flights.training import log_formats
-from cpfls_cli.pages.gap import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
+from cpfls_cli.pages.gap_words import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.report.content import Command
 from cpfls_cli.trajectory.consistency import coarsest_excited

@@ -26,7 +26,8 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import compare as compare_flights
 from cpfls_cli.gap.residual.views import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
-from cpfls_cli.pages.gap import GAP_WORDS, channel_unit, channel_words, playback_drawn, repeatability_drawn
+from cpfls_cli.pages.gap import channel_unit, channel_words
+from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import Drawn, in_columns, line, plain_ticks, stacked

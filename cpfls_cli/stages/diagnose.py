@@ -31,7 +31,6 @@ from cpfls_cli.gap.whole_vehicle import known_already
 from cpfls_cli.pages.gap import (
     AXES,
     BEFORE,
-    GAP_WORDS,
     MEASURED,
     channel_unit,
     channel_words,
@@ -40,11 +39,10 @@ from cpfls_cli.pages.gap import (
     keep_in_view,
     leaves_view,
     marked,
-    playback_drawn,
-    repeatability_drawn,
     sizes_drawn,
     wrong_numbers,
 )
+from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn
 from cpfls_cli.pages.playback import SIGNALS, WHO, axis_words, draw_errors, errors_height
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.errors import AFTER

@@ -28,7 +28,8 @@ from cpfls_cli.gap.whole_vehicle import (
     whole_vehicle,
     with_known_wrench,
 )
-from cpfls_cli.pages.gap import GAP_WORDS, intervals_drawn, playback_drawn, sizes_drawn
+from cpfls_cli.pages.gap import intervals_drawn, sizes_drawn
+from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
 from cpfls_cli.playback.model import VehicleModel

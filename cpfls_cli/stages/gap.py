@@ -21,7 +21,7 @@ from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, 
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
-from cpfls_cli.pages.gap import WHAT_TO_FLY
+from cpfls_cli.pages.gap_words import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result

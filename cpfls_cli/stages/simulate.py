@@ -21,13 +21,12 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.flight import MOTION, Flight, Infeasible, Simulated, Tracking, values_of
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
-from cpfls_cli.pages.playback import STILL_AIR
 from cpfls_cli.report.content import Outcome
 from cpfls_cli.simulation.inverse import simulate as fly_exactly
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
 from cpfls_cli.stage import Run, stage, stage_named
-from cpfls_cli.stages._flight import FIGURES, WORDS, infeasible_sentence
+from cpfls_cli.stages._flight import FIGURES, STILL_AIR, WORDS, infeasible_sentence
 from cpfls_cli.store import read
 
 if TYPE_CHECKING:

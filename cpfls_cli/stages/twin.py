@@ -21,7 +21,6 @@ from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.flights.training import known_by
 from cpfls_cli.logs.formats import is_log, log_contents
 from cpfls_cli.pages.gap import MEASURED
-from cpfls_cli.pages.playback import STILL_AIR
 from cpfls_cli.pages.trust import contradicted, seen_warnings
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.lack import Lack
@@ -54,6 +53,7 @@ from cpfls_cli.simulation.twin_flight import (
     measured_channels,
 )
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._flight import STILL_AIR
 from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.stages.compare import to_gap
 

@@ -50,7 +50,7 @@ from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, shown_slowly
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
 from cpfls_cli.flights.training import numbered_roles
-from cpfls_cli.pages.gap import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
+from cpfls_cli.pages.gap_words import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.model import said_by
 from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height, gust_words

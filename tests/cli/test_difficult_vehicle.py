@@ -14,7 +14,7 @@ from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.export.registry import FORMS
 from cpfls_cli.flights.models import found_vehicle
-from cpfls_cli.pages.gap import WHAT_TO_FLY
+from cpfls_cli.pages.gap_words import WHAT_TO_FLY
 from cpfls_cli.playback.along_flights import Playback
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import plain

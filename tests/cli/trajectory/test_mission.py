@@ -10,7 +10,7 @@ import pytest
 from cpfls_cli.config.study import parse_yaml, to_yaml
 from cpfls_cli.flights.flight import Flight
 from cpfls_cli.flights.path import PlannedPath
-from cpfls_cli.pages.gap import WHAT_TO_FLY
+from cpfls_cli.pages.gap_words import WHAT_TO_FLY
 from cpfls_cli.store import read
 from tests.builders.studies import VEHICLE
 

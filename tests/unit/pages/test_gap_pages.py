@@ -12,17 +12,8 @@ from matplotlib.figure import Figure
 from cpfls_cli import page
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.results import Estimate
-from cpfls_cli.pages.gap import (
-    BEFORE,
-    MEASURED,
-    NOT_SPLIT,
-    WHAT_TO_FLY,
-    effect_title,
-    keep_in_view,
-    leaves_view,
-    marked,
-    repeatability_drawn,
-)
+from cpfls_cli.pages.gap import BEFORE, MEASURED, effect_title, keep_in_view, leaves_view, marked
+from cpfls_cli.pages.gap_words import NOT_SPLIT, WHAT_TO_FLY, repeatability_drawn
 from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.playback.errors import PREDICTIONS, WITH_PAST
 from cpfls_cli.playback.history import Observer

@@ -9,7 +9,7 @@ from cpfls_cli import page
 from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.artifacts.vehicle_model import ResponseMismatch, vehicle_section
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.pages.gap import WHAT_TO_FLY
+from cpfls_cli.pages.gap_words import WHAT_TO_FLY
 from cpfls_cli.pages.model import against, slow_words
 from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
 from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
