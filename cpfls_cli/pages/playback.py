@@ -100,8 +100,7 @@ def draw_errors(
             line(axes, r.horizon_s, scale * r.of(name, signal).mae, label=called[name], **_STYLES[name])
         tops = {name: scale * float(r.of(name, signal).mae.max()) for name in r.models}
         top = 1.6 * max(tops[name] for name in (r.judged, *r.rivals))
-        axes.set_ylim(0.0, min(top, 1.06 * max(tops.values())) or 1.0)
-        axes.set_title(f"{words}, {unit}")
+        axes.set(ylim=(0.0, min(top, 1.06 * max(tops.values())) or 1.0), title=f"{words}, {unit}")
     panels[-1].set_xlabel("horizon, s")
     legend_over(figure, panels[0])
 

@@ -106,9 +106,7 @@ def _draw(name: str, r: Responses, figure: Figure) -> None:
         lower.plot(own.frequency, own.clearness, label="by random error", **_MODEL)
         legend_above(lower)
     lower.axhline(COHERENT, **BASELINE)
-    lower.set_ylim(0.0, 1.05)
-    lower.set_ylabel("coherence")
-    lower.set_xlabel("Hz")
+    lower.set(ylim=(0.0, 1.05), ylabel="coherence", xlabel="Hz")
     logarithmic(lower, own.frequency[0], own.frequency[-1])
     legend_over(figure, upper)
 

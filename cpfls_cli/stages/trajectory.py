@@ -224,8 +224,7 @@ def _draw_derivatives(r: PlannedPath, figure: Figure) -> None:
         curve = move.curves[peak.name]
         line(axes, move.time, curve, **style_of(0))
         jumps = "" if np.any(curve) else ": not limited, infinite where the derivative below jumps"
-        axes.set_title(f"{peak.name}{jumps}")
-        axes.set_ylabel(peak.unit)
+        axes.set(title=f"{peak.name}{jumps}", ylabel=peak.unit)
         axes.axhline(0.0, color="#999999", linewidth=0.6)
         for limit in (-peak.limit, peak.limit) if np.isfinite(peak.limit) else ():
             axes.axhline(limit, **BASELINE)

@@ -216,9 +216,7 @@ def _structures(r: Vehicle, figure: Figure) -> None:
         look = {"label": _TRIED[name], "color": style_of(place)["color"], "markersize": 7, "linestyle": "none"}
         axes.plot([by_name[name].numbers], [by_name[name].error], marker, **look)
     axes.axhline(1.1, label="rates stay", **BASELINE)
-    axes.set_xlabel("free numbers")
-    axes.set_ylabel("error on flights kept aside")
-    axes.set_yscale("log")
+    axes.set(xlabel="free numbers", ylabel="error on flights kept aside", yscale="log")
     legend_over(figure, axes)
 
 
