@@ -7,7 +7,7 @@ import os
 import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
@@ -312,8 +312,6 @@ class SearchOptions:
     ----------
     resume : bool
         Go on from the checkpoint.
-    time_limit_s : float or None
-        Stop the search after so much time, and keep what it has.
     workers : int
         Processes that evaluate.
     scheduler : str or None
@@ -321,18 +319,8 @@ class SearchOptions:
     """
 
     resume: bool = False
-    time_limit_s: float | None = None
     workers: int = 1
     scheduler: str | None = None
-
-    @property
-    def workers_option(self) -> str:
-        """The option that names the workers, as it is typed."""
-        return f"--workers {self.workers}" if self.scheduler is None else f"--scheduler {self.scheduler}"
-
-    def employed(self, evaluate: Evaluate) -> AbstractContextManager[Workforce]:
-        """Employ the workers that evaluate."""
-        return employ(evaluate, count=self.workers, scheduler=self.scheduler)
 
     def require_workers(self) -> None:
         """Refuse more processes than this machine can run, and a scheduler beside them or without an address."""
@@ -394,11 +382,10 @@ class Resumable:
 
         @contextmanager
         def workers(evaluate: Evaluate) -> Iterator[Workforce]:
-            with (
-                about_option(options.workers_option, WorkerError),
-                watch.deferring(),
-                options.employed(evaluate) as workforce,
-            ):
+            count, scheduler = options.workers, options.scheduler
+            asked = f"--workers {count}" if scheduler is None else f"--scheduler {scheduler}"
+            employed = employ(evaluate, count=count, scheduler=scheduler)
+            with about_option(asked, WorkerError), watch.deferring(), employed as workforce:
                 yield workforce
 
         return SearchRun(

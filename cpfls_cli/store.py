@@ -255,7 +255,7 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
             makers = " or ".join(f"`cpfls {each}`" for each in getattr(kind, "MADE_BY", "").split(" or ") if each)
             made_by = f" (made by {makers})" if makers else ""
             raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
-        origin, missing = identified(path, file).origin, list[str]()
+        origin, missing = identified(path, file)[1], list[str]()
         given = _read(kind, file, missing, rows)
     if missing:
         raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")

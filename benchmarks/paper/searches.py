@@ -211,7 +211,7 @@ def run(
     selection = InputFile("selection", setting.without_runs.selection, Selection.FORMAT)
     checkpoint = Checkpoint.beside(job.output, origin_before(study, {**inputs, "selection": selection}))
     search = Resumable(checkpoint, left(checkpoint))
-    state = search.run(SearchOptions(False, None, 1, None), watch, lambda _: None)
+    state = search.run(SearchOptions(), watch, lambda _: None)
     body, rng = six_parameters(study.vehicle.inertia_kg_m2), generator(study, "identify")
     try:
         with settings_of("identification", study):

@@ -76,7 +76,7 @@ def identify(
     scheduler: SchedulerOption = None,
 ) -> IdentifiedModel | None:
     """Identify a model, and gather the evidence on it."""
-    options, others, choosing = SearchOptions(resume, time_limit, workers, scheduler), validate or [], choose_on or []
+    options, others, choosing = SearchOptions(resume, workers, scheduler), validate or [], choose_on or []
     inputs, search = begin_search(run, input_roles(flights, selection, others, choosing), options)
     run.files.update(inputs)
     data, kept = read_training(flights, selection, run.study, inputs), choosing_source(choosing, inputs)
