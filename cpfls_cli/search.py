@@ -159,6 +159,20 @@ class KeptFile:
         """Name what is left of an output, such as ``model.h5.checkpoint`` of ``model.h5``."""
         return cls(output.with_name(f"{output.name}.checkpoint"), header)
 
+    @classmethod
+    def begun(cls, job: Job, header: Origin, *, resume: bool) -> tuple[Self, Any]:
+        """Check what is left and the output of a search before anything is computed; give what it goes on from."""
+        own = cls.beside(job.output, header)
+        left = own.read() if resume else None
+        if not resume:
+            own.require_permission(force=job.force)
+        check_outputs(job, job.output, replaceable=resume and own.output_may_be_replaced())
+        return own, left
+
+    def read(self) -> Any:
+        """Take up what was left."""
+        raise NotImplementedError
+
     @property
     def output(self) -> Path:
         """What the command is for."""
@@ -304,35 +318,6 @@ _OF_A_PROCESSOR = 8
 """Processes that a processor may get, of which more than one only share it."""
 
 
-@dataclass(frozen=True)
-class SearchOptions:
-    """How a command runs its search; nothing of it changes what a search that comes to its end finds.
-
-    Attributes
-    ----------
-    resume : bool
-        Go on from the checkpoint.
-    workers : int
-        Processes that evaluate.
-    scheduler : str or None
-        Address of a Dask scheduler whose workers evaluate.
-    """
-
-    resume: bool = False
-    workers: int = 1
-    scheduler: str | None = None
-
-    def require_workers(self) -> None:
-        """Refuse more processes than this machine can run, and a scheduler beside them or without an address."""
-        if self.scheduler is not None and self.workers > 1:
-            raise InputError("--scheduler: brings its own workers; leave out --workers")
-        if self.scheduler is not None:
-            require_address(self.scheduler)
-        processors = os.cpu_count() or 1
-        if self.workers > _OF_A_PROCESSOR * processors:
-            raise InputError(f"--workers {self.workers}: this machine has {processors} processors; give that many")
-
-
 class Watch:
     """Decides when a search has to stop: at an interrupt, or at its time limit.
 
@@ -372,17 +357,19 @@ class Resumable:
     checkpoint: Checkpoint
     stopped: StoppedSearch | None
 
-    def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
+    def run(
+        self, watch: Watch, progress: Callable[[SearchStep], None], *, count: int = 1, scheduler: str | None = None
+    ) -> SearchRun:
         """Arrange how the search is run; from here on a checkpoint that is not resumed is given up.
 
-        Interrupts are deferred as long as its workers are employed, which is as long as it searches.
+        Interrupts are deferred as long as its workers are employed, which is as long as it searches: so many processes,
+        or those of a Dask scheduler at an address.
         """
         if self.stopped is None:
             self.checkpoint.remove()
 
         @contextmanager
         def workers(evaluate: Evaluate) -> Iterator[Workforce]:
-            count, scheduler = options.workers, options.scheduler
             asked = f"--workers {count}" if scheduler is None else f"--scheduler {scheduler}"
             employed = employ(evaluate, count=count, scheduler=scheduler)
             with about_option(asked, WorkerError), watch.deferring(), employed as workforce:
@@ -405,27 +392,21 @@ class Resumable:
 
 
 def begin_search(
-    job: Job, inputs: Mapping[str, Path], options: SearchOptions
+    job: Job, inputs: Mapping[str, Path], *, resume: bool, workers: int, scheduler: str | None
 ) -> tuple[dict[str, InputFile], Resumable]:
-    """Check inputs, checkpoint and output of a search before anything is computed."""
-    options.require_workers()
-    files = take_inputs(job, inputs)
-    header = origin_before(job.study, files)
-    search = resumable(job.output, header, resume=options.resume, force=job.force)
-    check_outputs(job, job.output, replaceable=options.resume and search.checkpoint.output_may_be_replaced())
-    return files, search
+    """Check workers, inputs, checkpoint and output of a search before anything is computed.
 
-
-def resumable(output: Path, header: Origin, *, resume: bool, force: bool) -> Resumable:
-    """Find the checkpoint beside the output of a search, and read it where the search is to go on.
-
-    `force` allows a checkpoint to be given up.
+    Refused are more processes than this machine can run, and a scheduler beside them or without an address.
     """
-    checkpoint = Checkpoint.beside(output, header)
-    if resume:
-        return Resumable(checkpoint, checkpoint.read())
-    checkpoint.require_permission(force=force)
-    return Resumable(checkpoint, None)
+    if scheduler is not None and workers > 1:
+        raise InputError("--scheduler: brings its own workers; leave out --workers")
+    if scheduler is not None:
+        require_address(scheduler)
+    processors = os.cpu_count() or 1
+    if workers > _OF_A_PROCESSOR * processors:
+        raise InputError(f"--workers {workers}: this machine has {processors} processors; give that many")
+    files = take_inputs(job, inputs)
+    return files, Resumable(*Checkpoint.begun(job, origin_before(job.study, files), resume=resume))
 
 
 _OF_VEHICLE = ("vehicle", "import", "playback")
@@ -494,18 +475,3 @@ class VehicleCheckpoint(KeptFile):
         old, new = (keys_of(header, _OF_VEHICLE) for header in (origin, self.header))
         self._require_same(differences(origin, self.header, old, new, unimportant="held-out"))
         return kept
-
-
-def begin_vehicle_search(
-    job: Job, files: Mapping[str, InputFile], *, resume: bool
-) -> tuple[VehicleCheckpoint, Kept | None]:
-    """Check checkpoint and output of a search for the structure of a vehicle before anything is computed.
-
-    The solutions that are kept tell where to go on; None to start.
-    """
-    checkpoint = VehicleCheckpoint.beside(job.output, origin_before(job.study, files, "vehicle-checkpoint"))
-    kept = checkpoint.read() if resume else None
-    if kept is None:
-        checkpoint.require_permission(force=job.force)
-    check_outputs(job, job.output, replaceable=resume and checkpoint.output_may_be_replaced())
-    return checkpoint, kept

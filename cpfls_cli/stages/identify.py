@@ -48,7 +48,7 @@ from cpfls_cli.pages.identified_figures import FIGURES
 from cpfls_cli.pages.trust import tell_before_search
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command, Text
-from cpfls_cli.search import SearchOptions, Watch, begin_search
+from cpfls_cli.search import Watch, begin_search
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._checkpoint import stop_note, without_model
 from cpfls_cli.validation.trust import Trust
@@ -76,8 +76,10 @@ def identify(
     scheduler: SchedulerOption = None,
 ) -> IdentifiedModel | None:
     """Identify a model, and gather the evidence on it."""
-    options, others, choosing = SearchOptions(resume, workers, scheduler), validate or [], choose_on or []
-    inputs, search = begin_search(run, input_roles(flights, selection, others, choosing), options)
+    others, choosing = validate or [], choose_on or []
+    inputs, search = begin_search(
+        run, input_roles(flights, selection, others, choosing), resume=resume, workers=workers, scheduler=scheduler
+    )
     run.files.update(inputs)
     data, kept = read_training(flights, selection, run.study, inputs), choosing_source(choosing, inputs)
     with settings_of("identification", run.study):
@@ -94,7 +96,9 @@ def identify(
         return None
     clock, watch = time.perf_counter(), Watch(run, time_limit)
     run.until_written.enter_context(search.checkpoint.kept())
-    found = _identified(run, flights, data, held_out, kept, search.run(options, watch, _shown(run)))
+    found = _identified(
+        run, flights, data, held_out, kept, search.run(watch, _shown(run), count=workers, scheduler=scheduler)
+    )
     if isinstance(found, NothingFoundError):
         search.end(found.stop_reason)
         raise without_model(found.stop_reason, watch.signal) or _of(flights, found)

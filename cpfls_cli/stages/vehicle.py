@@ -22,7 +22,7 @@ from cpfls_cli.arguments import (
 )
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import InputFile
-from cpfls_cli.artifacts.job import Job
+from cpfls_cli.artifacts.job import Job, origin_before
 from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.artifacts.output import check_output, refuse_own
 from cpfls_cli.artifacts.vehicle_model import (
@@ -69,7 +69,7 @@ from cpfls_cli.report.content import percent
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
 from cpfls_cli.response.spectra import ACCEPTABLE
 from cpfls_cli.rounding import levelled
-from cpfls_cli.search import VehicleCheckpoint, Watch, begin_vehicle_search
+from cpfls_cli.search import VehicleCheckpoint, Watch
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._checkpoint import stop_note
 from cpfls_cli.stages._numbers import to_fly
@@ -289,7 +289,8 @@ def vehicle(
     """Find a vehicle in flights, and judge it on those held out."""
     others = held_out or []
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", others)
-    checkpoint, kept = begin_vehicle_search(run, run.take(learned | unseen), resume=resume)
+    begun = origin_before(run.study, run.take(learned | unseen), "vehicle-checkpoint")
+    checkpoint, kept = VehicleCheckpoint.begun(run, begun, resume=resume)
     refuse_seen(*([run.files[role] for role in roles] for roles in (learned, unseen)))
     twice = seen_twice(run.files[role] for role in learned)
     if write_config is not None:
