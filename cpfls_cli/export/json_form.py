@@ -107,24 +107,7 @@ def json_text(sheet: Sheet, remarks: Sequence[str] = ()) -> str:
         "mass_kg": vehicle.mass_kg,
         "gravity_m_s2": vehicle.gravity_m_s2,
         "inertia_kg_m2": symmetric(sheet.rigid_body) if found is None else None,
-        "structure": None if found is None else _structure(found),
-        "fuzzy": None if found is None else _fuzzy(found),
-        "rigid_body": None
-        if found is None
-        else {
-            "unit": "kg m^2",
-            "frame": BODY,
-            "tensor": dict(zip(INERTIA_PARAMETERS, found.rigid_body.tolist(), strict=True)),
-        },
-        "excited_region": None
-        if found is None
-        else {
-            "description": "'#' where training visited roll and pitch; a line for each roll, pitch along it, from -180 "
-            "deg",
-            "cell_deg": 360 / CELLS,
-            "share": np.mean(found.visited),
-            "rows": visited_rows(found),
-        },
+        **(dict.fromkeys(_OF_ATTITUDE) if found is None else _over_attitude(found)),
         "rotors": sheet.model.rotors,
         "response": response_of(sheet),
         "effects": {
@@ -169,6 +152,21 @@ def _wrench(sheet: Sheet) -> dict[str, Any]:
         },
         "wrench": {"lines": lines, "components": components},
     }
+
+
+_OF_ATTITUDE = ("structure", "fuzzy", "rigid_body", "excited_region")
+
+
+def _over_attitude(model: InertiaFunctions) -> dict[str, Any]:
+    region = {
+        "description": "'#' where training visited roll and pitch; a line for each roll, pitch along it, from -180 deg",
+        "cell_deg": 360 / CELLS,
+        "share": np.mean(model.visited),
+        "rows": visited_rows(model),
+    }
+    tensor = dict(zip(INERTIA_PARAMETERS, model.rigid_body.tolist(), strict=True))
+    rigid_body = {"unit": "kg m^2", "frame": BODY, "tensor": tensor}
+    return dict(zip(_OF_ATTITUDE, (_structure(model), _fuzzy(model), rigid_body, region), strict=True))
 
 
 def _structure(model: InertiaFunctions) -> dict[str, Any]:
