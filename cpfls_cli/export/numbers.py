@@ -20,7 +20,7 @@ from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.export.points import parts_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.rotations import rotation_matrix
-from cpfls_cli.vehicle.motion import Acting, Instant, Wrench
+from cpfls_cli.vehicle.motion import Acting, Acts, Instant, Wrench
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import SYMBOLS
@@ -173,7 +173,7 @@ def numbers_of(model: VehicleModel, wrenches: Wrenches, *, alike: bool) -> Numbe
     moved = tuple(replace(rotor, position_m=tuple(hub)) for rotor, hub in zip(model.vehicle.rotors, hubs, strict=True))
     vehicle = replace(model.vehicle, rotors=moved)
     names = wrenches(Instant(vehicle, Each([1.0] * rotors), (1.0,) * 3, (1.0,) * 3))
-    acting = [Acting(name, lambda see, _p, name=name: wrenches(see)[name]) for name in names]
+    acting = [Acting(name, _one_of(wrenches, name)) for name in names]
     tables = _squares(model.vehicle, alike) | weights_of(acting, vehicle)
     row = np.repeat([1 / arm(model.vehicle), 1.0], 3)
     hover = hover_speed(model.vehicle)
@@ -181,6 +181,10 @@ def numbers_of(model: VehicleModel, wrenches: Wrenches, *, alike: bool) -> Numbe
     turning = np.concatenate([[1.0], np.repeat([hover, hover**2, hover, hover**2], rotors)])
     size = row[:, None, None] * _sizes(rotors)[:, None] * turning
     return Numbers(tuple(tables), np.array(list(tables.values())), size)
+
+
+def _one_of(wrenches: Wrenches, name: str) -> Acts:
+    return lambda see, _p: wrenches(see)[name]
 
 
 @cache

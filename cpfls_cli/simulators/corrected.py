@@ -323,7 +323,7 @@ def corrected(
     files = _written(made, changes, [each.name for each in flights])
     names = of.model.output_names
     texts = {names[file]: text for file, text in files.items()}
-    diff = []
+    diff = list[str]()
     for file, text in files.items():
         given, after = (each.decode("utf-8", "replace").splitlines(keepends=True) for each in (raw_bytes(file), text))
         diff += difflib.unified_diff(given, after, f"given/{names[file]}", f"corrected/{names[file]}", n=1)

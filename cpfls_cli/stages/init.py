@@ -281,8 +281,8 @@ def init(
     file = None
     if model is not None:
         file = taken(run, model, "model")
-        given = (inertia, *((arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()))
-        if any(each is not None for each in given):
+        also = (arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()
+        if any(each is not None for each in (inertia, *also)):
             raise InputError(
                 f"{file.file}: states inertia{', rotors and their factors' if file.rotors else ''}, so leave out "
                 f"--inertia{', --arm and the factors' if file.rotors else ''}; --mass takes the mass as it flew"
