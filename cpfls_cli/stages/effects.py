@@ -8,32 +8,23 @@ import typer
 
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, effect
-from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-
-@result
-class Catalogue:
-    """Effects that a model can miss."""
-
-    vehicle: str = about("whose ranges they are")
-    effects: tuple[dict[str, Any], ...]
-
 
 NameArgument = Annotated[
     str | None, typer.Argument(metavar="NAME", help="An effect, such as rotor_drag; without it, all are listed.")
 ]
 
 
-@stage(Catalogue, output=False)
-def effects(run: Run, name: NameArgument = None) -> Catalogue:
+@stage(dict, output=False)
+def effects(run: Run, name: NameArgument = None) -> dict[str, Any]:
     """List the effects, or describe one in full; ranges are those of the default vehicle."""
     vehicle = VehicleSettings()
     shown = tuple(described(each, vehicle) for each in ([effect(name)] if name else CATALOGUE.values()))
-    run.also = shown[0] if name else {"effects": shown}
+    about = {"vehicle": f"default, {vehicle.mass_kg:g} kg with {len(vehicle.rotors)} rotors"}
+    run.also = about | (shown[0] if name else {"effects": shown})
     run.next.append(("cpfls", "effects") if name else ("cpfls", "effects", shown[0]["name"]))
-    return Catalogue(vehicle=f"default, {vehicle.mass_kg:g} kg with {len(vehicle.rotors)} rotors", effects=shown)
+    return about | {"effects": shown}
 
 
 def described(entry: Effect, vehicle: VehicleSettings) -> dict[str, Any]:

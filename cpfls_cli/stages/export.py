@@ -5,11 +5,10 @@ from __future__ import annotations
 import keyword
 import re
 import sys
-from collections.abc import Mapping
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -22,7 +21,6 @@ from cpfls_cli.export.mcap_form import TIME, View, csv_text, mcap_bytes
 from cpfls_cli.export.registry import FORMS, exported
 from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.viewed import view_of
-from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.stages._sheets import sheet_of
 
@@ -71,28 +69,14 @@ _NAMED_AS_FILES = {"pyflyt": "a model of PyFlyt", "webots": "a PROTO of Webots"}
 _IMPORTED = ("casadi", "jax", "numpy", "pegasus", "rotorpy")
 
 
-@result
-class Written:
-    """Files for other programs."""
-
-    dry_run: bool = about("whether nothing was written")
-    format: str = about("that they are of")
-    output: tuple[str, ...] = about("their names", "file")
-    bytes: int = about("in all of them")
-    sizes: Mapping[str, int] = about("bytes of each", brief=False)
-    said: tuple[str, ...] = about("what a model is, and what the form does not hold", "sentence", brief=False)
-    warnings: tuple[str, ...] = about("what speaks against using it", "warning", brief=False)
-    view: View | None = None
-
-
-@stage(Written, words={"TIME": TIME})
+@stage(dict, words={"TIME": TIME})
 def export(
     run: Run,
     model: ModelArgument,
     format: FormatOption = None,  # the name of the option
     name: NameOption = None,
     anyway: ExportAnywayOption = False,
-) -> Written:
+) -> dict[str, Any]:
     """Write a model, or what programs draw, in another form."""
     form = format.value if format else _form_of(run.output)
     if run.output.suffix != ENDINGS[form]:
@@ -100,7 +84,7 @@ def export(
     return _drawn(run, model, form) if form in VIEWERS else _modelled(run, model, form, name, anyway=anyway)
 
 
-def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: bool) -> Written:
+def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: bool) -> dict[str, Any]:
     """Write a model."""
     prefix, outputs = _prefix_of(run.output, form, name), _outputs_of(run.output, form)
     source = run.take({"model": model})["model"]
@@ -129,7 +113,7 @@ def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: boo
     return _written(run, form, (*sheet.remarks, *made.remarks), sheet.warnings)
 
 
-def _drawn(run: Run, artifact: Path, form: str) -> Written:
+def _drawn(run: Run, artifact: Path, form: str) -> dict[str, Any]:
     """Write the quantities of an artifact over the clock of its log."""
     run.take({"artifact": artifact})
     given, origin = store.read(artifact, kind_of(artifact))
@@ -153,18 +137,11 @@ def _drawn(run: Run, artifact: Path, form: str) -> Written:
 
 def _written(
     run: Run, form: str, said: tuple[str, ...] = (), warnings: tuple[str, ...] = (), view: View | None = None
-) -> Written:
+) -> dict[str, Any]:
     sizes = {str(path): len(each if isinstance(each, bytes) else each.encode()) for path, each in run.texts.items()}
-    return Written(
-        dry_run=run.dry_run,
-        format=form,
-        output=tuple(sizes),
-        bytes=sum(sizes.values()),
-        sizes=sizes,
-        said=said,
-        warnings=warnings,
-        view=view,
-    )
+    made = {"dry_run": run.dry_run, "format": form, "output": list(sizes), "bytes": sum(sizes.values())}
+    run.also = made | run.also
+    return made | {"sizes": sizes, "said": said, "warnings": warnings, "view": view}
 
 
 def _form_of(output: Path) -> str:

@@ -14,10 +14,11 @@ import typer
 from cpfls_cli import store
 from cpfls_cli.errors import InputError
 from cpfls_cli.report.source import source_of_result
-from cpfls_cli.result import datasets, part, plain, result
+from cpfls_cli.result import datasets, plain
 from cpfls_cli.stage import Run, Stage, loaded, stage, stage_that_made
 from cpfls_cli.words import did_you_mean
 
+_NOTHING: dict[str, Any] = {"file": None, "listed": (), "described": None}
 _LONG = "too long to be shown: its values are in the file"
 
 FileArgument = Annotated[Path | None, typer.Argument(metavar="FILE", help="Any artifact.")]
@@ -26,22 +27,13 @@ NameOption = Annotated[
 ]
 
 
-@result
-class Shown:
-    """A file, all formats, or one of them."""
-
-    file: Mapping[str, Any] | None = part(default=None, brief=False)
-    listed: tuple[Mapping[str, Any], ...] = part(default=(), brief=False)
-    described: Mapping[str, Any] | None = part(default=None, brief=False)
-
-
 def short(described: Mapping[str, Any]) -> str:
     """Give the name of a format as it is typed."""
     return str(described["format"]).removeprefix("cpfls/")
 
 
-@stage(Shown, output=False, words={"short": short})
-def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown:
+@stage(dict, output=False, words={"short": short})
+def info(run: Run, file: FileArgument = None, name: NameOption = None) -> dict[str, Any]:
     """Show a file, or formats."""
     if file and name is not None:
         raise InputError("--format describes files of a format in general: leave out FILE or --format")
@@ -64,23 +56,23 @@ def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown:
     run.also = held | ({} if long else {"result": plain(given)})
     run.next.append(("cpfls", "check", file))
     answer = _LONG if long else own.text(given, about=source)
-    return Shown(file=held | {"answer": answer, "datasets": _datasets(own)})
+    return _NOTHING | {"file": held | {"answer": answer, "datasets": _datasets(own)}}
 
 
-def _formats(run: Run, name: str | None) -> Shown:
+def _formats(run: Run, name: str | None) -> dict[str, Any]:
     """Describe the format of a name, such as ``flight`` or ``cpfls/flight``; without a name, list all."""
     every = tuple(map(described, formats()))
     if name is None:
         run.also = {"formats": [{name: each[name] for name in ("format", "description", "commands")} for each in every]}
         run.next.append(("cpfls", "info", "--format", short(every[0])))
-        return Shown(listed=every)
+        return _NOTHING | {"listed": every}
     known = {short(each): each for each in every}
     chosen = known.get(asked := name.removeprefix("cpfls/"))
     if chosen is None:
         hint = did_you_mean(asked, list(known), "", most=3)
         raise InputError(f"--format {name}: no such format{f' ({hint})' if hint else ''}; there are {', '.join(known)}")
     run.also = {"formats": [chosen]}
-    return Shown(described=chosen)
+    return _NOTHING | {"described": chosen}
 
 
 def formats() -> list[Stage]:
