@@ -41,18 +41,6 @@ _TAKES_OFF = 0.05
 """Share of a gap from which on refitted numbers of the vehicle are said to take some of it off."""
 
 
-@result
-class LargestGap:
-    """Where the gap of the model as given is largest on the held-out flights."""
-
-    channels: tuple[str, ...] = about("with a gap above noise, largest first, in floors", "channel")
-    flight: str = about("of the worst stretch of the first channel; empty where none stands out")
-    start_s: float = about("of the stretch, on the clock of the flight", unit="s", gaps=True)
-    end_s: float = about("of the stretch, on the clock of the flight", unit="s", gaps=True)
-    floors: float = about("root mean square there", gaps=True)
-    share_of_time: float = about("in which the first channel is above noise")
-
-
 class _OfGap:
     """What has a gap before and after."""
 
@@ -144,8 +132,12 @@ class Diagnosis(Conclusion, _OfGap):
         return tuple(map(LearnedFlight.in_file, files, training, [sum(everything)] if halved else training))
 
     @property
-    def where(self) -> LargestGap | None:
-        """Where the gap of the model as given is largest on the held-out flights; None where all is within noise."""
+    def where(self) -> dict[str, Any] | None:
+        """Where the gap of the model as given is largest on the held-out flights; None where all is within noise.
+
+        Channels with a gap above noise, largest first, and the worst stretch of the first one, on the clock of the
+        flight, whose name is empty where none stands out.
+        """
         floors = self.gap.before_floors
         order = [index for index in np.argsort(-np.nan_to_num(floors), kind="stable") if floors[index] > CLEAR]
         if not order:
@@ -154,14 +146,14 @@ class Diagnosis(Conclusion, _OfGap):
         first = CHANNELS[order[0]]
         worst = next((each for each in self.worst if each.channel == first), None)
         names = names_of(self.recorded, HELD_OUT)
-        return LargestGap(
-            channels=tuple(CHANNELS[index] for index in order),
-            flight="" if worst is None else names[worst.flight],
-            start_s=np.nan if worst is None else worst.start_s,
-            end_s=np.nan if worst is None else worst.end_s,
-            floors=np.nan if worst is None else worst.rms_floors,
-            share_of_time=float((np.abs(windows) > CLEAR).mean()),
-        )
+        return {
+            "channels": [CHANNELS[index] for index in order],
+            "flight": "" if worst is None else names[worst.flight],
+            "start_s": np.nan if worst is None else worst.start_s,
+            "end_s": np.nan if worst is None else worst.end_s,
+            "floors": np.nan if worst is None else worst.rms_floors,
+            "share_of_time": float((np.abs(windows) > CLEAR).mean()),
+        }
 
     @property
     def repeatability(self) -> dict[str, Repeatability] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
 from enum import StrEnum
 from importlib import import_module
 from math import inf, radians
@@ -202,20 +202,6 @@ _SAMPLES_IN_A_PART = 8
 _MOST_SAMPLES = 1_000_000
 
 
-@dataclass(frozen=True)
-class Flight:
-    """A path as it is to be flown, all runs of it.
-
-    `at` samples it anew, two runs at most, for a look between its samples; `excitation`: of a held vehicle, where the
-    path is optimised; `excited`: what is added to the setpoints.
-    """
-
-    planned: PlannedRotation
-    at: PlanAt
-    excitation: Excitation | None = None
-    excited: Excited | None = None
-
-
 def _draw_derivatives(r: PlannedPath, figure: Figure) -> None:
     """Draw pop to displacement over the first move: Figure 2 of the paper."""
     move = r.first_leg()
@@ -309,8 +295,8 @@ def _planned(run: Run, settings: TrajectorySettings, waypoints: Path | None) -> 
     if run.dry_run and settings.path == "optimised":
         return None
     with settings_of("trajectory", run.study):
-        flight = _flight(run, settings)
-        demand, problems = _demand(run.study, settings, flight.planned, flight.at)
+        planned, at, excitation, excited = _flight(run, settings)
+        demand, problems = _demand(run.study, settings, planned, at)
     if problems and settings.infeasible == "stop":
         change = f"{_remedy(run.study, settings)}, change the vehicle, or set trajectory.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{run.output}: no path was written; {change}"]))
@@ -319,7 +305,7 @@ def _planned(run: Run, settings: TrajectorySettings, waypoints: Path | None) -> 
     if run.study.vehicle.unknown and run.open_numbers == "refused":
         unknown = joined(name.replace("_", " ") for name in run.study.vehicle.unknown)
         run.note(f"{unknown}: null in the config; what the path asks of the rotors was checked with guesses")
-    return PlannedPath.of(flight.planned, demand, settings, excitation=flight.excitation, excited=flight.excited)
+    return PlannedPath.of(planned, demand, settings, excitation=excitation, excited=excited)
 
 
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
@@ -335,15 +321,18 @@ def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
     return settings
 
 
-def _flight(job: Run, settings: TrajectorySettings) -> Flight:
+def _flight(
+    job: Run, settings: TrajectorySettings
+) -> tuple[PlannedRotation, PlanAt, Excitation | None, Excited | None]:
+    """Give a path as it is to be flown, all runs of it, with what is optimised of a held vehicle and what is added.
+
+    The function samples it anew, two runs at most, for a look between its samples.
+    """
     if settings.held:
         with settings_of("trajectory.rotation", job.study):
             path, excitation = _rotation(job, settings)
-        return Flight(
-            held_rotation(path, settings.sample_time_s),
-            lambda sample_time: held_rotation(path, sample_time),
-            excitation,
-        )
+        planned = held_rotation(path, settings.sample_time_s)
+        return planned, lambda sample_time: held_rotation(path, sample_time), excitation, None
     gravity = job.study.vehicle.gravity_m_s2
     plain = plan(settings, gravity)
     room: RoomLeft | None = None
@@ -359,9 +348,9 @@ def _flight(job: Run, settings: TrajectorySettings) -> Flight:
 
     without = repeated(plain, settings, gravity)
     if room is None:
-        return Flight(without, at)
+        return without, at, None, None
     excited = repeated(room.added.onto(plain, gravity), settings, gravity)
-    return Flight(excited, at, None, Excited.of(settings.excite, excited, without, room))
+    return excited, at, None, Excited.of(settings.excite, excited, without, room)
 
 
 def _rotation(job: Run, settings: TrajectorySettings) -> tuple[RotationPath, Excitation | None]:
