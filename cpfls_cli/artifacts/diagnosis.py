@@ -15,9 +15,8 @@ from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, LeftOut, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import Comparison
-from cpfls_cli.gap.naming.causes import all_numbers
 from cpfls_cli.gap.naming.results import BODY, Conclusion, Estimate, GapChange, GapSize, NamedEffect
-from cpfls_cli.gap.recorded import GIVEN, HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
+from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
 from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.gap.settings import CLEAR
@@ -34,7 +33,6 @@ from cpfls_cli.weak_form.windows import Recording
 if TYPE_CHECKING:
     from cpfls_cli.gap.before_after import BeforeAfter
     from cpfls_cli.gap.diagnose import DiagnosisRun
-    from cpfls_cli.gap.extended import Refit
 
 
 _TAKES_OFF = 0.05
@@ -249,18 +247,6 @@ class Disagreement(Comparison):
     learned: tuple[LearnedFlight, ...] = part((), brief=False)
     """Flights that its base learned from."""
 
-    @classmethod
-    def of(
-        cls, found: Comparison, recordings: Sequence[Recording], warnings: tuple[str, ...], base: VehicleModel
-    ) -> Disagreement:
-        """Put a comparison together with the model and the flights."""
-        return cls(
-            **vars(found),
-            warnings=(*found.audit.filtered, *warnings),
-            base=base,
-            recorded=recorded(recordings, [GIVEN] * len(recordings)),
-        )
-
     @property
     def flights(self) -> list[str]:
         """Names of the flights."""
@@ -299,31 +285,6 @@ class Extended(AnyModel, _OfGap):
     playback: PlaybackChange | None = part(default=None)
     left_out: tuple[LeftOut, ...] = part(default=(), brief=False)
     """Effects that no vehicle for other programs holds."""
-
-    @classmethod
-    def of(
-        cls,
-        refit: Refit,
-        stated: VehicleSettings,
-        model: VehicleModel,
-        playback: PlaybackChange,
-        left_out: Sequence[LeftOut],
-    ) -> Extended:
-        """Put a refit together; `stated` is the vehicle that the effects were fitted with."""
-        fitted, unseen, moments = refit.model, refit.unseen, stated.inertia_kg_m2
-        rigid_body = six_parameters(moments) if fitted.base is None else np.zeros(6)
-        correction = np.array([*fitted.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])
-        scale = next((each.value for each in refit.estimates.parameters if each.name == "thrust_scale"), 0.0)
-        return cls(
-            model=model,
-            inertia=rigid_body + correction,
-            thrust_scale=1.0 + scale,
-            effects=refit.effects,
-            vehicle_numbers=all_numbers(refit.estimates),
-            gap=GapChange.of(unseen.size(unseen.before), unseen.size(unseen.after), unseen.floor),
-            playback=playback,
-            left_out=tuple(left_out),
-        )
 
     @property
     def contradictions(self) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from cpfls_cli.flights.recordings import Recordings, read_flights
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import compare as compare_flights
+from cpfls_cli.gap.recorded import GIVEN, recorded
 from cpfls_cli.gap.residual.views import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.gap import channel_unit, channel_words
@@ -254,7 +255,12 @@ def compared(
     """Compare a model with flights; rotors are held against `whole` ones, where there are more than these."""
     rng = generator(study, "compare")
     found = compare_flights(given.recordings, model, study.gap, rng, progress, whole=whole)
-    return Disagreement.of(found, given.recordings, given.warnings, model)
+    return Disagreement(
+        **vars(found),
+        warnings=(*found.audit.filtered, *given.warnings),
+        base=model,
+        recorded=recorded(given.recordings, [GIVEN] * len(given.recordings)),
+    )
 
 
 def check_ignored(study: Study) -> None:
