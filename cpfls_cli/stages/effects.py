@@ -38,7 +38,10 @@ def described(entry: Effect, vehicle: VehicleSettings) -> dict[str, Any]:
             {"name": each.name, "unit": each.unit, "meaning": each.meaning, "low": low, "high": high}
             for each, low, high in ranges
         ],
-        "shapes": list(map(vars, whole.shapes)),
+        "shapes": [
+            {name: getattr(each, name) for name in ("name", "unit", "grid", "meaning", "first", "valley")}
+            for each in whole.shapes
+        ],
         "needs": sorted(entry.needs),
         "seen_in": "sensors alone" if entry.columns is None else "torque and force",
         "excitation": entry.excitation,

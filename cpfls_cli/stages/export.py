@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
@@ -33,6 +33,7 @@ from cpfls_cli.export.viewed import view_of
 from cpfls_cli.flights.models import any_model, modelled
 from cpfls_cli.pages.model import against, impossible_in_words, worth_in_words
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.validation.trust import Trust
 
@@ -81,14 +82,28 @@ _NAMED_AS_FILES = {"pyflyt": "a model of PyFlyt", "webots": "a PROTO of Webots"}
 _IMPORTED = ("casadi", "jax", "numpy", "pegasus", "rotorpy")
 
 
-@stage(dict, words={"TIME": TIME})
+@result
+class Written:
+    """Files for other programs."""
+
+    dry_run: bool = about("whether nothing was written")
+    format: str = about("that they are of")
+    output: tuple[str, ...] = about("their names", "file")
+    bytes: int = about("in all of them")
+    sizes: Mapping[str, int] = about("bytes of each", brief=False)
+    said: tuple[str, ...] = about("what a model is, and what the form does not hold", "sentence", brief=False)
+    warnings: tuple[str, ...] = about("what speaks against using it", "warning", brief=False)
+    view: View | None = None
+
+
+@stage(Written, words={"TIME": TIME})
 def export(
     run: Run,
     model: ModelArgument,
     format: FormatOption = None,  # the name of the option
     name: NameOption = None,
     anyway: ExportAnywayOption = False,
-) -> dict[str, Any]:
+) -> Written:
     """Write a model, or what programs draw, in another form."""
     form = format.value if format else _form_of(run.output)
     if run.output.suffix != ENDINGS[form]:
@@ -96,7 +111,7 @@ def export(
     return _drawn(run, model, form) if form in VIEWERS else _modelled(run, model, form, name, anyway=anyway)
 
 
-def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: bool) -> dict[str, Any]:
+def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: bool) -> Written:
     """Write a model."""
     prefix, outputs = _prefix_of(run.output, form, name), _outputs_of(run.output, form)
     source = run.take({"model": model})["model"]
@@ -125,7 +140,7 @@ def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: boo
     return _written(run, form, (*sheet.remarks, *made.remarks), sheet.warnings)
 
 
-def _drawn(run: Run, artifact: Path, form: str) -> dict[str, Any]:
+def _drawn(run: Run, artifact: Path, form: str) -> Written:
     """Write the quantities of an artifact over the clock of its log."""
     run.take({"artifact": artifact})
     given, origin = store.read(artifact, kind_of(artifact))
@@ -149,11 +164,18 @@ def _drawn(run: Run, artifact: Path, form: str) -> dict[str, Any]:
 
 def _written(
     run: Run, form: str, said: tuple[str, ...] = (), warnings: tuple[str, ...] = (), view: View | None = None
-) -> dict[str, Any]:
+) -> Written:
     sizes = {str(path): len(each if isinstance(each, bytes) else each.encode()) for path, each in run.texts.items()}
-    made = {"dry_run": run.dry_run, "format": form, "output": list(sizes), "bytes": sum(sizes.values())}
-    run.also = made | run.also
-    return made | {"sizes": sizes, "said": said, "warnings": warnings, "view": view}
+    return Written(
+        dry_run=run.dry_run,
+        format=form,
+        output=tuple(sizes),
+        bytes=sum(sizes.values()),
+        sizes=sizes,
+        said=said,
+        warnings=warnings,
+        view=view,
+    )
 
 
 def _form_of(output: Path) -> str:

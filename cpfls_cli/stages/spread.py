@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -17,6 +17,8 @@ from cpfls_cli.flights.models import any_model, found_vehicle, is_found, is_mode
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.playback.gusts import GUST_AXES
 from cpfls_cli.playback.spread import Estimates, drawn, require_sure
+from cpfls_cli.result import about as described
+from cpfls_cli.result import result
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages.export import sheet_of
 
@@ -25,23 +27,33 @@ CountOption = Annotated[int, typer.Option("-n", "--count", metavar="N", min=2, h
 SeedOption = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the draws.")]
 
 
-def _calm(samples: Samples) -> dict[str, list[str]]:
-    """Name axes on which no gusts are known, those about which the vehicle turns and those along which it moves."""
-    gusts = samples.sheet.model.gusts
-    known = np.zeros(len(GUST_AXES), bool) if gusts is None else np.asarray(gusts.size) != 0
-    still = [name for name, known_there in zip(GUST_AXES, known, strict=True) if not known_there]
-    parted = (("about", GUST_AXES[:3]), ("along", GUST_AXES[3:]))
-    return {word: own for word, axes in parted if (own := [name for name in axes if name in still])}
+@result
+class Written:
+    """Vehicles that were drawn, in a file."""
+
+    dry_run: bool = described("whether nothing was written")
+    output: str = described("the file")
+    bytes: int = described("of the file")
+    samples: Samples
+
+    @property
+    def calm(self) -> dict[str, list[str]]:
+        """Axes on which no gusts are known, those about which the vehicle turns and those along which it moves."""
+        gusts = self.samples.sheet.model.gusts
+        known = np.zeros(len(GUST_AXES), bool) if gusts is None else np.asarray(gusts.size) != 0
+        still = [name for name, known_there in zip(GUST_AXES, known, strict=True) if not known_there]
+        parted = (("about", GUST_AXES[:3]), ("along", GUST_AXES[3:]))
+        return {word: own for word, axes in parted if (own := [name for name in axes if name in still])}
 
 
-@stage(dict, words={"name_of": name_of, "trust_words": trust_words})
+@stage(Written, words={"name_of": name_of, "trust_words": trust_words})
 def spread(
     run: Run,
     model: VehicleArgument,
     count: CountOption = 1000,
     seed: SeedOption = 1,
     anyway: ExportAnywayOption = False,
-) -> dict[str, Any] | None:
+) -> Written | None:
     """Draw vehicles, and write them."""
     ending = require_ending(str(run.output), run.output.suffix)
     source = run.take({"model": model})["model"]
@@ -66,7 +78,5 @@ def spread(
             held=found.guessed,
         )
     run.texts[run.output] = text = samples.written(ending)
-    written = {"dry_run": False, "output": str(run.output), "bytes": len(text)}
-    ranges = {name: each._asdict() for name, each in samples.ranges.items()}
-    run.also = {**written, **samples.facts, "ranges": ranges}
-    return written | {"samples": samples, "calm": _calm(samples)}
+    run.also = {**samples.facts, "ranges": {name: each._asdict() for name, each in samples.ranges.items()}}
+    return Written(dry_run=False, output=str(run.output), bytes=len(text), samples=samples)
