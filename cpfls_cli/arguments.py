@@ -53,9 +53,6 @@ TrainingArgument = Annotated[
     list[Path], typer.Argument(metavar="FLIGHT", help="Made by `cpfls simulate` or `cpfls import`; one or more.")
 ]
 LogArgument = Annotated[Path, typer.Argument(metavar="LOG", help=f"Flight log: {suffixes_in_words()}.")]
-LogsArgument = Annotated[
-    list[Path], typer.Argument(metavar="LOG", help=f"Flight logs of one vehicle: {suffixes_in_words()}.")
-]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Any artifact.")]
 FlightsArgument = Annotated[
     list[Path],

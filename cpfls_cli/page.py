@@ -187,19 +187,6 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 _NOTHING: Mapping[str, Any] = {}
 
 
-class _Added:
-    """What templates know beside what all do, the same for one mapping as long as that lives."""
-
-    def __init__(self, names: Mapping[str, Any]) -> None:
-        self.names = names
-
-    def __hash__(self) -> int:
-        return id(self.names)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Added) and other.names is self.names
-
-
 class _Compiled(BytecodeCache):
     """Templates as compiled, once for all stages: what each adds is looked up when they are rendered."""
 
@@ -216,8 +203,14 @@ class _Compiled(BytecodeCache):
 _COMPILED = _Compiled()
 
 
-@cache
-def _environment(folder: Path, added: _Added) -> Environment:
+_MADE: dict[tuple[Path, int], tuple[Environment, Mapping[str, Any]]] = {}
+"""What renders templates, with what they know besides what all do: the same for one mapping as long as that lives."""
+
+
+def environment(folder: Path, added: Mapping[str, Any]) -> Environment:
+    """Give what renders the templates of a folder, with what a stage adds."""
+    if (folder, id(added)) in _MADE:
+        return _MADE[folder, id(added)][0]
     made = Environment(
         loader=FileSystemLoader([folder, TEMPLATES]),
         # What macros give is not escaped again; everything else that is shown is data.
@@ -230,17 +223,13 @@ def _environment(folder: Path, added: _Added) -> Environment:
     )
     made.filters.update(_FILTERS)
     made.globals.update(
-        np=np, listing=listing, said=said, table=table, zip=zip, column=column, quoted=shlex.quote, **added.names
+        np=np, listing=listing, said=said, table=table, zip=zip, column=column, quoted=shlex.quote, **added
     )
-    functions = {name: each for name, each in added.names.items() if callable(each)}
+    functions = {name: each for name, each in added.items() if callable(each)}
     made.filters.update(functions)
     made.tests.update(functions)
+    _MADE[folder, id(added)] = made, added
     return made
-
-
-def environment(folder: Path, added: Mapping[str, Any]) -> Environment:
-    """Give what renders the templates of a folder, with what a stage adds."""
-    return _environment(folder, _Added(added))
 
 
 def words(

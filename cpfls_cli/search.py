@@ -7,10 +7,10 @@ import os
 import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -146,33 +146,32 @@ class StoppedSearch:
     unfinished: Unfinished
 
 
-class Written(NamedTuple):
-    """The output of a command that was stopped, or was not: whether it is complete, and where it comes from."""
-
-    complete: bool
-    origin: Origin
-
-
-def _same_origin(one: Origin, other: Origin) -> bool:
-    """Tell whether two outputs come from the same config and inputs."""
-    names = ("version", "seed", "config", "inputs", "cautions")
-    return all(getattr(one, name) == getattr(other, name) for name in names)
-
-
 @dataclass(frozen=True)
 class KeptFile:
     """A file next to the output from which a stopped command can go on; `origin` is of the command run now."""
 
     path: Path
     header: Origin
-    WORK: ClassVar[str]
-    SUFFIX: ClassVar[str]
     OUTPUT: ClassVar[type[IdentifiedModel | Vehicle]]
 
     @classmethod
     def beside(cls, output: Path, header: Origin) -> Self:
         """Name what is left of an output, such as ``model.h5.checkpoint`` of ``model.h5``."""
-        return cls(output.with_name(f"{output.name}{cls.SUFFIX}"), header)
+        return cls(output.with_name(f"{output.name}.checkpoint"), header)
+
+    @classmethod
+    def begun(cls, job: Job, header: Origin, *, resume: bool) -> tuple[Self, Any]:
+        """Check what is left and the output of a search before anything is computed; give what it goes on from."""
+        own = cls.beside(job.output, header)
+        left = own.read() if resume else None
+        if not resume:
+            own.require_permission(force=job.force)
+        check_outputs(job, job.output, replaceable=resume and own.output_may_be_replaced())
+        return own, left
+
+    def read(self) -> Any:
+        """Take up what was left."""
+        raise NotImplementedError
 
     @property
     def output(self) -> Path:
@@ -181,25 +180,22 @@ class KeptFile:
 
     def require_permission(self, *, force: bool) -> None:
         """Refuse to give up what is left, unless that is allowed, and what is not left by this program in any case."""
-        self.require_own()
-        if self.path.exists() and not force:
+        if not self.path.exists():
+            return
+        if not (self.path.is_file() and is_hdf5(self.path)):
             raise InputError(
-                f"{self.path}: a {self.WORK} for {self.output} was stopped here; --resume continues it, --force "
-                "starts again"
+                f"{self.path}: has the name of what a stopped search leaves, but is none; move it away, or name "
+                "another output"
             )
-
-    def require_own(self) -> None:
-        """Refuse a file of the user that happens to have the name of what is left."""
-        if self.path.exists() and not (self.path.is_file() and is_hdf5(self.path)):
+        if not force:
             raise InputError(
-                f"{self.path}: has the name of what a stopped {self.WORK} leaves, but is none; move it away, or "
-                "name another output"
+                f"{self.path}: a search for {self.output} was stopped here; --resume continues it, --force starts again"
             )
 
     def output_may_be_replaced(self) -> bool:
         """Tell whether the output is what the stopped command left: incomplete, or complete and not tidied up."""
-        written = self._written()
-        return written is not None and (not written.complete or _same_origin(written.origin, self.header))
+        complete, origin = self._written() or (True, None)
+        return origin is not None and (not complete or replace(origin, stage=self.header.stage) == self.header)
 
     def remove(self) -> None:
         """Remove what is left, if there is anything."""
@@ -218,8 +214,7 @@ class KeptFile:
     def _read(self, wanted: type[T]) -> tuple[T, Origin]:
         """Read what is left."""
         if not self.path.exists():
-            written = self._written()
-            if written is not None and written.complete:
+            if (self._written() or (False,))[0]:
                 raise InputError(f"{self.output}: is complete; nothing to resume")
             raise InputError(f"{self.path}: no such file, so nothing to resume; start without --resume")
         try:
@@ -235,19 +230,19 @@ class KeptFile:
         except (ValueError, LookupError, TypeError) as error:
             raise InputError(f"{self.path}: damaged: {error}; {_START_AGAIN}") from None
 
-    def _written(self) -> Written | None:
-        """Read the output; None where there is none, or another file."""
+    def _written(self) -> tuple[bool, Origin] | None:
+        """Tell whether the output is complete, and where it comes from; None where there is none, or another file."""
         if not self.output.is_file() or format_name(self.output) != self.OUTPUT.FORMAT:
             return None
         given, origin = read(self.output, self.OUTPUT)
-        return Written(given.complete, origin)
+        return given.complete, origin
 
     def _require_same(self, differing: Iterable[str]) -> None:
         """Refuse what is left of another command."""
         listed = "; ".join(differing)
         if listed:
             raise InputError(
-                f"{self.path}: belongs to another {self.WORK}: {listed}. Repeat the original command with --resume, or "
+                f"{self.path}: belongs to another search: {listed}. Repeat the original command with --resume, or "
                 "start again with --force alone"
             )
 
@@ -256,8 +251,6 @@ class KeptFile:
 class Checkpoint(KeptFile):
     """Where a search leaves its state after every generation."""
 
-    WORK: ClassVar = "search"
-    SUFFIX: ClassVar = ".checkpoint"
     OUTPUT: ClassVar = IdentifiedModel
 
     def write(self, state: EvolutionState) -> None:
@@ -325,47 +318,6 @@ _OF_A_PROCESSOR = 8
 """Processes that a processor may get, of which more than one only share it."""
 
 
-@dataclass(frozen=True)
-class SearchOptions:
-    """How a command runs its search; nothing of it changes what a search that comes to its end finds.
-
-    Attributes
-    ----------
-    resume : bool
-        Go on from the checkpoint.
-    time_limit_s : float or None
-        Stop the search after so much time, and keep what it has.
-    workers : int
-        Processes that evaluate.
-    scheduler : str or None
-        Address of a Dask scheduler whose workers evaluate.
-    """
-
-    resume: bool = False
-    time_limit_s: float | None = None
-    workers: int = 1
-    scheduler: str | None = None
-
-    @property
-    def workers_option(self) -> str:
-        """The option that names the workers, as it is typed."""
-        return f"--workers {self.workers}" if self.scheduler is None else f"--scheduler {self.scheduler}"
-
-    def employed(self, evaluate: Evaluate) -> AbstractContextManager[Workforce]:
-        """Employ the workers that evaluate."""
-        return employ(evaluate, count=self.workers, scheduler=self.scheduler)
-
-    def require_workers(self) -> None:
-        """Refuse more processes than this machine can run, and a scheduler beside them or without an address."""
-        if self.scheduler is not None and self.workers > 1:
-            raise InputError("--scheduler: brings its own workers; leave out --workers")
-        if self.scheduler is not None:
-            require_address(self.scheduler)
-        processors = os.cpu_count() or 1
-        if self.workers > _OF_A_PROCESSOR * processors:
-            raise InputError(f"--workers {self.workers}: this machine has {processors} processors; give that many")
-
-
 class Watch:
     """Decides when a search has to stop: at an interrupt, or at its time limit.
 
@@ -405,21 +357,22 @@ class Resumable:
     checkpoint: Checkpoint
     stopped: StoppedSearch | None
 
-    def run(self, options: SearchOptions, watch: Watch, progress: Callable[[SearchStep], None]) -> SearchRun:
+    def run(
+        self, watch: Watch, progress: Callable[[SearchStep], None], *, count: int = 1, scheduler: str | None = None
+    ) -> SearchRun:
         """Arrange how the search is run; from here on a checkpoint that is not resumed is given up.
 
-        Interrupts are deferred as long as its workers are employed, which is as long as it searches.
+        Interrupts are deferred as long as its workers are employed, which is as long as it searches: so many processes,
+        or those of a Dask scheduler at an address.
         """
         if self.stopped is None:
             self.checkpoint.remove()
 
         @contextmanager
         def workers(evaluate: Evaluate) -> Iterator[Workforce]:
-            with (
-                about_option(options.workers_option, WorkerError),
-                watch.deferring(),
-                options.employed(evaluate) as workforce,
-            ):
+            asked = f"--workers {count}" if scheduler is None else f"--scheduler {scheduler}"
+            employed = employ(evaluate, count=count, scheduler=scheduler)
+            with about_option(asked, WorkerError), watch.deferring(), employed as workforce:
                 yield workforce
 
         return SearchRun(
@@ -432,10 +385,6 @@ class Resumable:
             should_stop=watch.should_stop,
         )
 
-    def kept(self) -> AbstractContextManager[None]:
-        """Add to whatever fails inside that the search can go on nevertheless."""
-        return self.checkpoint.kept()
-
     def end(self, reason: StopReason) -> None:
         """Remove the checkpoint of a search that came to its end, after what it found is written."""
         if is_end(reason):
@@ -443,27 +392,21 @@ class Resumable:
 
 
 def begin_search(
-    job: Job, inputs: Mapping[str, Path], options: SearchOptions
+    job: Job, inputs: Mapping[str, Path], *, resume: bool, workers: int, scheduler: str | None
 ) -> tuple[dict[str, InputFile], Resumable]:
-    """Check inputs, checkpoint and output of a search before anything is computed."""
-    options.require_workers()
-    files = take_inputs(job, inputs)
-    header = origin_before(job.study, files)
-    search = resumable(job.output, header, resume=options.resume, force=job.force)
-    check_outputs(job, job.output, replaceable=options.resume and search.checkpoint.output_may_be_replaced())
-    return files, search
+    """Check workers, inputs, checkpoint and output of a search before anything is computed.
 
-
-def resumable(output: Path, header: Origin, *, resume: bool, force: bool) -> Resumable:
-    """Find the checkpoint beside the output of a search, and read it where the search is to go on.
-
-    `force` allows a checkpoint to be given up.
+    Refused are more processes than this machine can run, and a scheduler beside them or without an address.
     """
-    checkpoint = Checkpoint.beside(output, header)
-    if resume:
-        return Resumable(checkpoint, checkpoint.read())
-    checkpoint.require_permission(force=force)
-    return Resumable(checkpoint, None)
+    if scheduler is not None and workers > 1:
+        raise InputError("--scheduler: brings its own workers; leave out --workers")
+    if scheduler is not None:
+        require_address(scheduler)
+    processors = os.cpu_count() or 1
+    if workers > _OF_A_PROCESSOR * processors:
+        raise InputError(f"--workers {workers}: this machine has {processors} processors; give that many")
+    files = take_inputs(job, inputs)
+    return files, Resumable(*Checkpoint.begun(job, origin_before(job.study, files), resume=resume))
 
 
 _OF_VEHICLE = ("vehicle", "import", "playback")
@@ -518,8 +461,6 @@ class KeptStructures:
 class VehicleCheckpoint(KeptFile):
     """Where a search for the structure of a vehicle leaves what it has judged."""
 
-    WORK: ClassVar = "search"
-    SUFFIX: ClassVar = ".checkpoint"
     OUTPUT: ClassVar = Vehicle
 
     def write(self, judged: Sequence[Judged]) -> None:
@@ -534,18 +475,3 @@ class VehicleCheckpoint(KeptFile):
         old, new = (keys_of(header, _OF_VEHICLE) for header in (origin, self.header))
         self._require_same(differences(origin, self.header, old, new, unimportant="held-out"))
         return kept
-
-
-def begin_vehicle_search(
-    job: Job, files: Mapping[str, InputFile], *, resume: bool
-) -> tuple[VehicleCheckpoint, Kept | None]:
-    """Check checkpoint and output of a search for the structure of a vehicle before anything is computed.
-
-    The solutions that are kept tell where to go on; None to start.
-    """
-    checkpoint = VehicleCheckpoint.beside(job.output, origin_before(job.study, files, "vehicle-checkpoint"))
-    kept = checkpoint.read() if resume else None
-    if kept is None:
-        checkpoint.require_permission(force=job.force)
-    check_outputs(job, job.output, replaceable=resume and checkpoint.output_may_be_replaced())
-    return checkpoint, kept

@@ -2,7 +2,8 @@
 
 A module of `stages` holds one, made by the decorator `stage`; `templates` holds what a person reads of its result. The
 command line finds both by the name of the module (`cli/stages.py`). A result without a ``FORMAT`` has no file: it is
-only answered with, and what the stage writes are its `Run.texts`, unless the run is dry.
+only answered with, and what the stage writes are its `Run.texts`, unless the run is dry. One that is a ``dict`` is for
+the template alone: ``--json`` says `Run.also`.
 """
 
 from __future__ import annotations
@@ -281,6 +282,7 @@ class Stage:
             act()
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
         summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
+        summary = {} if self.kind is dict else summary
         return Outcome(
             {**summary, **run.also, **({"cautions": list(cautions)} if cautions else {})},
             (

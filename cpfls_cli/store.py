@@ -225,12 +225,6 @@ def read(path: Path, kind: type[T]) -> tuple[T, Origin]:
     return given, origin
 
 
-def read_first(path: Path, kind: type[T]) -> tuple[T, Origin]:
-    """Read a result as if it had two rows along ``STREAMED``: all else that it holds, in little memory."""
-    given, origin, _ = examine(path, kind, 2)
-    return given, origin
-
-
 def is_long(path: Path, kind: Any) -> bool:
     """Tell whether a result has more rows than are held in memory."""
     axis = getattr(kind, "STREAMED", "")
@@ -261,7 +255,7 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
             makers = " or ".join(f"`cpfls {each}`" for each in getattr(kind, "MADE_BY", "").split(" or ") if each)
             made_by = f" (made by {makers})" if makers else ""
             raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
-        origin, missing = identified(path, file).origin, list[str]()
+        origin, missing = identified(path, file)[1], list[str]()
         given = _read(kind, file, missing, rows)
     if missing:
         raise InputError(f"{path}: the {wanted} lacks {some(missing, 5)}; make it again")

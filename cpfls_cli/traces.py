@@ -7,13 +7,14 @@ import json
 import zlib
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from markupsafe import escape
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import visible
+from cpfls_cli.look.timeline import Event
 from cpfls_cli.page import TEMPLATES
 from cpfls_cli.report.canvas import BASELINE, Drawn, legend_above, stacked, style_of
 from cpfls_cli.trace import Track, thinned
@@ -36,31 +37,7 @@ _WIDE, _PANEL = 10.0, 1.5
 _SEVERITIES = ("note", "warning", "danger")
 
 
-class Happening(Protocol):
-    """Something that happens in a log, such as `look.timeline.Event`."""
-
-    @property
-    def time_s(self) -> float:
-        """When it begins."""
-        ...
-
-    @property
-    def until_s(self) -> float:
-        """When it ends; NaN of a moment."""
-        ...
-
-    @property
-    def text(self) -> str:
-        """What happens."""
-        ...
-
-    @property
-    def severity(self) -> str:
-        """A ``note``, a ``warning`` or a ``danger``."""
-        ...
-
-
-def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Happening] = ()) -> str:
+def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Event] = ()) -> str:
     """Show signals in panels over one axis of time, with a marker for each event.
 
     Parameters
@@ -89,6 +66,8 @@ def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Happening] = 
             for title, tracks in shown.items()
         ],
     }
+    # No text of it ends the script that it is in.
+    written = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     vendor = {name: (TEMPLATES / "vendor" / name).read_text(encoding="utf-8") for name in _VENDOR}
     licence, style, script = vendor.values()
     still = Drawn(
@@ -98,17 +77,12 @@ def traces(panels: Mapping[str, Sequence[Track]], events: Sequence[Happening] = 
         f'<div class="traces"><ol class="events" aria-label="Events">{"".join(map(_event, events))}</ol>'
         f'<div class="moving"></div><div class="still plot">{still(events)}</div></div>'
         f"<style>{style}</style><script>/*! uPlot 1.6.32 (https://github.com/leeoniya/uPlot)\n{licence}*/\n{script}</script>"
-        f'<script type="application/json" id="traces-data">{_in_script(data)}</script>'
+        f'<script type="application/json" id="traces-data">{written}</script>'
         f"<script>{(TEMPLATES / 'traces.js').read_text(encoding='utf-8')}</script>"
     )
 
 
 _VENDOR = ("uPlot.LICENSE.txt", "uPlot.min.css", "uPlot.iife.min.js")
-
-
-def _in_script(data: Any) -> str:
-    """Write data as JSON that cannot end the script it is in."""
-    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def _packed(own: Track, share: float, begin: float, tick: float) -> dict[str, Any]:
@@ -143,7 +117,7 @@ def _deflated(whole: np.ndarray[Any, Any]) -> str:
     return base64.b64encode(zlib.compress(planes.tobytes(), 6)).decode()
 
 
-def _event(own: Happening) -> str:
+def _event(own: Event) -> str:
     until = own.until_s if np.isfinite(own.until_s) else own.time_s
     severity = own.severity if own.severity in _SEVERITIES else _SEVERITIES[0]
     words = escape(visible(own.text))
@@ -151,7 +125,7 @@ def _event(own: Happening) -> str:
 
 
 def _still(
-    panels: Mapping[str, Sequence[Track]], ends: tuple[float, float], events: Sequence[Happening], figure: Figure
+    panels: Mapping[str, Sequence[Track]], ends: tuple[float, float], events: Sequence[Event], figure: Figure
 ) -> None:
     """Draw all panels for print and for who runs no scripts."""
     rows = stacked(figure, len(panels))

@@ -100,12 +100,13 @@ def _configuration() -> str:
 def _formats() -> str:
     lines = []
     for each in map(described, formats()):
-        makers = " or ".join(f"`cpfls {command}`" for command in each.commands)
-        lines += ["", f"### `{each.format}`", "", f"Made by {makers}: {each.description}.", ""]
+        makers = " or ".join(f"`cpfls {command}`" for command in each["commands"])
+        lines += ["", f"### `{each['format']}`", "", f"Made by {makers}: {each['description']}.", ""]
         lines += ["| dataset | dimensions | units | frame | required | description |", "|---|---|---|---|---|---|"]
-        for path, own in each.datasets.items():
-            required, gaps = "yes" if own.required else "no", "; may be not finite" if own.gaps else ""
-            cells = (" x ".join(own.dimensions) or "scalar", own.units, own.frame, required, own.description + gaps)
+        for path, own in each["datasets"].items():
+            required, gaps = "yes" if own["required"] else "no", "; may be not finite" if own["gaps"] else ""
+            shape = " x ".join(own["dimensions"]) or "scalar"
+            cells = (shape, own["units"], own["frame"], required, own["description"] + gaps)
             lines.append(f"| `/{path}` | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

@@ -34,7 +34,7 @@ from cpfls_cli.inertia import six_parameters
 from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.reduction.survey import Survey, survey
 from cpfls_cli.reduction.training_set import reduce_streamed
-from cpfls_cli.search import Checkpoint, Resumable, SearchOptions, StoppedSearch, Watch
+from cpfls_cli.search import Checkpoint, Resumable, StoppedSearch, Watch
 from cpfls_cli.store import Origin, read, write
 
 
@@ -211,7 +211,7 @@ def run(
     selection = InputFile("selection", setting.without_runs.selection, Selection.FORMAT)
     checkpoint = Checkpoint.beside(job.output, origin_before(study, {**inputs, "selection": selection}))
     search = Resumable(checkpoint, left(checkpoint))
-    state = search.run(SearchOptions(False, None, 1, None), watch, lambda _: None)
+    state = search.run(watch, lambda _: None)
     body, rng = six_parameters(study.vehicle.inertia_kg_m2), generator(study, "identify")
     try:
         with settings_of("identification", study):

@@ -15,9 +15,8 @@ from cpfls_cli.consistency.audit import Audit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, LeftOut, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import Comparison
-from cpfls_cli.gap.naming.causes import all_numbers
 from cpfls_cli.gap.naming.results import BODY, Conclusion, Estimate, GapChange, GapSize, NamedEffect
-from cpfls_cli.gap.recorded import GIVEN, HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
+from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
 from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.gap.settings import CLEAR
@@ -34,27 +33,31 @@ from cpfls_cli.weak_form.windows import Recording
 if TYPE_CHECKING:
     from cpfls_cli.gap.before_after import BeforeAfter
     from cpfls_cli.gap.diagnose import DiagnosisRun
-    from cpfls_cli.gap.extended import Refit
 
 
 _TAKES_OFF = 0.05
 """Share of a gap from which on refitted numbers of the vehicle are said to take some of it off."""
 
 
+class _OfGap:
+    """What has a gap before and after."""
+
+    if TYPE_CHECKING:
+        gap: GapChange
+
+    @property
+    def gap_before(self) -> dict[str, Any]:
+        """The gap of the model as given, for machines: lists over x, y, z."""
+        return GapSize(self.gap.before, self.gap.before_floors).as_summary
+
+    @property
+    def gap_after(self) -> dict[str, Any]:
+        """The gap with the effects, for machines: lists over x, y, z."""
+        return GapSize(self.gap.after, self.gap.after_floors).as_summary
+
+
 @result
-class LargestGap:
-    """Where the gap of the model as given is largest on the held-out flights."""
-
-    channels: tuple[str, ...] = about("with a gap above noise, largest first, in floors", "channel")
-    flight: str = about("of the worst stretch of the first channel; empty where none stands out")
-    start_s: float = about("of the stretch, on the clock of the flight", unit="s", gaps=True)
-    end_s: float = about("of the stretch, on the clock of the flight", unit="s", gaps=True)
-    floors: float = about("root mean square there", gaps=True)
-    share_of_time: float = about("in which the first channel is above noise")
-
-
-@result
-class Diagnosis(Conclusion):
+class Diagnosis(Conclusion, _OfGap):
     """Which physical effect a model misses, judged on flights that the fit did not see."""
 
     FORMAT: ClassVar = "cpfls/diagnosis"
@@ -127,8 +130,12 @@ class Diagnosis(Conclusion):
         return tuple(map(LearnedFlight.in_file, files, training, [sum(everything)] if halved else training))
 
     @property
-    def where(self) -> LargestGap | None:
-        """Where the gap of the model as given is largest on the held-out flights; None where all is within noise."""
+    def where(self) -> dict[str, Any] | None:
+        """Where the gap of the model as given is largest on the held-out flights; None where all is within noise.
+
+        Channels with a gap above noise, largest first, and the worst stretch of the first one, on the clock of the
+        flight, whose name is empty where none stands out.
+        """
         floors = self.gap.before_floors
         order = [index for index in np.argsort(-np.nan_to_num(floors), kind="stable") if floors[index] > CLEAR]
         if not order:
@@ -137,24 +144,14 @@ class Diagnosis(Conclusion):
         first = CHANNELS[order[0]]
         worst = next((each for each in self.worst if each.channel == first), None)
         names = names_of(self.recorded, HELD_OUT)
-        return LargestGap(
-            channels=tuple(CHANNELS[index] for index in order),
-            flight="" if worst is None else names[worst.flight],
-            start_s=np.nan if worst is None else worst.start_s,
-            end_s=np.nan if worst is None else worst.end_s,
-            floors=np.nan if worst is None else worst.rms_floors,
-            share_of_time=float((np.abs(windows) > CLEAR).mean()),
-        )
-
-    @property
-    def gap_before(self) -> dict[str, Any]:
-        """The gap of the model as given, for machines: lists over x, y, z."""
-        return GapSize(self.gap.before, self.gap.before_floors).as_summary
-
-    @property
-    def gap_after(self) -> dict[str, Any]:
-        """The gap with the effects, for machines: lists over x, y, z."""
-        return GapSize(self.gap.after, self.gap.after_floors).as_summary
+        return {
+            "channels": [CHANNELS[index] for index in order],
+            "flight": "" if worst is None else names[worst.flight],
+            "start_s": np.nan if worst is None else worst.start_s,
+            "end_s": np.nan if worst is None else worst.end_s,
+            "floors": np.nan if worst is None else worst.rms_floors,
+            "share_of_time": float((np.abs(windows) > CLEAR).mean()),
+        }
 
     @property
     def repeatability(self) -> dict[str, Repeatability] | None:
@@ -250,18 +247,6 @@ class Disagreement(Comparison):
     learned: tuple[LearnedFlight, ...] = part((), brief=False)
     """Flights that its base learned from."""
 
-    @classmethod
-    def of(
-        cls, found: Comparison, recordings: Sequence[Recording], warnings: tuple[str, ...], base: VehicleModel
-    ) -> Disagreement:
-        """Put a comparison together with the model and the flights."""
-        return cls(
-            **vars(found),
-            warnings=(*found.audit.filtered, *warnings),
-            base=base,
-            recorded=recorded(recordings, [GIVEN] * len(recordings)),
-        )
-
     @property
     def flights(self) -> list[str]:
         """Names of the flights."""
@@ -280,7 +265,7 @@ class Disagreement(Comparison):
 
 
 @result
-class Extended(AnyModel):
+class Extended(AnyModel, _OfGap):
     """A model with the effects that it missed in it, refitted together."""
 
     FORMAT: ClassVar = "cpfls/extended"
@@ -301,31 +286,6 @@ class Extended(AnyModel):
     left_out: tuple[LeftOut, ...] = part(default=(), brief=False)
     """Effects that no vehicle for other programs holds."""
 
-    @classmethod
-    def of(
-        cls,
-        refit: Refit,
-        stated: VehicleSettings,
-        model: VehicleModel,
-        playback: PlaybackChange,
-        left_out: Sequence[LeftOut],
-    ) -> Extended:
-        """Put a refit together; `stated` is the vehicle that the effects were fitted with."""
-        fitted, unseen, moments = refit.model, refit.unseen, stated.inertia_kg_m2
-        rigid_body = six_parameters(moments) if fitted.base is None else np.zeros(6)
-        correction = np.array([*fitted.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])
-        scale = next((each.value for each in refit.estimates.parameters if each.name == "thrust_scale"), 0.0)
-        return cls(
-            model=model,
-            inertia=rigid_body + correction,
-            thrust_scale=1.0 + scale,
-            effects=refit.effects,
-            vehicle_numbers=all_numbers(refit.estimates),
-            gap=GapChange.of(unseen.size(unseen.before), unseen.size(unseen.after), unseen.floor),
-            playback=playback,
-            left_out=tuple(left_out),
-        )
-
     @property
     def contradictions(self) -> tuple[str, ...]:
         """Contradictions within the flights that it was found in."""
@@ -340,16 +300,6 @@ class Extended(AnyModel):
     def impossible(self) -> tuple[str, ...]:
         """Moments of inertia that are more than the other two together; others are as stated, or as they were found."""
         return tuple(f"inertia.{name}" for name in more_than_others(self.inertia.tolist()))
-
-    @property
-    def gap_before(self) -> dict[str, Any]:
-        """The gap of the model as given, for machines: lists over x, y, z."""
-        return GapSize(self.gap.before, self.gap.before_floors).as_summary
-
-    @property
-    def gap_after(self) -> dict[str, Any]:
-        """The gap with the effects, for machines: lists over x, y, z."""
-        return GapSize(self.gap.after, self.gap.after_floors).as_summary
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -90,7 +90,7 @@ def opened_file(path: Path) -> Iterator[h5py.File]:
                 _refuse_links(file)
             yield file
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
-        raise InputError(f"{path}: damaged: {one_line(error)}") from None
+        raise InputError(f"{path}: damaged: {' '.join(str(error.args[0] if error.args else error).split())}") from None
 
 
 def _require_sealed(path: Path) -> None:
@@ -244,28 +244,21 @@ def stage_module(attributes: Mapping[str, Any]) -> str:
     return next((name for name in names if (folder / f"{name}.py").is_file()), "")
 
 
-class Known(NamedTuple):
-    """What a file holds, and where it comes from."""
-
-    format: str
-    origin: Origin
-
-
-def identified(path: Path, file: h5py.File) -> Known:
-    """Tell what an open file holds; one that no stage of this version made is refused."""
+def identified(path: Path, file: h5py.File) -> tuple[str, Origin]:
+    """Tell the format of an open file, and where it comes from; one that no stage of this version made is refused."""
     name = held_format(path, file)
     if file.attrs.get("schema_version") != SCHEMA_VERSION or not stage_module(file.attrs):
         raise other_version(path, file)
-    return Known(name, origin_of(file))
+    return name, origin_of(file)
 
 
 @lru_cache(maxsize=64)
-def _known_of(state: FileState) -> Known:
+def _known_of(state: FileState) -> tuple[str, Origin]:
     with opened_file(state.path) as file, patient(state.path):
         return identified(state.path, file)
 
 
-def _known(path: Path) -> Known | None:
+def _known(path: Path) -> tuple[str, Origin] | None:
     """Look into a file that stays as it is once only; None where it is no good: who reads it then says why."""
     try:
         return _known_of(state_of(path))
@@ -276,17 +269,12 @@ def _known(path: Path) -> Known | None:
 def format_name(path: Path) -> str | None:
     """Tell the format of a file without reading it whole; None where no stage made it."""
     known = _known(path)
-    return None if known is None else known.format
+    return None if known is None else known[0]
 
 
 def read_origin(path: Path) -> Origin:
     """Read where a result comes from, and none of its data."""
     if (known := _known(path)) is not None:
-        return known.origin
+        return known[1]
     with opened_file(path) as file, patient(path):
-        return identified(path, file).origin
-
-
-def one_line(error: Exception) -> str:
-    """Word an error of a library in one line."""
-    return " ".join(str(error.args[0] if error.args else error).split())
+        return identified(path, file)[1]

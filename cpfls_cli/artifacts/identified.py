@@ -86,11 +86,6 @@ class IdentifiedModel(AnyModel):
         return functions
 
     @property
-    def chosen_on(self) -> frozenset[str]:
-        """Hashes of the flights that it was chosen on, among several."""
-        return frozenset(self.kept_for_choice)
-
-    @property
     def complete(self) -> bool:
         """Whether the search came to its end."""
         return is_end(self.stop_reason)

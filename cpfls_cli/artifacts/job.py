@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from cpfls_cli.artifacts.gate import InputFile, Origin, format_name, read_origin
 from cpfls_cli.artifacts.output import check_output
@@ -29,10 +29,6 @@ Interrupted = Callable[[], int | None]
 """Gives the number of the signal that asks to stop, or None."""
 
 
-def _uninterrupted() -> AbstractContextManager[Interrupted]:
-    return nullcontext(lambda: None)
-
-
 @dataclass
 class Job:
     """One run of a stage.
@@ -51,7 +47,7 @@ class Job:
     dry_run: bool
     progress: Progress
     reads: Callable[[Path], None]
-    deferred_interrupts: Callable[[], AbstractContextManager[Interrupted]] = _uninterrupted
+    deferred_interrupts: Callable[[], AbstractContextManager[Interrupted]] = lambda: nullcontext(lambda: None)
     inputs: list[Path] = field(default_factory=list)
     config: Path = Path("CONFIG")
     open_numbers: Literal["refused", "guessed", "found"] = "refused"
@@ -88,26 +84,7 @@ def check_outputs(job: Job, *paths: Path, replaceable: bool = False) -> None:
         check_output(path, job.force or replaceable, job.inputs)
 
 
-class Taking(Protocol):
-    """What takes note of the files that it reads."""
-
-    @property
-    def reads(self) -> Callable[[Path], None]:
-        """Takes note of every input file."""
-        ...
-
-    @property
-    def inputs(self) -> list[Path]:
-        """What was taken so far."""
-        ...
-
-    @property
-    def cautions(self) -> dict[str, None]:
-        """What speaks against what the inputs hold."""
-        ...
-
-
-def take_inputs(job: Taking, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
+def take_inputs(job: Any, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
     """Check inputs, and take note of what they hold."""
     for path in inputs.values():
         _check_input(path)

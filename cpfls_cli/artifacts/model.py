@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -60,11 +60,6 @@ def joined_flights(*groups: Iterable[LearnedFlight]) -> tuple[LearnedFlight, ...
     return tuple(kept.values())
 
 
-def part_learned(learned: Iterable[LearnedFlight], hashes: Collection[str]) -> LearnedFlight | None:
-    """Find what was learned from a flight of these hashes, its file's and its log's; None where nothing was."""
-    return next((flight for flight in learned if flight.sha256 in hashes), None)
-
-
 def of_no_body(model: VehicleModel) -> tuple[str, ...]:
     """Name the moments of inertia of a vehicle that are those of no body of its mass between its rotors."""
     vehicle = model.vehicle
@@ -89,11 +84,6 @@ class AnyModel:
     def learned_from(self) -> tuple[LearnedFlight, ...]:
         """Flights that it was found in, those of what it was built on among them."""
         return ()
-
-    @property
-    def chosen_on(self) -> frozenset[str]:
-        """Hashes of the flights that it was chosen on, among several."""
-        return frozenset()
 
     @property
     def trust(self) -> str:

@@ -160,10 +160,6 @@ class StageCommand(TyperCommand):
     def _line(self) -> CommandLine:
         return command_line(self._file)
 
-    def _stage(self) -> Stage:
-        own: Stage = import_module("cpfls_cli.stage").loaded(self._file.stem)
-        return own
-
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Repeat options that take all values that follow."""
         return super().parse_args(ctx, repeated(self.params, args) if self._line.several else args)
@@ -172,7 +168,9 @@ class StageCommand(TyperCommand):
     def _loaded(self) -> TyperCommand:
         app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
         assert self.name is not None, "a command has a name"
-        app.command(self.name)(command_of(self.name, self._line, self._stage))
+        app.command(self.name)(
+            command_of(self.name, self._line, lambda: import_module("cpfls_cli.stage").loaded(self._file.stem))
+        )
         made = typer.main.get_command(app)
         assert isinstance(made, TyperCommand), "it is one command"
         return made
@@ -239,10 +237,6 @@ def run_of(
     return run
 
 
-def _unshown(done: float, total: int, note: str = "") -> None:
-    """Show no progress of what only answers."""
-
-
 @contextmanager
 def noted(job: Job) -> Iterator[None]:
     """Say with what cannot be computed what speaks against the numbers that it came about with."""
@@ -295,7 +289,7 @@ def _run(own: Stage, common: Common, given: dict[str, Any], *, declared: bool) -
         config = None
     if own.overrides:
         common = replace(common, overrides=[*(common.overrides or []), *own.overrides(**given)])
-    with nullcontext(_unshown) if own.output is False else progress_bar(own.name, common) as progress:
+    with nullcontext(lambda *_, **__: None) if own.output is False else progress_bar(own.name, common) as progress:
         run = run_of(own, common, output, config, narration.reads, progress)
         with locked(run.output, own.name) if run.writes and not run.dry_run else nullcontext(), noted(run):
             outcome = own.run(run, **given)

@@ -173,7 +173,7 @@ def progress_bar(title: str, common: Common) -> Iterator[Callable[..., None]]:
     """
     with _log_shown(title, common):
         if common.quiet:
-            yield _silent
+            yield lambda *_, **__: None
         elif not sys.stderr.isatty():
             yield _log_progress(title, asked=common.verbose)
         else:
@@ -224,10 +224,6 @@ def _log_shown(title: str, common: Common) -> Iterator[None]:
         yield
     finally:
         log.removeHandler(lines)
-
-
-def _silent(done: float, total: int, note: str = "") -> None:
-    """Show nothing."""
 
 
 def _log_progress(title: str, *, asked: bool) -> Callable[..., None]:

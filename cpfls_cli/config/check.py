@@ -344,13 +344,10 @@ def _describe_errors(errors: Iterable[ErrorDetails], data: dict[str, Any], sourc
     reported = [
         location
         for location in reasons
-        if location in not_of_length or not any(_is_below(entry, location) for entry in entries)
+        if location in not_of_length
+        or not any(len(entry) > len(location) and entry[: len(location)] == location for entry in entries)
     ]
     return [_line(location, reasons[location].values(), data, source) for location in reported]
-
-
-def _is_below(location: Location, parent: Location) -> bool:
-    return len(location) > len(parent) and location[: len(parent)] == parent
 
 
 def _without_unknown_keys(data: dict[str, Any], errors: Iterable[ErrorDetails]) -> dict[str, Any]:

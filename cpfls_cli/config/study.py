@@ -148,20 +148,6 @@ _StudyDumper.add_representer(list, _represent_list)
 _StudyDumper.add_implicit_resolver(_TAG + "float", _FLOAT, list("-+0123456789."))
 
 
-SECTIONS = (
-    "vehicle",
-    "trajectory",
-    "simulation",
-    "import",
-    "reduction",
-    "identification",
-    "gap",
-    "playback",
-    "report",
-)
-"""The sections of a config, in the order of the pipeline."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class ReportSettings(Settings):
     """Settings of the report."""
@@ -193,6 +179,10 @@ class Study(BaseModel):
         PlaybackSettings()
     )
     report: Annotated[ReportSettings, Doc("what `cpfls report` shows")] = ReportSettings()
+
+
+SECTIONS = tuple(field.alias or name for name, field in Study.model_fields.items() if name != "seed")
+"""The sections of a config, in the order of the pipeline."""
 
 
 def resolved(study: Study, sections: Sequence[str] = ()) -> dict[str, Any]:

@@ -61,7 +61,8 @@ def with_guesses(data: dict[str, Any]) -> dict[str, Any]:
     open_ = [
         name
         for name, key in KEYS.items()
-        if any(key in holder and _has_null(holder[key]) for holder in (vehicle, *listed))
+        for given in [[holder[key] for holder in (vehicle, *listed) if key in holder]]
+        if any(each is None or (isinstance(each, list) and None in each) for each in given)
     ]
     if not open_:
         return data
@@ -79,10 +80,6 @@ def with_guesses(data: dict[str, Any]) -> dict[str, Any]:
     if isinstance(rotors, list):
         filled["rotors"] = [_filled(rotor, guesses) if isinstance(rotor, dict) else rotor for rotor in rotors]
     return {**data, "vehicle": filled}
-
-
-def _has_null(value: Any) -> bool:
-    return value is None or (isinstance(value, list) and None in value)
 
 
 def _filled(rotor: dict[str, Any], guesses: dict[Unknown, Any]) -> dict[str, Any]:

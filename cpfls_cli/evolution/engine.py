@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -224,23 +223,6 @@ class History:
 
 
 @dataclass(frozen=True)
-class Generation:
-    """Report a population after one generation, of which 0 is the initial population.
-
-    Genes are as the evaluator refined them; objectives are to be minimised, +inf where it gave no finite value;
-    evaluations count each chromosome once; the front holds the non-dominated chromosomes among all ever evaluated.
-    """
-
-    index: int
-    genes: IntArray
-    objectives: Array
-    subpopulations: IntArray
-    evaluations: int
-    front_genes: IntArray
-    front_objectives: Array
-
-
-@dataclass(frozen=True)
 class EvolutionState:
     """Hold all that the next generation depends on, and all that a stopped evolution needs to go on.
 
@@ -268,19 +250,6 @@ class EvolutionState:
     history: History
     rng: np.random.Generator
 
-    def report(self) -> Generation:
-        """Report this generation, with the front of the archive."""
-        front = self.archive.front
-        return Generation(
-            index=self.index,
-            genes=self.genes,
-            objectives=self.objectives,
-            subpopulations=self.subpopulations,
-            evaluations=len(self.archive),
-            front_genes=front.genes,
-            front_objectives=front.objectives,
-        )
-
 
 def ended(state: EvolutionState, settings: EvolutionSettings) -> End | None:
     """Tell why an evolution has reached its end; None where another generation is to be bred."""
@@ -305,27 +274,6 @@ def stalled(history: History, generations: int | None, improvement: float) -> bo
     return bool(np.all(at_most(before[known] - now[known], improvement * size, size)))
 
 
-def evolve(
-    evaluate: Evaluate,
-    gene_count: int,
-    settings: EvolutionSettings,
-    rng: np.random.Generator,
-    initial: IntArray | None = None,
-) -> Iterator[Generation]:
-    """Search for non-dominated chromosomes, one generation at a time.
-
-    `evaluate` takes chromosomes, shape (n, genes), 16 bits each, never seen before, and returns their `Evaluation`. It
-    may rewrite them (Lamarckian local search); the rewritten genes take their place. `initial`: chromosomes to start
-    with; the rest of the initial population, which comes first, is random. `ComputationError` where they, or the
-    evaluator's result, do not fit. Paper, section 9; method.md section 7.
-    """
-    state = start(evaluate, gene_count, settings, rng, initial)
-    yield state.report()
-    while ended(state, settings) is None:
-        state = step(state, evaluate, settings)
-        yield state.report()
-
-
 def start(
     evaluate: Evaluate,
     gene_count: int,
@@ -333,7 +281,13 @@ def start(
     rng: np.random.Generator,
     initial: IntArray | None = None,
 ) -> EvolutionState:
-    """Evaluate the initial population; the parameters are those of `evolve`."""
+    """Evaluate the initial population of a search for non-dominated chromosomes, which `step` goes on with.
+
+    `evaluate` takes chromosomes, shape (n, genes), 16 bits each, never seen before, and returns their `Evaluation`. It
+    may rewrite them (Lamarckian local search); the rewritten genes take their place. `initial`: chromosomes to start
+    with; the rest of the initial population, which comes first, is random. `ComputationError` where they, or the
+    evaluator's result, do not fit. Paper, section 9; method.md section 7.
+    """
     genes = rng.integers(0, 2**BITS_PER_GENE, size=(settings.population, gene_count), dtype=np.int64)
     if initial is not None:
         if initial.ndim != 2 or initial.shape[1] != gene_count or len(initial) > len(genes):
@@ -349,7 +303,7 @@ def start(
 
 
 def step(state: EvolutionState, evaluate: Evaluate, settings: EvolutionSettings) -> EvolutionState:
-    """Breed one generation; the parameters are those of `evolve`.
+    """Breed one generation; the parameters are those of `start`.
 
     The next state shares the archive and the random generator with the given one, which is of no use for another step,
     also where the evaluation raises an error.

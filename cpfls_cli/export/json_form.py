@@ -107,10 +107,7 @@ def json_text(sheet: Sheet, remarks: Sequence[str] = ()) -> str:
         "mass_kg": vehicle.mass_kg,
         "gravity_m_s2": vehicle.gravity_m_s2,
         "inertia_kg_m2": symmetric(sheet.rigid_body) if found is None else None,
-        "structure": None if found is None else _structure(found),
-        "fuzzy": None if found is None else _fuzzy(found),
-        "rigid_body": None if found is None else _rigid_body(found),
-        "excited_region": None if found is None else _region(found),
+        **(dict.fromkeys(_OF_ATTITUDE) if found is None else _over_attitude(found)),
         "rotors": sheet.model.rotors,
         "response": response_of(sheet),
         "effects": {
@@ -123,7 +120,14 @@ def json_text(sheet: Sheet, remarks: Sequence[str] = ()) -> str:
         else {**_gusts(sheet.model.gusts), "frame": BODY, "how_to_play": GUST_RECIPE},
         **_wrench(sheet),
         "judged": None,
-        "provenance": _provenance(sheet),
+        "provenance": {
+            "model": {"name": sheet.file, "sha256": sheet.sha256},
+            "cpfls_version": sheet.origin.version,
+            "exported_by_cpfls_version": EXPORTER,
+            "seed": sheet.origin.seed,
+            "inputs": {role: vars(source) for role, source in sheet.origin.inputs.items()},
+            "config": sheet.config,
+        },
         "period_s": PERIOD,
         "reference_points": attitudes_of(attitudes),
         "reference_wrenches": points_of(points),
@@ -148,6 +152,21 @@ def _wrench(sheet: Sheet) -> dict[str, Any]:
         },
         "wrench": {"lines": lines, "components": components},
     }
+
+
+_OF_ATTITUDE = ("structure", "fuzzy", "rigid_body", "excited_region")
+
+
+def _over_attitude(model: InertiaFunctions) -> dict[str, Any]:
+    region = {
+        "description": "'#' where training visited roll and pitch; a line for each roll, pitch along it, from -180 deg",
+        "cell_deg": 360 / CELLS,
+        "share": np.mean(model.visited),
+        "rows": visited_rows(model),
+    }
+    tensor = dict(zip(INERTIA_PARAMETERS, model.rigid_body.tolist(), strict=True))
+    rigid_body = {"unit": "kg m^2", "frame": BODY, "tensor": tensor}
+    return dict(zip(_OF_ATTITUDE, (_structure(model), _fuzzy(model), rigid_body, region), strict=True))
 
 
 def _structure(model: InertiaFunctions) -> dict[str, Any]:
@@ -195,30 +214,4 @@ def _function(model: InertiaFunctions, block: Block) -> dict[str, Any]:
         "inputs": [_ANGLES[angle] for angle in function.inputs],
         "rules_per_input": [structure.partitions[i].rules(circular=structure.circular) for i in block.partitions],
         "rules": [{"rule": label, "coefficients": own} for label, own in zip(labels, coefficients, strict=True)],
-    }
-
-
-def _rigid_body(model: InertiaFunctions) -> dict[str, Any]:
-    values = dict(zip(INERTIA_PARAMETERS, model.rigid_body.tolist(), strict=True))
-    return {"unit": "kg m^2", "frame": BODY, "tensor": values}
-
-
-def _region(model: InertiaFunctions) -> dict[str, Any]:
-    return {
-        "description": "'#' where training visited roll and pitch; a line for each roll, pitch along it, from -180 deg",
-        "cell_deg": 360 / CELLS,
-        "share": np.mean(model.visited),
-        "rows": visited_rows(model),
-    }
-
-
-def _provenance(sheet: Sheet) -> dict[str, Any]:
-    header = sheet.origin
-    return {
-        "model": {"name": sheet.file, "sha256": sheet.sha256},
-        "cpfls_version": header.version,
-        "exported_by_cpfls_version": EXPORTER,
-        "seed": header.seed,
-        "inputs": {role: vars(source) for role, source in header.inputs.items()},
-        "config": sheet.config,
     }

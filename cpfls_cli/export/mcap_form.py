@@ -6,9 +6,11 @@ import csv
 import heapq
 import io
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -213,13 +215,18 @@ def mcap_bytes(view: View) -> bytes:
     writer.start(profile="", library="cpfls")
     writer.add_metadata("cpfls", {"title": view.title, **view.about})
     first = min((int(_nanoseconds(track.time[:1])[0]) for track in view.tracks), default=0)
-    channels = [
-        *(_Channel.of_track(writer, track) for track in view.tracks),
-        *(_Channel.of_curve(writer, curve, first) for curve in view.curves),
-        *(channel for pose in view.poses for channel in _Channel.of_pose(writer, pose)),
-    ]
-    counts = dict.fromkeys((channel.number for channel in channels), 0)
-    for stamp, number, message in heapq.merge(*(channel.messages for channel in channels), key=lambda own: own[:2]):
+    streams = []
+    for topic, schema, about, messages in (
+        *map(_of_track, view.tracks),
+        *(_of_curve(curve, first) for curve in view.curves),
+        *(channel for pose in view.poses for channel in _of_pose(pose)),
+    ):
+        described = json.dumps(schema, sort_keys=True).encode()
+        kind = writer.register_schema(name=schema["title"], encoding="jsonschema", data=described)
+        number = writer.register_channel(topic=topic, message_encoding="json", schema_id=kind, metadata=about)
+        streams.append(zip(messages, repeat(number), strict=False))
+    counts = Counter[int]()
+    for (stamp, message), number in heapq.merge(*streams, key=lambda own: (own[0][0], own[1])):
         writer.add_message(
             channel_id=number,
             log_time=stamp,
@@ -232,87 +239,80 @@ def mcap_bytes(view: View) -> bytes:
     return stream.getvalue()
 
 
-class _Channel:
-    """A channel of the file and its messages in time: stamp in ns, number of the channel, what it says."""
+_Channel = tuple[str, dict[str, Any], dict[str, str], Iterator[tuple[int, dict[str, Any]]]]
+"""Topic, schema and what else is said of it, and its messages in time: stamp in ns, what it says."""
 
-    def __init__(self, writer: Any, topic: str, schema: Mapping[str, Any], about: Mapping[str, str]) -> None:
-        number = writer.register_schema(
-            name=schema["title"], encoding="jsonschema", data=json.dumps(schema, sort_keys=True).encode()
+
+def _of_track(track: Track) -> _Channel:
+    """Give a message for each sample, by axis and what it is."""
+    about = {"unit": track.unit, "frame": track.frame, "description": track.description}
+    described = ", ".join(part for part in (track.description, track.unit, track.frame) if part)
+    columns = list(track.columns)
+    by_axis: dict[str, dict[str, Any]] = {}
+    for what, axis, _ in columns:
+        by_axis.setdefault(axis, {})[what] = _NUMBER
+    properties = by_axis[""] if set(by_axis) == {""} else {a: _object(a, own) for a, own in by_axis.items()}
+    schema = _object(f"cpfls.{track.name.replace('/', '.')}", properties, described)
+    return f"/{track.path}", schema, about, _of_samples(track, columns)
+
+
+def _of_samples(track: Track, columns: list[tuple[str, str, Array]]) -> Iterator[tuple[int, dict[str, Any]]]:
+    stamps = _nanoseconds(track.time).tolist()
+    names = [(what, axis) for what, axis, _ in columns]
+    for stamp, row in zip(stamps, zip(*(_rounded(values) for _, _, values in columns), strict=True), strict=True):
+        message: dict[str, Any] = {}
+        for (what, axis), value in zip(names, row, strict=True):
+            if value is not None:
+                (message.setdefault(axis, {}) if axis else message)[what] = value
+        if message:
+            yield stamp, message
+
+
+def _of_curve(curve: Curve, stamp: int) -> _Channel:
+    """Give one message with all points."""
+    known = {name: values for name, values in curve.values.items() if np.isfinite(values).any()}
+    whole = np.isfinite(np.column_stack([curve.x, *known.values()])).all(axis=1)
+    points = {curve.over: curve.x[whole], **{name: values[whole] for name, values in known.items()}}
+    listed = {"type": "array", "items": _NUMBER}
+    schema = _object(f"cpfls.{curve.name}", dict.fromkeys(points, listed), curve.description)
+    message = {name: _rounded(own) for name, own in points.items()}
+    about = {"description": curve.description, "over": curve.over}
+    return f"/curves/{curve.name}", schema, about, iter([(stamp, message)])
+
+
+def _of_pose(pose: Pose) -> Iterator[_Channel]:
+    """Give a pose, and the same as the way from one frame to the other, as panels in space want it."""
+    from scipy.spatial.transform import Rotation
+
+    about = {"unit": "m, quaternion", "frame": WORLD_FRAME}
+    known = np.isfinite(pose.attitude).all(axis=1)
+    stamps = _nanoseconds(pose.time[known]).tolist()
+    turned = Rotation.from_euler("ZYX", pose.attitude[known, ::-1]).as_quat().tolist() if stamps else []
+    samples = [
+        (
+            {"sec": stamp // 10**9, "nsec": stamp % 10**9},
+            dict(zip("xyz", place, strict=True)),
+            dict(zip("xyzw", turn, strict=True)),
         )
-        self.number: int = writer.register_channel(
-            topic=topic, message_encoding="json", schema_id=number, metadata=dict(about)
-        )
-        self.messages: Iterator[tuple[int, int, dict[str, Any]]] = iter(())
-
-    @classmethod
-    def of_track(cls, writer: Any, track: Track) -> _Channel:
-        """Give a message for each sample, by axis and what it is."""
-        about = {"unit": track.unit, "frame": track.frame, "description": track.description}
-        described = ", ".join(part for part in (track.description, track.unit, track.frame) if part)
-        columns = list(track.columns)
-        by_axis: dict[str, dict[str, Any]] = {}
-        for what, axis, _ in columns:
-            by_axis.setdefault(axis, {})[what] = _NUMBER
-        properties = by_axis[""] if set(by_axis) == {""} else {a: _object(a, own) for a, own in by_axis.items()}
-        schema = _object(f"cpfls.{track.name.replace('/', '.')}", properties, described)
-        channel = cls(writer, f"/{track.path}", schema, about)
-        channel.messages = channel._of_samples(track, columns)
-        return channel
-
-    def _of_samples(
-        self, track: Track, columns: list[tuple[str, str, Array]]
-    ) -> Iterator[tuple[int, int, dict[str, Any]]]:
-        stamps = _nanoseconds(track.time).tolist()
-        names = [(what, axis) for what, axis, _ in columns]
-        for stamp, row in zip(stamps, zip(*(_rounded(values) for _, _, values in columns), strict=True), strict=True):
-            message: dict[str, Any] = {}
-            for (what, axis), value in zip(names, row, strict=True):
-                if value is not None:
-                    (message.setdefault(axis, {}) if axis else message)[what] = value
-            if message:
-                yield stamp, self.number, message
-
-    @classmethod
-    def of_curve(cls, writer: Any, curve: Curve, stamp: int) -> _Channel:
-        """Give one message with all points."""
-        known = {name: values for name, values in curve.values.items() if np.isfinite(values).any()}
-        whole = np.isfinite(np.column_stack([curve.x, *known.values()])).all(axis=1)
-        points = {curve.over: curve.x[whole], **{name: values[whole] for name, values in known.items()}}
-        listed = {"type": "array", "items": _NUMBER}
-        schema = _object(f"cpfls.{curve.name}", dict.fromkeys(points, listed), curve.description)
-        channel = cls(writer, f"/curves/{curve.name}", schema, {"description": curve.description, "over": curve.over})
-        channel.messages = iter([(stamp, channel.number, {name: _rounded(own) for name, own in points.items()})])
-        return channel
-
-    @classmethod
-    def of_pose(cls, writer: Any, pose: Pose) -> list[_Channel]:
-        """Give a pose, and the same as the way from one frame to the other, as panels in space want it."""
-        from scipy.spatial.transform import Rotation
-
-        about = {"unit": "m, quaternion", "frame": WORLD_FRAME}
-        known = np.isfinite(pose.attitude).all(axis=1)
-        stamps = _nanoseconds(pose.time[known]).tolist()
-        turned = Rotation.from_euler("ZYX", pose.attitude[known, ::-1]).as_quat().tolist() if stamps else []
-        samples = [
-            (stamp, dict(zip("xyz", place, strict=True)), dict(zip("xyzw", turn, strict=True)))
-            for stamp, place, turn in zip(stamps, np.nan_to_num(pose.position[known]).tolist(), turned, strict=True)
-        ]
-        topic = "/pose" if pose.child == BODY_FRAME else f"/pose/{pose.child}"
-        posed, moved = (
-            cls(writer, topic, _POSE_IN_FRAME, about),
-            cls(writer, f"/tf/{pose.child}", _FRAME_TRANSFORM, about),
-        )
-        frames = {"parent_frame_id": WORLD_FRAME, "child_frame_id": pose.child}
-        posed.messages = (
-            (stamp, posed.number, {"timestamp": _timestamp(stamp), "frame_id": WORLD_FRAME, "pose": own})
-            for stamp, place, turn in samples
-            for own in [{"position": place, "orientation": turn}]
-        )
-        moved.messages = (
-            (stamp, moved.number, {"timestamp": _timestamp(stamp), **frames, "translation": place, "rotation": turn})
-            for stamp, place, turn in samples
-        )
-        return [posed, moved]
+        for stamp, place, turn in zip(stamps, np.nan_to_num(pose.position[known]).tolist(), turned, strict=True)
+    ]
+    posed = (
+        {"timestamp": time, "frame_id": WORLD_FRAME, "pose": {"position": place, "orientation": turn}}
+        for time, place, turn in samples
+    )
+    moved = (
+        {
+            "timestamp": time,
+            "parent_frame_id": WORLD_FRAME,
+            "child_frame_id": pose.child,
+            "translation": place,
+            "rotation": turn,
+        }
+        for time, place, turn in samples
+    )
+    topic = "/pose" if pose.child == BODY_FRAME else f"/pose/{pose.child}"
+    yield topic, _POSE_IN_FRAME, about, zip(stamps, posed, strict=True)
+    yield f"/tf/{pose.child}", _FRAME_TRANSFORM, about, zip(stamps, moved, strict=True)
 
 
 def _refuse_negative(view: View) -> None:
@@ -328,10 +328,6 @@ def _nanoseconds(time: Array) -> IntArray:
     """Give stamps in ns; the whole seconds apart, so that none of their digits is lost."""
     whole = np.floor(time)
     return np.asarray(whole.astype(np.int64) * 10**9 + np.rint((time - whole) * 1e9).astype(np.int64))
-
-
-def _timestamp(stamp: int) -> dict[str, int]:
-    return {"sec": stamp // 10**9, "nsec": stamp % 10**9}
 
 
 def _rounded(values: Array) -> list[float | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -53,14 +53,6 @@ LACK_RECIPE = (
 _SEED = 1
 _ROWS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 REFITTED = "refitted numbers of the vehicle"
-
-
-class References(NamedTuple):
-    """What the library computes, for an export to test itself: torque and force, runs, and torque over attitude."""
-
-    points: ReferencePoints
-    runs: tuple[ReferenceRun, ...]
-    attitudes: Expected | None
 
 
 @dataclass(frozen=True)
@@ -144,11 +136,11 @@ class Sheet:
         return parse_config(self.origin.config, f"{self.file}: /config")
 
     @cached_property
-    def references(self) -> References:
-        """States and runs, the same for every form."""
+    def references(self) -> tuple[ReferencePoints, tuple[ReferenceRun, ...], Expected | None]:
+        """What the library computes, for an export to test itself: torque and force, runs, and torque over attitude."""
         rng, found = np.random.default_rng(_SEED), self.identified
         attitudes = None if found is None else attitude_points(found, np.random.default_rng(_SEED))
-        return References(reference_points(self.model, rng), runs_of(self.model, rng), attitudes)
+        return reference_points(self.model, rng), runs_of(self.model, rng), attitudes
 
     @property
     def facts(self) -> list[str]:

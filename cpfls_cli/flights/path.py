@@ -221,7 +221,13 @@ class PlannedPath:
             excited=excited,
             questions=tuple(questions),
             condition_number=None if excitation is None else excitation.condition_number,
-            random=None if excitation is None else _random(excitation.random),
+            random=None
+            if excitation is None
+            else RandomPaths(
+                best=float(excitation.random.min()),
+                median=float(np.median(excitation.random)),
+                count=len(excitation.random),
+            ),
             evaluations=None if excitation is None else excitation.evaluations,
         )
 
@@ -313,11 +319,6 @@ class PlannedPath:
 
 def _largest(values: Array) -> list[float]:
     return [float(value) for value in np.abs(values).max(axis=0)]
-
-
-def _random(condition_numbers: Array) -> RandomPaths:
-    best, median = float(condition_numbers.min()), float(np.median(condition_numbers))
-    return RandomPaths(best=best, median=median, count=len(condition_numbers))
 
 
 _UNITS = ("m/s⁶", "m/s⁵", "m/s⁴", "m/s³", "m/s²", "m/s", "m")

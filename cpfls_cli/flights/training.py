@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain, count
 from pathlib import Path
 
@@ -143,12 +144,8 @@ def _enough_of(path: Path, study: Study) -> ReadFlight:
         return read_flight(path, study)
     names, first = held_rows(path, Flight), (samples - ENOUGH) // 2
     units = units_of(path, read_origin(path), study)
-    return ReadFlight(path.name, _rows_in(path, names, first, first + ENOUGH), units, ())
-
-
-def _rows_in(path: Path, names: Sequence[str], start: int, stop: int) -> Mapping[str, Array]:
-    (read,) = read_rows(path, names, start, stop, max(stop - start, 1))
-    return dict(zip(names, read, strict=True))
+    (rows,) = read_rows(path, names, first, first + ENOUGH, ENOUGH)
+    return ReadFlight(path.name, dict(zip(names, rows, strict=True)), units, ())
 
 
 REST = "held-out rest"
@@ -159,26 +156,43 @@ _FLIGHTS, _ARE = ("flight", "flights"), ("is", "are")
 
 @dataclass(frozen=True)
 class SplitFlights:
-    """Flights, each with a leading part that trains and a rest that is held out."""
+    """Flights, each with a leading part that trains and a rest that is held out.
+
+    `selected`: indices of samples that are learned from among all samples of the flights, one flight after the other;
+    ascending, None for all that train.
+    """
 
     paths: tuple[Path, ...]
     flights: tuple[TorqueSource, ...]
     splits: tuple[Split, ...]
+    selected: IntArray | None = None
 
-    @property
+    @cached_property
     def training(self) -> TorqueSource:
-        """The parts that train, one after the other."""
+        """The parts that train, one after the other: they judge chromosomes, and give the input ranges."""
         return joined(
             [part_of(flight, split.training) for flight, split in zip(self.flights, self.splits, strict=True)]
         )
 
-    @property
+    @cached_property
     def training_indices(self) -> IntArray:
         """Indices of the samples that train among all samples of the flights, one after the other."""
         starts = np.cumsum([0, *(len(flight) for flight in self.flights)])
         return np.concatenate(
             [start + np.arange(split.training.stop) for start, split in zip(starts, self.splits, strict=False)]
         )
+
+    @property
+    def indices(self) -> IntArray:
+        """Indices of the samples that are learned from, as of those that train."""
+        return self.training_indices if self.selected is None else self.selected
+
+    @property
+    def learned(self) -> TorqueSource:
+        """The samples that parameters are learned from."""
+        if self.selected is None:
+            return self.training
+        return gathered(self.training, np.searchsorted(self.training_indices, self.selected))
 
     @property
     def parts(self) -> tuple[tuple[int, int], ...]:
@@ -198,31 +212,6 @@ class SplitFlights:
         }
 
 
-@dataclass(frozen=True)
-class TrainingData:
-    """What a model is learned from and judged on.
-
-    Attributes
-    ----------
-    training : TorqueSource
-        All that trains: judges chromosomes, and gives the input ranges.
-    learned : TorqueSource
-        The samples of it that parameters are learned from.
-    rests : mapping of str to TorqueSource
-        What of the flights is held out, by name.
-    indices : array of int, shape (learned samples,)
-        Of the learned samples among all samples of the flights, one flight after the other; ascending.
-    parts : tuple of (int, int)
-        Of each flight, the leading samples that train, and all samples.
-    """
-
-    training: TorqueSource
-    learned: TorqueSource
-    rests: Mapping[str, TorqueSource]
-    indices: IntArray
-    parts: tuple[tuple[int, int], ...]
-
-
 def flight_roles(flights: Sequence[Path]) -> dict[str, Path]:
     """Give the flights that train their roles as inputs: ``flight``, ``flight-2`` and so on."""
     return {"flight" if number == 1 else f"flight-{number}": path for number, path in enumerate(flights, start=1)}
@@ -240,15 +229,12 @@ def split_training(
 
 def read_training(
     flights: Sequence[Path], selection: Path | None, study: Study, inputs: Mapping[str, InputFile] | None = None
-) -> TrainingData:
+) -> SplitFlights:
     """Open flights and find what of them trains, all or what was selected from these very flights."""
     split = split_training(flights, study, inputs)
-    training, candidates = split.training, split.training_indices
     if selection is None:
-        return TrainingData(training, training, split.rests, candidates, split.parts)
-    indices = _selected(_hashed(flights, inputs), selection, candidates)
-    learned = gathered(training, np.searchsorted(candidates, indices))
-    return TrainingData(training, learned, split.rests, indices, split.parts)
+        return split
+    return replace(split, selected=_selected(_hashed(flights, inputs), selection, split.training_indices))
 
 
 def _hashed(flights: Sequence[Path], inputs: Mapping[str, InputFile] | None) -> dict[Path, str]:

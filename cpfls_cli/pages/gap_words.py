@@ -26,7 +26,7 @@ from cpfls_cli.pages.gap import (
 )
 from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
-from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.pages.trust import contradicted
 from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over
 from cpfls_cli.report.content import plain, probability
 

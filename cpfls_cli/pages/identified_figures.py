@@ -107,8 +107,7 @@ def _draw_ridge(r: IdentifiedModel, figure: Figure) -> None:
     shown = [*range(0, last - 1, max(last // 6, 1)), last]
     axes.set_xticks(position[shown], [weight_words(weight[index], 1) for index in shown])
     axes.minorticks_off()
-    axes.set_xlabel("ridge weight on the fuzzy part")
-    axes.set_ylabel("cross-validated error, scaled torque²")
+    axes.set(xlabel="ridge weight on the fuzzy part", ylabel="cross-validated error, scaled torque²")
     legend_above(axes)
 
 
@@ -284,8 +283,7 @@ def _draw_steps(r: IdentifiedModel, figure: Figure) -> None:
                 axes.plot(steps.horizon, positive, label=PREDICTORS.get(predictor, predictor), **style)
         panels[0].set_ylabel(title)
     for axes in grid.flat:
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        axes.set(xscale="log", yscale="log")
         axes.minorticks_off()
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, smallest=1e-3)))
@@ -305,8 +303,7 @@ def _draw_convergence(r: IdentifiedModel, figure: Figure) -> None:
     units = (unit, "N m", "pure number")
     for axes, title, unit, best in zip(panels, titles, units, r.history.best.T, strict=True):
         axes.plot(generation, np.where(np.isfinite(best), best, np.nan), marker="o", markersize=3, **style_of(0))
-        axes.set_title(title)
-        axes.set_ylabel(unit)
+        axes.set(title=title, ylabel=unit)
         plain_ticks(axes.yaxis)
     panels[-1].set_xlabel("generation")
     panels[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -319,8 +316,7 @@ def _draw_front(r: IdentifiedModel, figure: Figure) -> None:
     axes = figure.subplots()
     axes.plot(shown[:, 2], shown[:, 0], "o", color=style_of(0)["color"], markersize=5, label="not dominated")
     axes.plot(*objectives[chosen, [2, 0]], "D", label="chosen", markersize=9, **_MARKED)
-    axes.set_xlabel("condition number")
-    axes.set_ylabel(", ".join(first_objective(r)))
+    axes.set(xlabel="condition number", ylabel=", ".join(first_objective(r)))
     plain_ticks(axes.yaxis)
     axes.set_xscale("log")
     legend_above(axes)
@@ -353,8 +349,7 @@ def _draw_partition(axes: Axes, peaks: Array, joined: bool) -> None:
     values = join_ends(values) if joined else values
     for function in range(values.shape[1]):
         axes.plot(points, values[:, function], **style_of(function))
-    axes.set_ylim(0.0, 1.18)
-    axes.set_yticks([0.0, 0.5, 1.0])
+    axes.set(ylim=(0.0, 1.18), yticks=[0.0, 0.5, 1.0])
     for index, peak in enumerate(peaks):
         function_number = index % values.shape[1] + 1
         colour = style_of(function_number - 1)["color"]

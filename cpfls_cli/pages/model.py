@@ -16,15 +16,10 @@ from cpfls_cli.pages.trust import learned_words, model_words, stopped_words
 from cpfls_cli.report.content import Text, impossible, number, plain
 from cpfls_cli.words import joined
 
-
-def _effect_name(name: str) -> str:
-    return "numbers refitted" if CATALOGUE[name].kind == "parameter" else effect_title(name)
-
-
 WORDS: Mapping[str, Any] = {
     "FOUND_AS": FOUND_AS,
     "INERTIA_PARAMETERS": INERTIA_PARAMETERS,
-    "effect_name": _effect_name,
+    "effect_name": lambda name: "numbers refitted" if CATALOGUE[name].kind == "parameter" else effect_title(name),
     "impossible": impossible,
     "learned_words": learned_words,
     "name_of": name_of,

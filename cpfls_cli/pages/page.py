@@ -102,51 +102,41 @@ def _of_stage(name: str, sources: Sources) -> list[Section]:
     ]
 
 
-_Lack = tuple[type, str, str]
-_LACKS: tuple[_Lack, ...] = (
-    (PlannedPath, "Figure 2 and the table of peaks", "cpfls trajectory CONFIG -o trajectory.h5"),
-    (
+_LACKS: Mapping[str, tuple[type, str, str]] = {
+    "trajectory": (PlannedPath, "Figure 2 and the table of peaks", "cpfls trajectory CONFIG -o trajectory.h5"),
+    "flight": (
         Flight,
         "Figure 4 and the quality of the flight",
         "cpfls simulate CONFIG trajectory.h5 -o flight.h5, or cpfls import CONFIG LOG -o flight.h5",
     ),
-    (Selection, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
-    (IdentifiedModel, "Table 5, the baselines, Figure 6 and the rules", "cpfls identify CONFIG flight.h5 -o model.h5"),
-)
-_GAP_LACKS: tuple[_Lack, ...] = (
-    (
+    "selection": (Selection, "Table 4 and Figure 5", "cpfls reduce CONFIG flight.h5 -o selection.h5"),
+    "model": (
+        IdentifiedModel,
+        "Table 5, the baselines, Figure 6 and the rules",
+        "cpfls identify CONFIG flight.h5 -o model.h5",
+    ),
+    "disagreement": (
         Disagreement,
         "where and when model and flights disagree",
         "cpfls compare CONFIG FLIGHT... -o disagreement.h5",
     ),
-    (Diagnosis, "what the model misses", "cpfls diagnose CONFIG disagreement.h5 -o diagnosis.h5"),
-    (Extended, "the model with the effects in it", "cpfls extend CONFIG diagnosis.h5 -o extended.h5"),
-)
-_SHOWN = {"extended": "extended model"}
+    "diagnosis": (Diagnosis, "what the model misses", "cpfls diagnose CONFIG disagreement.h5 -o diagnosis.h5"),
+    "extended": (Extended, "the model with the effects in it", "cpfls extend CONFIG diagnosis.h5 -o extended.h5"),
+}
 
 
 def missing(sources: Sources) -> dict[str, str]:
     """Name the formats, such as ``selection``, of which no artifact was given: what is not shown, and what makes it."""
-    listed = _wanted(sources)
-    lacking = {_word(kind): (shows, command) for kind, shows, command in listed if not sources.of_kind(kind)}
+    # Nobody who looks for a gap wants a training path.
+    wanted: tuple[str, ...] = () if sources.only_gap else ("trajectory", "flight", "selection", "model")
+    wanted += ("disagreement", "diagnosis") if sources.gap else ()
+    wanted += ("extended",) if any(diagnosis.record.effects for diagnosis in sources.diagnoses) else ()
     return {
-        word: f"Not shown, because no {_SHOWN.get(word, word)} was given: {shows}; made by: {command}."
-        for word, (shows, command) in lacking.items()
+        word: f"Not shown, because no {word.replace('extended', 'extended model')} was given: {shows}; made by: "
+        f"{command}."
+        for word, (kind, shows, command) in _LACKS.items()
+        if word in wanted and not sources.of_kind(kind)
     }
-
-
-def _wanted(sources: Sources) -> Iterator[_Lack]:
-    """List what a report of these artifacts could show: nobody who looks for a gap wants a training path."""
-    if not sources.only_gap:
-        yield from _LACKS
-    if sources.gap:
-        yield from _GAP_LACKS[:2]
-        if any(diagnosis.record.effects for diagnosis in sources.diagnoses):
-            yield _GAP_LACKS[2]
-
-
-def _word(wanted: Any) -> str:
-    return "model" if wanted is IdentifiedModel else str(wanted.FORMAT).removeprefix("cpfls/")
 
 
 def _vehicle_rows(sources: Sources) -> Iterator[tuple[str, str]]:
@@ -290,19 +280,20 @@ def _toned(text: str, tone: Tone) -> Markup:
 
 
 def _block(block: Block) -> dict[str, Any]:
+    kind = type(block).__name__.lower()
     match block:
         case Table():
-            return _table(block)
+            return {"kind": kind, **_table(block)}
         case Folded():
-            return {"kind": block.kind, "summary": block.summary, "blocks": [_block(inner) for inner in block.blocks]}
+            return {"kind": kind, "summary": block.summary, "blocks": [_block(inner) for inner in block.blocks]}
         case Facts():
-            return {"kind": block.kind, "rows": [[_bare(term), _bare(value)] for term, value in block.rows]}
+            return {"kind": kind, "rows": [[_bare(term), _bare(value)] for term, value in block.rows]}
         case Text():
-            return {"kind": block.kind, "text": block.text, "tone": block.tone}
+            return {"kind": kind, "text": block.text, "tone": block.tone}
         case Plot():
             return {"kind": "figure", "name": block.name, "caption": block.caption, "description": block.description}
         case _:
-            return {"kind": block.kind, **asdict(block)}
+            return {"kind": kind, **asdict(block)}
 
 
 def _bare(text: str) -> str:
@@ -319,7 +310,6 @@ def _table(table: Table) -> dict[str, Any]:
         if cell.tone != "plain"
     ]
     return {
-        "kind": table.kind,
         "name": table.name,
         "caption": table.explained,
         "header": list(table.header),

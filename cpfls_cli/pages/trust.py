@@ -1,12 +1,14 @@
-"""How far to trust a model, in words: one table of them, and whether it has seen a flight that it is judged on."""
+"""How far to trust a model, whether it has seen a flight, and what is said of logs that contradict themselves."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from cpfls_cli.artifacts.model import AnyModel, LearnedFlight, part_learned
-from cpfls_cli.report.content import Tone
+from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
+from cpfls_cli.consistency.findings import as_contradiction
+from cpfls_cli.report.content import Tone, sentence
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
 
@@ -90,7 +92,7 @@ def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy)
         Of each flight its file name, and the SHA-256 of the file and of the log that it was imported from.
     """
     for name, hashes in judged:
-        flight = part_learned(learned, hashes)
+        flight = next((each for each in learned if each.sha256 in hashes), None)
         if flight is not None:
             what, it = ("it", "it") if flight.whole else (_part(flight), "that")
             yield f"{name}: {model} has learned from {what}, so {it} says nothing about unseen flights"
@@ -98,3 +100,21 @@ def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy)
 
 def _part(flight: LearnedFlight) -> str:
     return f"its first {flight.samples} of {flight.of} samples"
+
+
+def contradicted(first: str) -> str:
+    """Say before anything else that a log contradicts itself or its config, and where it does so first."""
+    return sentence(as_contradiction(sentence(first)))
+
+
+NOTHING_COMES = (
+    "Nothing is searched, for nothing found could be used. Correct what is wrong, in the section `import` of the "
+    "config or in `vehicle`, or leave that flight out; --anyway searches all the same."
+)
+"""What to do about logs that contradict themselves."""
+
+
+def tell_before_search(contradictions: Sequence[str]) -> None:
+    """Say at once, above the progress, that what a long search finds cannot be used."""
+    if contradictions:
+        logging.getLogger("cpfls_cli").warning("%s No model found in it can be used.", contradicted(contradictions[0]))

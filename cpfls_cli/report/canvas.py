@@ -212,7 +212,7 @@ def pictures(figures: Mapping[str, Callable[[Any], str]], prefix: str, given: An
 
 def figure_html(picture: Picture) -> str:
     """Write a figure, what it draws folded away as a table."""
-    svg = picture.svg
+    svg: str = picture.svg
     if not picture.rows:
         return svg
     head = "".join(f'<th scope="col">{title}</th>' for title in ("Panel", "Curve", "x", "y"))

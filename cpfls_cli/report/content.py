@@ -9,11 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+from typing import Any, Literal
 
 Tone = Literal["plain", "note", "good", "warning", "unsure"]
 """How much something stands out."""
@@ -49,7 +45,6 @@ class Text:
     text: str
     tone: Tone = "plain"
     always: bool = False
-    kind: ClassVar[str] = "text"
 
 
 @dataclass(frozen=True)
@@ -57,7 +52,6 @@ class Facts:
     """Terms with their values."""
 
     rows: Sequence[tuple[str, str]]
-    kind: ClassVar[str] = "facts"
 
 
 @dataclass(frozen=True)
@@ -89,21 +83,11 @@ class Table:
     words: frozenset[int] = frozenset({0})
     sentences: frozenset[int] = frozenset()
     legend: str = ""
-    kind: ClassVar[str] = "table"
 
     @property
     def explained(self) -> str:
         """The caption with the legend."""
         return f"{self.caption} {self.legend}".strip()
-
-    def part(self, name: str, *columns: int) -> Table:
-        """Take some of its columns, without a caption."""
-        header, rows = ([self.header[each] for each in columns], [[row[each] for each in columns] for row in self.rows])
-        words, sentences = (
-            frozenset(new for new, old in enumerate(columns) if old in chosen)
-            for chosen in (self.words, self.sentences)
-        )
-        return Table(name, "", header, rows, words, sentences)
 
     @property
     def cells(self) -> list[list[Cell]]:
@@ -111,22 +95,8 @@ class Table:
         return [[entry if isinstance(entry, Cell) else Cell(entry) for entry in row] for row in self.rows]
 
 
-class Picture(Protocol):
-    """A figure that is drawn when somebody asks what it looks like: not every form of a page shows it."""
-
-    @property
-    def svg(self) -> str:
-        """One ``svg`` element without external references."""
-        ...
-
-    @property
-    def rows(self) -> Sequence[tuple[str, ...]]:
-        """What it draws, for who does not see it: panel, curve, x, y."""
-        ...
-
-    def figure(self) -> Figure:
-        """Draw it for whoever goes on with it."""
-        ...
+Picture = Any
+"""A figure as `report.canvas` draws it when somebody asks what it looks like: not every form of a page shows it."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +114,6 @@ class Plot:
     picture: Picture
     description: str = ""
     see: tuple[str, str] | None = None
-    kind: ClassVar[str] = "plot"
 
 
 @dataclass(frozen=True)
@@ -152,7 +121,6 @@ class Listing:
     """Verbatim text."""
 
     text: str
-    kind: ClassVar[str] = "listing"
 
 
 @dataclass(frozen=True)
@@ -170,7 +138,6 @@ class Folded:
     summary: str
     blocks: Sequence[Block]
     shown: bool = False
-    kind: ClassVar[str] = "folded"
 
 
 @dataclass(frozen=True)
@@ -178,7 +145,6 @@ class Heading:
     """A heading inside a section."""
 
     text: str
-    kind: ClassVar[str] = "heading"
 
 
 @dataclass(frozen=True)
@@ -189,7 +155,6 @@ class Box:
     title: str
     sentences: Sequence[str]
     tone: Tone = "note"
-    kind: ClassVar[str] = "box"
 
 
 Block = Box | Text | Facts | Table | Plot | Listing | Folded | Heading

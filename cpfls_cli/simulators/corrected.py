@@ -56,6 +56,8 @@ _OF_EFFECTS: dict[str, Quantity] = {"drag": "drag", "rolling": "rolling", "lag_u
 _WRITES = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 _OF_PLUGINS = ("sdf", "urdf-gazebo")
 _OF_XML = (*_OF_PLUGINS, "urdf", "mjcf")
+_BEFORE_ROOT = re.compile(rb"(?:<!--.*?-->|<\?.*?\?>|[^<])*", re.DOTALL)
+"""Declaration and comments ahead of the first element."""
 _ROUNDING, _SAME = 1e-9, 1e-6
 _LEAST_S = 5.0
 """Length of a flight that shows single rotors."""
@@ -145,6 +147,10 @@ class _Found(NamedTuple):
         value = self.value * other.value
         return _Found(value, value * (1 - wide[0]), value * (1 + wide[1]))
 
+    def __str__(self) -> str:
+        """Write it with its interval."""
+        return f"{self.value:.4g} [{self.low:.4g}, {self.high:.4g}]"
+
     def contradicts(self, stated: float, wider: float = 1.0) -> bool:
         """Tell whether a number lies outside the interval, made wider by a factor."""
         below, above = (self.value + wider * (end - self.value) for end in (self.low, self.high))
@@ -153,11 +159,6 @@ class _Found(NamedTuple):
 
 
 _ONE = _Found(1.0, 1.0, 1.0)
-
-
-def _significant(factor: _Found, wider: float) -> _Found:
-    """Give a factor, or 1 with as wide an interval where it may be that."""
-    return factor if factor.contradicts(1.0, wider) else factor.plus(1.0 - factor.value)
 
 
 def _part(number: Estimate | None, times: float) -> _Found:
@@ -328,13 +329,16 @@ def corrected(
     files = _written(made, changes, [each.name for each in flights])
     names = of.model.output_names
     texts = {names[file]: text for file, text in files.items()}
-    diff = "".join(_diff(names[file], raw_bytes(file), text) for file, text in files.items())
+    diff = list[str]()
+    for file, text in files.items():
+        given, after = (each.decode("utf-8", "replace").splitlines(keepends=True) for each in (raw_bytes(file), text))
+        diff += difflib.unified_diff(given, after, f"given/{names[file]}", f"corrected/{names[file]}", n=1)
     said = Corrected(
         files=tuple(texts),
         changes=changes,
         unchanged=tuple(made.unchanged),
         elsewhere=tuple(made.elsewhere),
-        diff=visible(diff),
+        diff=visible("".join(line if line.endswith("\n") else f"{line}\n" for line in diff)),
     )
     return said, texts
 
@@ -456,10 +460,7 @@ def _say_hidden(made: _Corrections, name: str, stated: Stated, reason: str | Non
 
 
 def _values(each: NamedEffect) -> str:
-    return ", ".join(
-        f"{number.name} {number.value:.4g} [{number.low:.4g}, {number.high:.4g}] {number.unit}"
-        for number in each.numbers
-    )
+    return ", ".join(f"{number.name} {_Found.of(number)} {number.unit}" for number in each.numbers)
 
 
 def _not_held(made: _Corrections, each: NamedEffect) -> None:
@@ -472,7 +473,10 @@ def _not_held(made: _Corrections, each: NamedEffect) -> None:
 
 def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     """Correct thrust, yaw torque and inertia by wrong numbers, rotors that differ, and a wrong drag factor together."""
-    scale = _significant(_factor(numbers.get("thrust_scale")), made.wider)
+    scale = _factor(numbers.get("thrust_scale"))
+    if not scale.contradicts(1.0, made.wider):
+        # 1 with as wide an interval, where it may be that.
+        scale = scale.plus(1.0 - scale.value)
     lifts, drags = (numbers.get(f"{what}_imbalance") for what in ("lift", "drag"))
     modes, spins = gain_modes(made.vehicle), [rotor.spin for rotor in made.vehicle.rotors]
     patterns = [
@@ -512,11 +516,7 @@ def _as_found(made: _Corrections, kind: str, factors: Sequence[_Found], words: s
         found = [factor.times(own) for factor, own in zip(factors, known, strict=True)]
         if made.of_rotors(kind, found, words, [common.times(own) for own in known]):
             return
-    off = {
-        f"M{index + 1}": f"{each.value:.4g} [{each.low:.4g}, {each.high:.4g}]"
-        for index, each in enumerate(factors)
-        if each.contradicts(1.0, made.wider)
-    }
+    off = {f"M{index + 1}": str(each) for index, each in enumerate(factors) if each.contradicts(1.0, made.wider)}
     if off:
         alike = len(off) == len(factors) and len(set(off.values())) == 1
         sizes = {"all rotors": off["M1"]} if alike else off
@@ -584,16 +584,13 @@ def _inertia(made: _Corrections, wanted: Mapping[int, _Found]) -> None:
     for entry, found in wanted.items():
         total = float(whole[INERTIA_ENTRIES[entry]])
         if own.node is None and not made.of.model.states_inertia:
-            made.elsewhere.append(
-                f"{ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] kg m^2: the "
-                "file states none"
-            )
+            made.elsewhere.append(f"{ENTRIES[entry]} of the vehicle is {found} kg m^2: the file states none")
             continue
         if not own.entries or not _straight(own.turned):
             if found.contradicts(total, made.wider):
                 made.elsewhere.append(
-                    f"{ENTRIES[entry]} of the vehicle is {found.value:.4g} [{found.low:.4g}, {found.high:.4g}] "
-                    f"kg m^2, and not {total:.4g}: {own.inertia_at} states it in other axes, or not; change it there"
+                    f"{ENTRIES[entry]} of the vehicle is {found} kg m^2, and not {total:.4g}: {own.inertia_at} states "
+                    "it in other axes, or not; change it there"
                 )
             continue
         new = found.plus(float(own.inertia[INERTIA_ENTRIES[entry]]) - total)
@@ -684,8 +681,8 @@ def _lag(made: _Corrections, numbers: Mapping[str, Estimate]) -> bool:
     stated = [each.value for each in (*up, *down)]
     if tau.low <= max(stated) and tau.high >= min(stated):
         made.unchanged.append(
-            f"time constants {min(stated):.4g} and {max(stated):.4g} s agree with the flights, {tau.value:.4g} "
-            f"[{tau.low:.4g}, {tau.high:.4g}] s up and down together"
+            f"time constants {min(stated):.4g} and {max(stated):.4g} s agree with the flights, {_Found.of(tau)} s up "
+            "and down together"
         )
         return True
     for kind in ("lag_up", "lag_down"):
@@ -726,25 +723,13 @@ def _written(made: _Corrections, changes: Sequence[Change], flights: Sequence[st
             raw = raw[: span.start] + edits[span] + raw[span.end :]
         own_changes = [change for change in changes if change.file == made.of.model.output_names[file]]
         if own and made.of.model.format in _OF_XML:
-            at = _root_at(file)
-            raw = raw[:at] + _comment(_comment_lines(own_changes, flights), raw) + raw[at:]
+            head = _BEFORE_ROOT.match(raw_bytes(file))
+            assert head is not None, "it may be empty"
+            raw = head[0] + _comment(_comment_lines(own_changes, flights), raw) + raw[head.end() :]
         elif own:
             raw = with_comment(file, raw, _comment_lines(own_changes, flights))
         found[file] = raw
     return found
-
-
-def _root_at(file: Path) -> int:
-    """Find where the first element begins: behind declaration and comments."""
-    raw, at = raw_bytes(file), 0
-    while True:
-        at = raw.index(b"<", at)
-        if raw.startswith(b"<!--", at):
-            at = raw.index(b"-->", at) + 3
-        elif raw.startswith(b"<?", at):
-            at = raw.index(b"?>", at) + 2
-        else:
-            return at
 
 
 def _comment_lines(changes: Sequence[Change], flights: Sequence[str]) -> list[str]:
@@ -764,14 +749,3 @@ def _comment(lines: Sequence[str], raw: bytes) -> bytes:
     # Two hyphens end a comment, and files are in many encodings.
     text = re.sub("-(?=-)", "- ", end.join(map(visible, lines)))
     return f"<!-- {text} -->{end}".encode("ascii", "xmlcharrefreplace")
-
-
-def _diff(name: str, before: bytes, after: bytes) -> str:
-    given, found = (each.decode("utf-8", "replace").splitlines(keepends=True) for each in (before, after))
-    return "".join(
-        _ended(line) for line in difflib.unified_diff(given, found, f"given/{name}", f"corrected/{name}", n=1)
-    )
-
-
-def _ended(line: str) -> str:
-    return line if line.endswith("\n") else f"{line}\n"

@@ -17,8 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.simulators.document import Node, Stated, read_xml
-from cpfls_cli.simulators.model import Body, Rotor, SimulatorModel, of_quaternion, part_of, pose, rotated, turning, unit
+from cpfls_cli.simulators.model import Body, Rotor, SimulatorModel, of_quaternion, part_of, pose, turning, unit
 
 _TURNING = ("hinge", "slide", "ball")
 _SMALL = 1e-9
@@ -117,7 +118,7 @@ class _File:
             turn = of_quaternion(unit(node, "quat", held["quat"]))
         elif "euler" in held:
             for axis, angle in zip(self.order, held["euler"], strict=True):
-                one = rotated([radians * angle if each == axis.lower() else 0.0 for each in "xyz"])
+                (one,) = rotation_matrix(np.array([[radians * angle * (each == axis.lower()) for each in "xyz"]]))
                 turn = turn @ one if axis.islower() else one @ turn
         elif "axisangle" in held:
             *axis_of, angle = held["axisangle"]

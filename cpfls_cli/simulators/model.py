@@ -356,28 +356,12 @@ def unit(node: Node, name: str, direction: Sequence[float] | Array) -> Array:
     return np.asarray(direction, dtype=float) / length
 
 
-def rotated(rpy: Sequence[float]) -> Array:
-    """Rotation by roll, pitch and yaw about fixed axes, rad, shape (3, 3)."""
-    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
 def of_quaternion(quaternion: Sequence[float] | Array) -> Array:
     """Rotation by a quaternion w, x, y, z of length 1, shape (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
     w, x, y, z = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return np.asarray(Rotation.from_quat([x, y, z, w]).as_matrix())
 
 
 def pose(rotation: Array, place: Sequence[float] | Array) -> Array:

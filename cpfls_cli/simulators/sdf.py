@@ -10,7 +10,7 @@ at a speed w in rad/s, thrust is ``motorConstant w^2`` along z of the rotor's li
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from os.path import isdir, isfile
 from pathlib import Path
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.simulators.document import Node, Stated, read_xml
 from cpfls_cli.simulators.model import (
     ENTRIES,
@@ -27,7 +28,6 @@ from cpfls_cli.simulators.model import (
     of_quaternion,
     part_of,
     pose,
-    rotated,
     turning,
     unit,
 )
@@ -165,24 +165,24 @@ def _pose(node: Node | None) -> Array:
         return pose(of_quaternion(unit(node, "its quaternion", [turn[3], *turn[:3]])), (x, y, z))
     x, y, z, *rpy = (each.value for each in node.numbers(count=6))
     degrees = node.attributes.get("degrees", "false") in ("true", "1")
-    return pose(rotated([angle * (np.pi / 180 if degrees else 1.0) for angle in rpy]), (x, y, z))
+    return pose(rotation_matrix(np.array([rpy]) * (np.pi / 180 if degrees else 1.0))[0], (x, y, z))
 
 
 def _model_of(root: Node) -> Node:
     """Find the one model with motors, or the only one."""
     places = [root, *root.all("world")]
     models = [model for place in places for model in place.all("model")]
-    flying = [model for model in models if any(MOTOR.search(p.attributes.get("filename", "")) for p in _plugins(model))]
+    flying = [
+        model
+        for model in models
+        if any(p.tag == "plugin" and MOTOR.search(p.attributes.get("filename", "")) for p in model.walk())
+    ]
     if len(flying) == 1 or len(models) == 1:
         return (flying or models)[0]
     if not models:
         raise root.error("has no <model>; give the file of a vehicle")
     names = ", ".join(model.name for model in flying or models)
     raise InputError(f"{root.file}: holds several models: {names}; give a file with one vehicle alone")
-
-
-def _plugins(model: Node) -> Iterator[Node]:
-    return (node for node in model.walk() if node.tag == "plugin")
 
 
 def read_sdf(file: Path) -> SimulatorModel:

@@ -18,8 +18,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
+from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.simulators.document import Node, Stated, read_xml
-from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, part_of, pose, rotated, turning
+from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, part_of, pose, turning
 from cpfls_cli.simulators.sdf import CANNOT as CANNOT_OF_PLUGINS
 from cpfls_cli.simulators.sdf import MOTOR, in_order, no_motor, not_in_file, rotor_of, text_of
 
@@ -133,7 +134,7 @@ def _origin(node: Node | None) -> Array:
         [each.value for each in node.numbers(name, 3)] if name in node.attributes else [0.0] * 3
         for name in ("xyz", "rpy")
     )
-    return pose(rotated(rpy), xyz)
+    return pose(rotation_matrix(np.array([rpy]))[0], xyz)
 
 
 def _body(link: Node, placed: Array, notes: list[str]) -> Body:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 
 _TURN = 360.0
+STILL_AIR = "flown in still air; the model holds the gusts of its flights: --gusts plays them"
+"""Of a flight in which the gusts that its model holds were not played."""
 
 
 def demand_sentences(demand: Flyability, planned: PlannedRotation) -> tuple[str, ...]:
@@ -64,8 +66,7 @@ def draw_attitude(r: Any, figure: Figure) -> None:
     axes = figure.subplots()
     for index, axis in enumerate(AXES[:2]):
         line(axes, r.time, np.degrees(r.attitude[:, index]), label=axis, **style_of(index))
-    axes.set_xlabel("time, s")
-    axes.set_ylabel("angle, °")
+    axes.set(xlabel="time, s", ylabel="angle, °")
     legend_above(axes)
 
 
@@ -80,10 +81,8 @@ def draw_rotation(r: Any, figure: Figure) -> None:
         for number, part in enumerate(np.split(np.arange(len(r.time)), seams)):
             line(angles, r.time[part], wrapped[part], label=axis if number == 0 else None, **style)
         line(rates, r.time, r.attitude_rate[:, index], **style)
-    angles.set_yticks([0, 90, 180, 270, 360])
-    angles.set_ylabel("angle on the circle, °")
-    rates.set_ylabel("Euler rate, rad/s")
-    rates.set_xlabel("time, s")
+    angles.set(yticks=[0, 90, 180, 270, 360], ylabel="angle on the circle, °")
+    rates.set(ylabel="Euler rate, rad/s", xlabel="time, s")
     legend_above(angles)
 
 
@@ -93,8 +92,7 @@ def _draw_torque(r: Flight, figure: Figure) -> None:
     panels = stacked(figure, 3)
     for index, (axes, axis) in enumerate(zip(panels, AXES, strict=True)):
         line(axes, r.time, r.torque[:, index], **style_of(0))
-        axes.set_title(f"torque on {axis}")
-        axes.set_ylabel("N m")
+        axes.set(title=f"torque on {axis}", ylabel="N m")
     panels[-1].set_xlabel("time, s")
 
 

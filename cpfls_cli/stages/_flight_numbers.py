@@ -17,7 +17,7 @@ from cpfls_cli.errors import InputError, visible
 from cpfls_cli.flightlog.stated_vehicle import autopilots_apart, ranges_apart, stated_vehicle, vehicles_apart
 from cpfls_cli.flights.recordings import read_alone
 from cpfls_cli.logs.formats import is_log, log_contents
-from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.pages.trust import contradicted
 from cpfls_cli.report.change_words import WORDS
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.version import code_fingerprint

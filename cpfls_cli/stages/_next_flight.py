@@ -62,11 +62,6 @@ class Case:
     notes: tuple[str, ...]
 
 
-def waypoints_path(run: Run) -> dict[Path, str]:
-    """Name the file of waypoints that an autopilot flies, with its form."""
-    return {run.output.with_name(f"{run.output.stem}-waypoints.csv"): "csv"}
-
-
 def planned(run: Run, diagnosis: Path | None = None) -> PlannedPath | None:
     """Plan the flight that decides most; None in a dry run."""
     study = run.study

@@ -24,6 +24,7 @@ from cpfls_cli.flights.recordings import Recordings, read_flights
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import compare as compare_flights
+from cpfls_cli.gap.recorded import GIVEN, recorded
 from cpfls_cli.gap.residual.views import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.gap import channel_unit, channel_words
@@ -77,8 +78,7 @@ def _draw_gap(r: Disagreement, figure: Figure) -> None:
         _mark_stretches(axes, r, CHANNELS[index], offset)
         for part in parts[1:]:
             axes.axvline(time[part][0], color="black", linewidth=0.7, linestyle=(0, (4, 2)))
-        axes.set_xlim(time.min(), time.max())
-        axes.set_title(channel_words(CHANNELS[index]))
+        axes.set(xlim=(time.min(), time.max()), title=channel_words(CHANNELS[index]))
     figure.supylabel("gap, noise floors", fontsize=9.5)
     panels[-1].set_xlabel("time, s; flights one after another")
 
@@ -115,8 +115,7 @@ def _draw_dependence(r: Disagreement, figure: Figure) -> None:
         colours = [_BLUE if each.sure else "white" for each in best]
         axes.barh(rows, shares, height=0.66, color=colours, edgecolor=_BLUE)
         axes.set_yticks(rows, [each.signal for each in best])
-        axes.set_axisbelow(True)
-        axes.set_xlim(0.0, 1.0)
+        axes.set(axisbelow=True, xlim=(0.0, 1.0))
         axes.grid(visible=False, axis="y")
         axes.set_title(channel_words(channel))
     for column in range(min(_COLUMNS, len(channels))):
@@ -143,8 +142,7 @@ def _draw_heat_map(r: Disagreement, figure: Figure) -> None:
     bar.ax.set_yticklabels([plain(float(limit), smallest=1e-4) for limit in limits])
     bar.set_label(f"mean gap, {channel_unit(found.channel)}")
     axes.grid(visible=False)
-    axes.set_xlabel(_signal_words(found.signals[0]))
-    axes.set_ylabel(_signal_words(found.signals[1]))
+    axes.set(xlabel=_signal_words(found.signals[0]), ylabel=_signal_words(found.signals[1]))
     for axis in (axes.xaxis, axes.yaxis):
         plain_ticks(axis)
 
@@ -257,7 +255,12 @@ def compared(
     """Compare a model with flights; rotors are held against `whole` ones, where there are more than these."""
     rng = generator(study, "compare")
     found = compare_flights(given.recordings, model, study.gap, rng, progress, whole=whole)
-    return Disagreement.of(found, given.recordings, given.warnings, model)
+    return Disagreement(
+        **vars(found),
+        warnings=(*found.audit.filtered, *given.warnings),
+        base=model,
+        recorded=recorded(given.recordings, [GIVEN] * len(given.recordings)),
+    )
 
 
 def check_ignored(study: Study) -> None:

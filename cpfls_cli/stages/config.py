@@ -10,7 +10,6 @@ import typer
 from cpfls_cli.config.check import commented_default
 from cpfls_cli.config.study import resolved, resolved_yaml
 from cpfls_cli.errors import ConfigError
-from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, stage
 
 ConfigArgument = Annotated[Path | None, typer.Argument(metavar="CONFIG", help="Study config (YAML).")]
@@ -19,17 +18,10 @@ SectionOption = Annotated[
 ]
 
 
-@result
-class Shown:
-    """A config; ``--json`` shows its sections and keys."""
-
-    text: str = about("as it is written", brief=False)
-
-
-@stage(Shown, output=False, study=True)
-def config(run: Run, config: ConfigArgument = None, section: SectionOption = None) -> Shown:
+@stage(dict, output=False, study=True)
+def config(run: Run, config: ConfigArgument = None, section: SectionOption = None) -> dict[str, str]:
     """Write a config out."""
     if config is None and section:
         raise ConfigError("--section needs a CONFIG; without one the commented default is printed")
     run.also = resolved(run.study, section or ())
-    return Shown(text=commented_default() if config is None else resolved_yaml(run.study, section or ()))
+    return {"text": commented_default() if config is None else resolved_yaml(run.study, section or ())}

@@ -28,7 +28,6 @@ from cpfls_cli.gap.diagnose import diagnose as diagnose_flights
 from cpfls_cli.gap.naming.causes import of_thrust
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.whole_vehicle import known_already
-from cpfls_cli.pages.disturbance import axis_words
 from cpfls_cli.pages.gap import (
     AXES,
     BEFORE,
@@ -44,7 +43,7 @@ from cpfls_cli.pages.gap import (
     wrong_numbers,
 )
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn
-from cpfls_cli.pages.playback import SIGNALS, WHO, draw_errors, errors_height
+from cpfls_cli.pages.playback import SIGNALS, WHO, axis_words, draw_errors, errors_height
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.errors import AFTER
 from cpfls_cli.playback.model import VehicleModel

@@ -5,26 +5,37 @@ from __future__ import annotations
 import keyword
 import re
 import sys
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from cpfls_cli import store
 from cpfls_cli.arguments import ExportAnywayOption
+from cpfls_cli.artifacts.diagnosis import Extended
+from cpfls_cli.artifacts.gate import InputFile, Origin, read_origin
+from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.output import check_output
+from cpfls_cli.config.load import stored_study
+from cpfls_cli.dynamics import CELLS, InertiaFunctions
 from cpfls_cli.errors import InputError
+from cpfls_cli.export.holding import Missing, Off, sized
 from cpfls_cli.export.mcap_form import TIME, View, csv_text, mcap_bytes
 from cpfls_cli.export.registry import FORMS, exported
+from cpfls_cli.export.sheet import REFITTED, Sheet
 from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.viewed import view_of
-from cpfls_cli.result import about, part, plain, result
+from cpfls_cli.flights.models import any_model, modelled
+from cpfls_cli.pages.model import against, impossible_in_words, worth_in_words
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
-from cpfls_cli.stages._sheets import sheet_of
+from cpfls_cli.validation.trust import Trust
 
 Formats = StrEnum(
     "Formats",
@@ -72,49 +83,6 @@ _IMPORTED = ("casadi", "jax", "numpy", "pegasus", "rotorpy")
 
 
 @result
-class Model:
-    """A model in another form."""
-
-    name: str = about("prefix of its names")
-    complete: bool = about("whether its search came to its end")
-    verdict: str | None = about("on the model, in a word")
-    cautions: tuple[str, ...] = about("what speaks against it", "caution")
-    impossible: str | None = about("its numbers that no vehicle has")
-    rotors: int = about("count of them")
-    weights: int = about("numbers of torque and force that are not zero")
-    effects: tuple[str, ...] = about("that it holds", "effect")
-    learned: bool = about("whether a part of it has no name")
-    parameters: int | None = about("of an identified model")
-    fuzzy: bool = about("whether its inertia depends on the attitude")
-    rigid_body: bool = about("whether it has an inertia")
-    region_share: float | None = about("share of the attitudes that training visited")
-    said: tuple[str, ...] = about("what it is, and what the form does not hold", "sentence", brief=False)
-    warnings: tuple[str, ...] = about("what speaks against using it", "warning", brief=False)
-
-
-@result
-class Track:
-    """A quantity over time."""
-
-    name: str = about("with its flight")
-    unit: str = about("of its values")
-    frame: str = about("of its components")
-    samples: int = about("count of them")
-    first_s: float = about("time of the first", unit="s")
-    values: tuple[str, ...] = about("measured, of a model, ...", "value")
-    axes: tuple[str, ...] = about("names of its components", "component")
-
-
-@result
-class Viewed:
-    """What programs draw of an artifact."""
-
-    on_log_clock: bool = about("whether times are those of the log")
-    tracks: tuple[Track, ...] = part()
-    curves: tuple[str, ...] = about("over something else than time", "curve")
-
-
-@result
 class Written:
     """Files for other programs."""
 
@@ -123,7 +91,8 @@ class Written:
     output: tuple[str, ...] = about("their names", "file")
     bytes: int = about("in all of them")
     sizes: Mapping[str, int] = about("bytes of each", brief=False)
-    model: Model | None = part(default=None, brief=False)
+    said: tuple[str, ...] = about("what a model is, and what the form does not hold", "sentence", brief=False)
+    warnings: tuple[str, ...] = about("what speaks against using it", "warning", brief=False)
     view: View | None = None
 
 
@@ -152,25 +121,23 @@ def _modelled(run: Run, model: Path, form: str, name: str | None, *, anyway: boo
     made = exported(sheet, form, run.output.name)
     run.texts |= zip(outputs, made.texts.values(), strict=True)
     identified = sheet.identified
-    found = Model(
-        name=sheet.name,
-        complete=sheet.complete,
-        verdict=sheet.verdict,
-        cautions=sheet.cautions,
-        impossible=sheet.impossible or None,
-        rotors=sheet.model.rotors,
-        weights=len(sheet.numbers),
-        effects=tuple(effect.name for effect in sheet.model.effects),
-        learned=sheet.model.remainder is not None,
-        parameters=None if identified is None else identified.structure.parameters,
-        fuzzy=sheet.rules is not None,
-        rigid_body=bool(sheet.rigid_body.any()),
-        region_share=None if identified is None else float(np.mean(identified.visited)),
-        said=(*sheet.remarks, *made.remarks),
-        warnings=sheet.warnings,
-    )
-    run.also = plain(found) | {"missing": [asdict(each) for each in made.missing]}
-    return _written(run, form, model=found)
+    run.also = {
+        "name": sheet.name,
+        "complete": sheet.complete,
+        "verdict": sheet.verdict,
+        "cautions": sheet.cautions,
+        "impossible": sheet.impossible or None,
+        "rotors": sheet.model.rotors,
+        "weights": len(sheet.numbers),
+        "effects": [effect.name for effect in sheet.model.effects],
+        "learned": sheet.model.remainder is not None,
+        "parameters": None if identified is None else identified.structure.parameters,
+        "fuzzy": sheet.rules is not None,
+        "rigid_body": bool(sheet.rigid_body.any()),
+        "region_share": None if identified is None else float(np.mean(identified.visited)),
+        "missing": [asdict(each) for each in made.missing],
+    }
+    return _written(run, form, (*sheet.remarks, *made.remarks), sheet.warnings)
 
 
 def _drawn(run: Run, artifact: Path, form: str) -> Written:
@@ -179,24 +146,25 @@ def _drawn(run: Run, artifact: Path, form: str) -> Written:
     given, origin = store.read(artifact, kind_of(artifact))
     view = view_of(artifact, given, origin.config)
     run.texts[run.output] = mcap_bytes(view) if form == "mcap" else csv_text(view)
-    tracks = (
-        Track(
-            name=each.path,
-            unit=each.unit,
-            frame=each.frame,
-            samples=len(each.time),
-            first_s=float(np.min(each.time, initial=np.inf)),
-            values=tuple(each.values),
-            axes=each.axes,
-        )
+    tracks = [
+        {
+            "name": each.path,
+            "unit": each.unit,
+            "frame": each.frame,
+            "samples": len(each.time),
+            "first_s": float(np.min(each.time, initial=np.inf)),
+            "values": list(each.values),
+            "axes": each.axes,
+        }
         for each in view.tracks
-    )
-    curves = tuple(curve.name for curve in view.curves)
-    run.also = plain(Viewed(on_log_clock=view.on_log_clock, tracks=tuple(tracks), curves=curves))
+    ]
+    run.also = {"on_log_clock": view.on_log_clock, "tracks": tracks, "curves": [curve.name for curve in view.curves]}
     return _written(run, form, view=view)
 
 
-def _written(run: Run, form: str, model: Model | None = None, view: View | None = None) -> Written:
+def _written(
+    run: Run, form: str, said: tuple[str, ...] = (), warnings: tuple[str, ...] = (), view: View | None = None
+) -> Written:
     sizes = {str(path): len(each if isinstance(each, bytes) else each.encode()) for path, each in run.texts.items()}
     return Written(
         dry_run=run.dry_run,
@@ -204,7 +172,8 @@ def _written(run: Run, form: str, model: Model | None = None, view: View | None 
         output=tuple(sizes),
         bytes=sum(sizes.values()),
         sizes=sizes,
-        model=model,
+        said=said,
+        warnings=warnings,
         view=view,
     )
 
@@ -251,3 +220,134 @@ def _outputs_of(output: Path, form: str) -> list[Path]:
     if not re.fullmatch(r"[A-Za-z0-9_.+-]+", output.stem):
         raise InputError(f"{output}: C includes its header by name; use letters, digits and any of _ . + - in it")
     return [output.with_suffix(FORMS[form].also), output]
+
+
+_SCORE_UNITS = {"mse": "(N m)^2", "max_error": "N m", "relative_error": "1", "r2": "1", "vaf": "1", "r2_body": "1"}
+
+
+def sheet_of(path: Path, name: str, file: InputFile, *, force: bool, anyway: bool = False) -> Sheet:
+    """Read any model; one that nobody should use, or whose search was stopped, needs `force` and is marked.
+
+    Numbers that no vehicle has need `anyway`, which does for the others too.
+    """
+    record = any_model(path)
+    sheet = _bare_sheet(path, record, read_origin(path))
+    if isinstance(sheet.model.fuzzy, InertiaFunctions):
+        _require_usable(sheet.model.fuzzy, path)
+    if sheet.impossible and not anyway:
+        raise InputError(
+            f"{path}: impossible numbers, which no such vehicle has: {sheet.impossible}; --anyway exports them all the "
+            "same, and says so in the first line"
+        )
+    force = force or anyway
+    if not (sheet.complete or force):
+        raise InputError(
+            f"{path}: the search for this model did not come to its end ({sheet.stopped}); "
+            f"`cpfls {record.MADE_BY} ... --resume` goes on, --anyway exports the model as it is, marked as "
+            "incomplete"
+        )
+    if sheet.verdict == "do-not-use" and not force:
+        raise InputError(f"{path}: its verdict is do-not-use; --anyway exports it, marked as such")
+    return replace(sheet, name=name, file=path.name, sha256=file.sha256)
+
+
+def bare_sheet(record: AnyModel, model: VehicleModel, origin: Origin) -> Sheet:
+    """Put a model on a sheet that has no name yet."""
+    return Sheet(
+        "",
+        model,
+        tuple(worth_in_words(record)),
+        origin,
+        "",
+        "",
+        verdict=None if record.trust == Trust.NOT_JUDGED else str(record.trust),
+        stopped=record.stopped or None,
+        cautions=() if isinstance(record, IdentifiedModel) else (*origin.cautions, *against(record)),
+        evidence=_evidence(record) if isinstance(record, IdentifiedModel) else {},
+        impossible=impossible_in_words(record),
+    )
+
+
+def _require_usable(functions: InertiaFunctions, path: Path) -> None:
+    """Refuse what no other program could evaluate."""
+    where = f"{path}: model/fuzzy"
+    if functions.visited.shape != (CELLS, CELLS):
+        raise InputError(f"{where}/visited: is {functions.visited.shape}, not {(CELLS, CELLS)}; identify it again")
+    for partition, peaks in zip(functions.structure.partitions, functions.partitions, strict=True):
+        if not (np.all(np.diff(peaks) >= 0.0) and np.all((peaks >= 0.0) & (peaks <= 1.0))):
+            raise InputError(f"{where}/partitions: those of {partition.name} make no partition; identify it again")
+
+
+def _bare_sheet(path: Path, record: AnyModel, origin: Origin) -> Sheet:
+    """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
+    model = modelled(path, record)
+    beside = model.unsimulated
+    held = tuple(each for each in model.effects if each.name not in beside)
+    still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
+    sheet = bare_sheet(record, still, origin)
+    if isinstance(record, IdentifiedModel):
+        return replace(sheet, warnings=tuple(_warnings(record, origin.config, path)))
+    outside = tuple(_missing(record, (*model.filters, *model.along)))
+    floor = tuple(record.gap.floor.tolist()) if isinstance(record, Extended) else sheet.floor
+    return replace(sheet, outside=outside, wind=model.wind, floor=floor)
+
+
+def _missing(record: AnyModel, effects: tuple[ModelEffect, ...]) -> Iterator[Missing]:
+    """List effects that no table of weights holds, with their sizes along held-out flights where these are known."""
+    known = {each.name: each for each in record.left_out} if isinstance(record, Extended) else {}
+    for effect in effects:
+        if isinstance(record, Extended) and effect.name in known:
+            own, floor = known[effect.name], record.gap.floor
+            yield sized(_in_numbers(effect), own.wrench, floor, Off.of(own.ends), "along its held-out flights")
+        else:
+            yield Missing(_in_numbers(effect), np.nan, np.nan, np.nan, None)
+
+
+def _in_numbers(effect: ModelEffect) -> str:
+    """Say what an effect is and which numbers it has, so that others can add it."""
+    units = {each.name: "" if each.unit in ("", "1") else f" {each.unit}" for each in effect.known.numbers}
+    numbers = ", ".join(f"{name} = {value:.4g}{units[name]}" for name, value in effect.values.items())
+    title = REFITTED if effect.known.kind == "parameter" else effect.known.title
+    return f"{title} ({effect.known.formula}; {numbers})"
+
+
+def _evidence(record: IdentifiedModel) -> dict[str, Any]:
+    """Say what an identified model was judged by, for JSON."""
+    verdict, judged = record.verdict, record.judged
+    counts = zip(judged.parts, judged.samples, judged.outside, strict=True)
+    stated = None
+    if verdict is not None:
+        reasons = [{"reason": reason, "speaks": float(speaks)} for reason, speaks in verdict.reasons]
+        stated = {"label": verdict.label, "region": verdict.region, "reasons": reasons}
+    return {
+        "stop_reason": record.stop_reason,
+        "verdict": stated,
+        "findings": record.findings,
+        "judged": {
+            "units": _SCORE_UNITS,
+            "parts": {part: {"samples": int(samples), "outside": int(outside)} for part, samples, outside in counts},
+            "models": {
+                model: {
+                    part: {measure: judged.of_axes(measure, model, part).tolist() for measure in judged.measures}
+                    for part in judged.parts
+                }
+                for model in judged.models
+            },
+        },
+    }
+
+
+def _warnings(model: IdentifiedModel, config: str, path: object) -> Iterator[str]:
+    """Say what speaks against flying with an identified model."""
+    if not model.complete:
+        yield "the model is incomplete, and marked as such: do not fly with it"
+    if model.verdict is None:
+        off = not stored_study(config, path).identification.validation.enabled
+        why = "identification.validation.enabled was off when it was identified" if off else "it was not validated"
+        yield (
+            f"{path}: holds no verdict ({why}), so nothing says how far to trust it; run `cpfls identify` with "
+            "identification.validation.enabled: true"
+        )
+    elif model.verdict.label == "do-not-use":
+        against = [reason for reason, speaks in model.verdict.reasons if speaks < 0]
+        yield ": ".join([f"{path}: its verdict is do-not-use, exported all the same", *against[:1]])

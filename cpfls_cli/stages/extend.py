@@ -7,6 +7,8 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from cpfls_cli.arguments import DiagnosisArgument, ModelOption
 from cpfls_cli.artifacts.diagnosis import Diagnosis, Extended
 from cpfls_cli.artifacts.model import as_inputs, joined_flights
@@ -18,7 +20,8 @@ from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon, left_out, played_pairs, rates_fade
 from cpfls_cli.gap.extended import extend as refitted
 from cpfls_cli.gap.extended import plain
-from cpfls_cli.gap.naming.results import GapVerdict, NamedEffect
+from cpfls_cli.gap.naming.causes import all_numbers
+from cpfls_cli.gap.naming.results import GapChange, GapVerdict, NamedEffect
 from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, in_roles
 from cpfls_cli.gap.whole_vehicle import (
     above_thrust,
@@ -28,6 +31,7 @@ from cpfls_cli.gap.whole_vehicle import (
     whole_vehicle,
     with_known_wrench,
 )
+from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.gap import intervals_drawn, sizes_drawn
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
@@ -110,4 +114,17 @@ def extended(
     played = played_pairs(held, whole, given, rates_fade(training, study.gap.horizon_s))
     playback = PlaybackChange.of_pairs(played, errors_by_horizon(played, study.gap.horizon_s))
     missing = left_out(whole, whole.unsimulated, held, study.gap.horizon_s)
-    return Extended.of(extension, vehicle, whole, playback, missing)
+    fitted, unseen, moments = extension.model, extension.unseen, vehicle.inertia_kg_m2
+    rigid_body = six_parameters(moments) if fitted.base is None else np.zeros(6)
+    correction = np.array([*fitted.parameters[:3] * np.array(moments[:3]), 0.0, 0.0, 0.0])
+    scale = next((each.value for each in extension.estimates.parameters if each.name == "thrust_scale"), 0.0)
+    return Extended(
+        model=whole,
+        inertia=rigid_body + correction,
+        thrust_scale=1.0 + scale,
+        effects=extension.effects,
+        vehicle_numbers=all_numbers(extension.estimates),
+        gap=GapChange.of(unseen.size(unseen.before), unseen.size(unseen.after), unseen.floor),
+        playback=playback,
+        left_out=tuple(missing),
+    )

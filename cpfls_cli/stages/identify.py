@@ -24,12 +24,12 @@ from cpfls_cli.arguments import (
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel, identified_model
 from cpfls_cli.artifacts.model import LearnedFlight
-from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
 from cpfls_cli.flights.same_vehicle import other_vehicles
 from cpfls_cli.flights.training import (
-    TrainingData,
+    SplitFlights,
     check_file,
     choosing_source,
     flight_roles,
@@ -45,10 +45,10 @@ from cpfls_cli.identification.search import NothingFoundError, SearchRun, Search
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.identification import WORDS
 from cpfls_cli.pages.identified_figures import FIGURES
-from cpfls_cli.pages.sensors import tell_before_search
+from cpfls_cli.pages.trust import tell_before_search
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command, Text
-from cpfls_cli.search import SearchOptions, Watch, begin_search
+from cpfls_cli.search import Watch, begin_search
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._checkpoint import stop_note, without_model
 from cpfls_cli.validation.trust import Trust
@@ -76,22 +76,29 @@ def identify(
     scheduler: SchedulerOption = None,
 ) -> IdentifiedModel | None:
     """Identify a model, and gather the evidence on it."""
-    options, others, choosing = SearchOptions(resume, time_limit, workers, scheduler), validate or [], choose_on or []
-    inputs, search = begin_search(run, input_roles(flights, selection, others, choosing), options)
+    others, choosing = validate or [], choose_on or []
+    inputs, search = begin_search(
+        run, input_roles(flights, selection, others, choosing), resume=resume, workers=workers, scheduler=scheduler
+    )
     run.files.update(inputs)
     data, kept = read_training(flights, selection, run.study, inputs), choosing_source(choosing, inputs)
     with settings_of("identification", run.study):
         require_flights(run.study.identification.choice, given=kept is not None)
     held_out = held_out_parts(run.study, data.rests, inputs, others)
-    wrong = _contradictions([*flights, *choosing, *others], run.study)
-    for sentence in other_vehicles([*flights, *choosing, *others], run.study):
+    every = [*flights, *choosing, *others]
+    # A simulated flight cannot contradict itself.
+    recorded = (path for path in every if "log" in read_origin(path).inputs)
+    wrong = contradictions(finding.of(path.name) for path in recorded for finding in check_file(path, run.study))
+    for sentence in other_vehicles(every, run.study):
         run.said.append(Text(sentence, "warning", always=True))
     tell_before_search(wrong)
     if run.dry_run:
         return None
     clock, watch = time.perf_counter(), Watch(run, time_limit)
-    run.until_written.enter_context(search.kept())
-    found = _identified(run, flights, data, held_out, kept, search.run(options, watch, _shown(run)))
+    run.until_written.enter_context(search.checkpoint.kept())
+    found = _identified(
+        run, flights, data, held_out, kept, search.run(watch, _shown(run), count=workers, scheduler=scheduler)
+    )
     if isinstance(found, NothingFoundError):
         search.end(found.stop_reason)
         raise without_model(found.stop_reason, watch.signal) or _of(flights, found)
@@ -120,16 +127,10 @@ def _next(run: Run, made: IdentifiedModel, flights: Sequence[Path]) -> Command:
     return "cpfls", "report", run.config, *flights, run.output, "-o", run.beside("report.html")
 
 
-def _contradictions(flights: Sequence[Path], study: Study) -> tuple[str, ...]:
-    """Say what of recorded flights contradicts itself; a simulated one cannot."""
-    recorded = (path for path in flights if "log" in read_origin(path).inputs)
-    return contradictions(finding.of(path.name) for path in recorded for finding in check_file(path, study))
-
-
 def _identified(
     job: Run,
     flights: Sequence[Path],
-    data: TrainingData,
+    data: SplitFlights,
     held_out: dict[str, TorqueSource],
     kept: TorqueSource | None,
     search: SearchRun,
@@ -155,7 +156,7 @@ def _identified(
         raise _of(flights, error) from None
 
 
-def _with_length(result: Identification, flights: Sequence[Path], data: TrainingData) -> Identification:
+def _with_length(result: Identification, flights: Sequence[Path], data: SplitFlights) -> Identification:
     """Add a warning of short flights, where all were recorded: a planned one may be exact."""
     if not all("log" in read_origin(path).inputs for path in flights):
         return result
@@ -184,7 +185,7 @@ def _note(step: SearchStep) -> str:
 def _evidence(
     job: Run,
     result: Identification,
-    data: TrainingData,
+    data: SplitFlights,
     held_out: Mapping[str, TorqueSource],
     wrong: Sequence[str],
     signal: int | None,

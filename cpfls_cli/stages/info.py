@@ -14,10 +14,11 @@ import typer
 from cpfls_cli import store
 from cpfls_cli.errors import InputError
 from cpfls_cli.report.source import source_of_result
-from cpfls_cli.result import about, datasets, part, plain, result
+from cpfls_cli.result import datasets, plain
 from cpfls_cli.stage import Run, Stage, loaded, stage, stage_that_made
 from cpfls_cli.words import did_you_mean
 
+_NOTHING: dict[str, Any] = {"file": None, "listed": (), "described": None}
 _LONG = "too long to be shown: its values are in the file"
 
 FileArgument = Annotated[Path | None, typer.Argument(metavar="FILE", help="Any artifact.")]
@@ -26,67 +27,13 @@ NameOption = Annotated[
 ]
 
 
-@result
-class Dataset:
-    """A dataset of a format."""
-
-    dimensions: tuple[str, ...] = about("its axes", "axis of it")
-    units: str = about("of its values")
-    frame: str = about("of its components")
-    required: bool = about("whether every file holds it")
-    gaps: bool = about("whether values may be missing: not finite")
-    description: str = about("what it holds")
-
-
-@result
-class Format:
-    """A format of files."""
-
-    format: str = about("its name")
-    description: str = about("what a file of it holds")
-    commands: tuple[str, ...] = about("that write it", "command")
-    datasets: Mapping[str, Dataset] = part(brief=False)
-
-
-@result
-class Input:
-    """A file that another one was made from."""
-
-    name: str = about("of the file")
-    sha256: str = about("of its content")
-    format: str = about("of the file")
-
-
-@result
-class Held:
-    """What a file holds."""
-
-    file: str = about("as it was given")
-    format: str = about("that it is of")
-    cpfls_version: str = about("of the program that made it")
-    seed: int | None = about("of the run that made it, or None where it needs none")
-    inputs: Mapping[str, Input] = part()
-    cautions: tuple[str, ...] = about("what speaks against it", "caution")
-    answer: str = about("what its command answered, in Markdown", brief=False)
-    datasets: Mapping[str, Dataset] = part(brief=False)
-
-
-@result
-class Shown:
-    """A file, all formats, or one of them."""
-
-    file: Held | None = part(default=None, brief=False)
-    listed: tuple[Format, ...] = part(default=(), brief=False)
-    described: Format | None = part(default=None, brief=False)
-
-
-def short(described: Format) -> str:
+def short(described: Mapping[str, Any]) -> str:
     """Give the name of a format as it is typed."""
-    return described.format.removeprefix("cpfls/")
+    return str(described["format"]).removeprefix("cpfls/")
 
 
-@stage(Shown, output=False, words={"short": short})
-def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown:
+@stage(dict, output=False, words={"short": short})
+def info(run: Run, file: FileArgument = None, name: NameOption = None) -> dict[str, Any]:
     """Show a file, or formats."""
     if file and name is not None:
         raise InputError("--format describes files of a format in general: leave out FILE or --format")
@@ -96,37 +43,36 @@ def info(run: Run, file: FileArgument = None, name: NameOption = None) -> Shown:
     long = store.is_long(file, own.kind)
     if long:
         store.check_rows(file, own.kind, store.held_rows(file, own.kind))
-    given, origin = store.read_first(file, own.kind) if long else store.read(file, own.kind)
+    given, origin = store.examine(file, own.kind, 2)[:2] if long else store.read(file, own.kind)
     source = source_of_result(given, origin, file, file.name, "")
-    held = Held(
-        file=str(file),
-        format=own.kind.FORMAT,
-        cpfls_version=origin.version,
-        seed=origin.seed,
-        inputs={role: Input(**vars(each)) for role, each in origin.inputs.items()},
-        cautions=tuple(origin.cautions),
-        answer=_LONG if long else own.text(given, about=source),
-        datasets=_datasets(own),
-    )
-    run.also = plain(held) | ({} if long else {"result": plain(given)})
+    held = {
+        "file": str(file),
+        "format": own.kind.FORMAT,
+        "cpfls_version": origin.version,
+        "seed": origin.seed,
+        "inputs": {role: vars(each) for role, each in origin.inputs.items()},
+        "cautions": origin.cautions,
+    }
+    run.also = held | ({} if long else {"result": plain(given)})
     run.next.append(("cpfls", "check", file))
-    return Shown(file=held)
+    answer = _LONG if long else own.text(given, about=source)
+    return _NOTHING | {"file": held | {"answer": answer, "datasets": _datasets(own)}}
 
 
-def _formats(run: Run, name: str | None) -> Shown:
+def _formats(run: Run, name: str | None) -> dict[str, Any]:
     """Describe the format of a name, such as ``flight`` or ``cpfls/flight``; without a name, list all."""
     every = tuple(map(described, formats()))
     if name is None:
-        run.also = {"formats": plain(every)}
+        run.also = {"formats": [{name: each[name] for name in ("format", "description", "commands")} for each in every]}
         run.next.append(("cpfls", "info", "--format", short(every[0])))
-        return Shown(listed=every)
+        return _NOTHING | {"listed": every}
     known = {short(each): each for each in every}
     chosen = known.get(asked := name.removeprefix("cpfls/"))
     if chosen is None:
         hint = did_you_mean(asked, list(known), "", most=3)
         raise InputError(f"--format {name}: no such format{f' ({hint})' if hint else ''}; there are {', '.join(known)}")
-    run.also = {"formats": [plain(chosen) | {"datasets": plain(chosen.datasets)}]}
-    return Shown(described=chosen)
+    run.also = {"formats": [chosen]}
+    return _NOTHING | {"described": chosen}
 
 
 def formats() -> list[Stage]:
@@ -139,27 +85,27 @@ def formats() -> list[Stage]:
     return [stages[name] for name in sorted(stages)]
 
 
-def described(own: Stage) -> Format:
+def described(own: Stage) -> dict[str, Any]:
     """Describe the format of a stage."""
     first = str(own.kind.__doc__).split("\n", 1)[0].rstrip(".")
-    return Format(
-        format=own.kind.FORMAT,
-        description=first[0].lower() + first[1:],
-        commands=tuple(str(getattr(own.kind, "MADE_BY", own.name)).split(" or ")),
-        datasets=_datasets(own),
-    )
+    return {
+        "format": own.kind.FORMAT,
+        "description": first[0].lower() + first[1:],
+        "commands": str(getattr(own.kind, "MADE_BY", own.name)).split(" or "),
+        "datasets": _datasets(own),
+    }
 
 
 def _datasets(own: Stage) -> dict[str, Any]:
     return {
-        path: Dataset(
-            dimensions=each.about.axes,
-            units="text" if each.scalar is str else each.about.unit,
-            frame=each.about.frame,
-            required=each.required,
-            gaps=each.about.gaps,
-            description=each.about.text,
-        )
+        path: {
+            "dimensions": each.about.axes,
+            "units": "text" if each.scalar is str else each.about.unit,
+            "frame": each.about.frame,
+            "required": each.required,
+            "gaps": each.about.gaps,
+            "description": each.about.text,
+        }
         for path, each in datasets(own.kind)
         if each.about
     }

@@ -29,7 +29,7 @@ from cpfls_cli.flights.models import found_vehicle, is_found
 from cpfls_cli.flights.recordings import check_flight, imported, read_import, seen_twice
 from cpfls_cli.logs.formats import log_contents, suffixes_in_words
 from cpfls_cli.page import TEMPLATES
-from cpfls_cli.pages.sensors import contradicted
+from cpfls_cli.pages.trust import contradicted
 from cpfls_cli.report.content import Command, number
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
@@ -281,7 +281,12 @@ def init(
     file = None
     if model is not None:
         file = taken(run, model, "model")
-        _refuse_stated(file, inertia, *((arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()))
+        also = (arm, thrust_factor, drag_factor, scale_to_arm or None) if file.rotors else ()
+        if any(each is not None for each in (inertia, *also)):
+            raise InputError(
+                f"{file.file}: states inertia{', rotors and their factors' if file.rotors else ''}, so leave out "
+                f"--inertia{', --arm and the factors' if file.rotors else ''}; --mass takes the mass as it flew"
+            )
     stated = Stated(mass, arm, inertia, thrust_factor, drag_factor, file)
     _require_possible(stated)
     made, given, text = proposed(run, logs or (), stated, scale_to_arm=scale_to_arm)
@@ -303,14 +308,6 @@ def taken(run: Run, model: Path, role: str) -> SimulatorModel:
     read = read_model(model)
     run.take({f"{role}-include-{at}": file for at, file in enumerate(read.files[1:], start=1)})
     return read
-
-
-def _refuse_stated(file: SimulatorModel, *given: object) -> None:
-    if any(each is not None for each in given):
-        raise InputError(
-            f"{file.file}: states inertia{', rotors and their factors' if file.rotors else ''}, so leave out "
-            f"--inertia{', --arm and the factors' if file.rotors else ''}; --mass takes the mass as it flew"
-        )
 
 
 def proposed(
@@ -507,7 +504,12 @@ def config_text(made: Proposed) -> str:
         loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     plain.filters.update(flow=_flow, comment=_comment, number=number)
-    known = {"ASK": ASK, "DECIDES_ROTORS": DECIDES_ROTORS, "capitalised": capitalised, "signal_lines": _signal_lines}
+    known = {
+        "ASK": ASK,
+        "DECIDES_ROTORS": DECIDES_ROTORS,
+        "capitalised": capitalised,
+        "signal_lines": lambda guess: "\n".join(_signal(guess)),
+    }
     usual = [(kind, own) for kind in USUAL if (own := usual_airframe(kind, 4)) is not None]
     return plain.get_template("init.yaml.j2").render(r=made, usual_airframes=usual, **known)
 
@@ -516,10 +518,6 @@ def _comment(text: str, indent: int) -> str:
     start = f"{' ' * indent}# "
     lines = textwrap.wrap(text, _WIDTH - len(start), break_long_words=False, break_on_hyphens=False)
     return "".join(f"{start}{line}\n" for line in lines)
-
-
-def _signal_lines(guess: Guess) -> str:
-    return "\n".join(_signal(guess))
 
 
 def _rotor(rotor: RotorPlace | None, airframe: Airframe | None, stated: Stated) -> str:

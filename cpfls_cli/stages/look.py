@@ -84,8 +84,7 @@ def _effectiveness(r: Look, figure: Figure) -> None:
 def _over_frequency(axes: Axes) -> None:
     low, high = axes.dataLim.intervalx
     logarithmic(axes, low, high)
-    axes.set_xlim(low, high)
-    axes.set_xlabel("frequency, Hz")
+    axes.set(xlim=(low, high), xlabel="frequency, Hz")
     if len(axes.get_legend_handles_labels()[1]) > 1:
         legend_above(axes, 3)
 
@@ -109,9 +108,7 @@ def _step(r: Look, figure: Figure) -> None:
         if getattr(loop, "law_explains", False) and len(loop.law_step) == len(loop.time):
             axes.plot(time, loop.law_step[inside], label=f"{loop.axis}, by law", color=style["color"], linewidth=0.7)
     low, high = axes.get_ylim()
-    axes.set_ylim(max(low, -0.5), min(high, 2.0))
-    axes.set_xlabel("time after the step, s")
-    axes.set_ylabel("share of the step")
+    axes.set(ylim=(max(low, -0.5), min(high, 2.0)), xlabel="time after the step, s", ylabel="share of the step")
     legend_above(axes, 3)
 
 
@@ -125,8 +122,7 @@ def _response(r: Look, figure: Figure) -> None:
         band(axes, frequency, gain / spread, gain * spread, color=style["color"], alpha=_FAINT)
         axes.plot(frequency, gain, label=loop.axis, **style)
     axes.axhline(1.0, **BASELINE)
-    axes.set_ylim(0.0, 2.0)
-    axes.set_ylabel("gain")
+    axes.set(ylim=(0.0, 2.0), ylabel="gain")
     _over_frequency(axes)
 
 
@@ -155,8 +151,7 @@ def _map(r: Look, figure: Figure) -> None:
         extent=(hz[0], hz[-1], v.map_collective[0] - half, v.map_collective[-1] + half),
     )
     axes.grid(visible=False)
-    axes.set_xlabel("frequency, Hz")
-    axes.set_ylabel("throttle, share of full")
+    axes.set(xlabel="frequency, Hz", ylabel="throttle, share of full")
 
 
 def _of_gyroscope(r: Look) -> list[Spectrum]:
@@ -178,13 +173,8 @@ def _spectra(r: Look, figure: Figure) -> None:
     for line in () if r.vibration is None else r.vibration.lines:
         axes.axvline(line.hz, **BASELINE)
         axes.text(line.hz, 1.0, f"{line.hz:.0f}", transform=axes.get_xaxis_transform(), ha="center", fontsize=8.5)
-    axes.set_yscale("log")
-    axes.set_ylabel("deg/s per √Hz")
+    axes.set(yscale="log", ylabel="deg/s per √Hz")
     _over_frequency(axes)
-
-
-def _shaped(r: Look) -> bool:
-    return r.hover is not None and r.hover.shape is not None and len(r.hover.shape.collective) > 0
 
 
 def _thrust(r: Look, figure: Figure) -> None:
@@ -197,8 +187,7 @@ def _thrust(r: Look, figure: Figure) -> None:
     middle = float(np.median(shape.specific_force / shape.collective**exponent))
     axes.plot(level, middle * level**exponent, label=f"exponent {exponent:.2f}", **style_of(1))
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("throttle, share of full")
-    axes.set_ylabel("specific force, m/s²")
+    axes.set(xlabel="throttle, share of full", ylabel="specific force, m/s²")
     legend_above(axes)
 
 
@@ -233,7 +222,11 @@ FIGURES = {
         "Power of the gyroscope over frequency and throttle: the darker, the stronger", _map, _mapped
     ),
     "spectra": _drawn("Spectrum of the gyroscope, mean of its axes", _spectra, _of_gyroscope),
-    "thrust": _drawn("Specific force along the rotors' axis over the collective command", _thrust, _shaped),
+    "thrust": _drawn(
+        "Specific force along the rotors' axis over the collective command",
+        _thrust,
+        lambda r: r.hover and r.hover.shape and len(r.hover.shape.collective),
+    ),
 }
 
 

@@ -45,8 +45,7 @@ def _draw(r: Selection, figure: Figure) -> None:
         lower.plot(size, np.where(values > 0, values, np.nan), color=style["color"], linestyle=dashes, label=word)
     lower.set_xlabel("selected samples")
     for axes, name in ((upper, "condition number"), (lower, "singular value")):
-        axes.set_ylabel(name)
-        axes.set_yscale("log")
+        axes.set(ylabel=name, yscale="log")
         legend_above(axes, columns=2)
 
 

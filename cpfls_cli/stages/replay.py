@@ -98,8 +98,7 @@ def _where(r: Playback, figure: Figure) -> None:
         keep_in_view(axes, [nothing], model)
         axes.set_ylim(bottom=0.0)
         plain_ticks(axes.yaxis)
-        axes.set_title(flight.name)
-        axes.set_ylabel("error, rad/s")
+        axes.set(title=flight.name, ylabel="error, rad/s")
     panels[-1].set_xlabel("start of the window, s")
     legend_over(figure, panels[0])
 

@@ -13,11 +13,10 @@ from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.config.study import Study
 from cpfls_cli.files import read_content
 from cpfls_cli.pages.comparison import differing
-from cpfls_cli.pages.page import WORDS, report_page
+from cpfls_cli.pages.page import WORDS, Page, report_page
 from cpfls_cli.pages.trust import model_words
 from cpfls_cli.report.content import Form
 from cpfls_cli.report.source import Source, Sources, source_of_result, unique_labels
-from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage, stage_that_made
 from cpfls_cli.store import Origin, read
 from cpfls_cli.version import __version__
@@ -29,25 +28,8 @@ FormOption = Annotated[
 ]
 
 
-@result
-class Report:
-    """A page about artifacts."""
-
-    output: str = about("file of the page")
-    bytes: int = about("of the file")
-    sections: tuple[str, ...] = about("names of its sections", "section", default=())
-    figures: tuple[str, ...] = about("names of its figures", "figure", default=())
-    tables: tuple[str, ...] = about("names of its tables", "table", default=())
-    missing: tuple[str, ...] = about("formats of which none was given", "format", default=())
-    verdicts: Mapping[str, str] | None = about("how far to trust each model", brief=False, default=None)
-    differing: tuple[str, ...] | None = about(
-        "constants that differ between vehicles", "constant", brief=False, default=None
-    )
-    repeated: tuple[str, ...] = about("artifacts that are shown once", "sentence", brief=False, default=())
-
-
-@stage(Report, study=True, words=WORDS)
-def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> Report | None:
+@stage(dict, study=True, words=WORDS)
+def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> dict[str, Any] | None:
     """Write a report about artifacts."""
     suffix = run.output.suffix.lower()
     form = form or {".md": Form.MARKDOWN, ".markdown": Form.MARKDOWN, ".json": Form.JSON}.get(suffix, Form.HTML)
@@ -68,19 +50,20 @@ def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> R
     return _written(
         run,
         page.text,
-        sections=page.sections,
-        figures=page.figures,
-        tables=page.tables,
-        missing=page.missing,
+        page,
         verdicts={model.label: model_words(model.record).sentence for model in given.of_kind(AnyModel)},
         differing=differing(given),
         repeated=(*again, *equal),
     )
 
 
-def _written(run: Run, text: str, **more: Any) -> Report | None:
+def _written(run: Run, text: str, page: Page | None = None, **more: Any) -> dict[str, Any] | None:
     run.texts[run.output] = text
-    return None if run.dry_run else Report(output=str(run.output), bytes=len(text.encode()), **more)
+    if run.dry_run:
+        return None
+    run.also = {"output": str(run.output), "bytes": len(text.encode())}
+    run.also |= {name: getattr(page, name, ()) for name in ("sections", "figures", "tables", "missing")}
+    return {"verdicts": {}, "differing": None, "repeated": (), **run.also, **more}
 
 
 def read_sources(paths: Sequence[Path], hashes: Sequence[str]) -> list[Source]:

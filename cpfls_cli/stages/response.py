@@ -19,8 +19,7 @@ from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.pages.gap import MEASURED
-from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.pages.trust import contradicted, seen_warnings
 from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.settings import VEHICLE
@@ -107,9 +106,7 @@ def _draw(name: str, r: Responses, figure: Figure) -> None:
         lower.plot(own.frequency, own.clearness, label="by random error", **_MODEL)
         legend_above(lower)
     lower.axhline(COHERENT, **BASELINE)
-    lower.set_ylim(0.0, 1.05)
-    lower.set_ylabel("coherence")
-    lower.set_xlabel("Hz")
+    lower.set(ylim=(0.0, 1.05), ylabel="coherence", xlabel="Hz")
     logarithmic(lower, own.frequency[0], own.frequency[-1])
     legend_over(figure, upper)
 

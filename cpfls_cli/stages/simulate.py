@@ -15,19 +15,18 @@ from cpfls_cli.arguments import FlownArgument
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.job import require_numbers
-from cpfls_cli.config.study import Study, generator, settings_of
+from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flights.flight import MOTION, Flight, Infeasible, Simulated, Tracking, values_of
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
-from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.report.content import Outcome
 from cpfls_cli.simulation.inverse import simulate as fly_exactly
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
 from cpfls_cli.stage import Run, stage, stage_named
-from cpfls_cli.stages._flight import FIGURES, WORDS, infeasible_sentence
+from cpfls_cli.stages._flight import FIGURES, STILL_AIR, WORDS, infeasible_sentence
 from cpfls_cli.store import read
 
 if TYPE_CHECKING:
@@ -130,7 +129,9 @@ def simulate(
             raise InputError(f"{trajectory}: --mode {mode}: along a flight all is flown in closed loop; leave it out")
         return stage_named("twin").run(run, path=trajectory, model=model)
     if model is not None and mode is None:
-        run.study = _in_closed_loop(run.study)
+        with settings_of("simulation", run.study):
+            closed_loop = replace(run.study.simulation, mode="closed-loop")
+        run.study = run.study.model_copy(update={"simulation": closed_loop})
     _take_numbers(run, model)
     closed = run.study.simulation.mode == "closed-loop"
     if model is not None and not closed:
@@ -152,12 +153,6 @@ def _take_numbers(run: Run, model: Path | None) -> None:
         require_numbers(run, "simulate", whole=False)
         return
     import_module("cpfls_cli.stages._numbers").with_numbers(run, "simulate", model)
-
-
-def _in_closed_loop(study: Study) -> Study:
-    """Take the mode in which a model is flown, where nothing else is said."""
-    with settings_of("simulation", study):
-        return study.model_copy(update={"simulation": replace(study.simulation, mode="closed-loop")})
 
 
 def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:
@@ -187,6 +182,6 @@ def _closed_loop(run: Run, time: Array, planned: dict[str, Array], model: Vehicl
     study, rng = run.study, generator(run.study, "simulate")
     flight = measure(time, planned, study.vehicle, study.simulation, rng, run.progress, model)
     if model is not None and model.gusts is not None and not study.simulation.closed_loop.gusts:
-        run.say(still_air_text().text)
+        run.say(STILL_AIR)
     run.go_on("gap", run.output, output=run.beside("gap"))
     return replace(Simulated.of(time, flight), effects=values_of(flight.effects), tracking=Tracking.of(flight))

@@ -20,7 +20,7 @@ from cpfls_cli.playback.spread import Estimates, drawn, require_sure
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
 from cpfls_cli.stage import Run, stage
-from cpfls_cli.stages._sheets import sheet_of
+from cpfls_cli.stages.export import sheet_of
 
 VehicleArgument = Annotated[Path, typer.Argument(metavar="VEHICLE", help="Made by `cpfls vehicle`.")]
 CountOption = Annotated[int, typer.Option("-n", "--count", metavar="N", min=2, help="Vehicles to draw.")]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
+from enum import StrEnum
 from importlib import import_module
-from math import inf
+from math import inf, radians
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import typer
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.job import check_outputs, require_numbers
@@ -28,26 +30,6 @@ from cpfls_cli.simulation.room_left import RoomLeft, room_left
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import demand_sentences, draw_attitude, draw_rotation
 from cpfls_cli.stages._mission import mission_of, mission_paths, mission_texts, mission_words
-from cpfls_cli.stages._path_options import (
-    Added,
-    BandOption,
-    BoxOption,
-    DurationOption,
-    ExciteOption,
-    ForOption,
-    HeightOption,
-    HomeOption,
-    HoverOption,
-    MissionOption,
-    PlotOption,
-    RepeatOption,
-    SignalOption,
-    SizeOption,
-    ToTellOption,
-    WaypointsOption,
-    option_overrides,
-    require_no_room,
-)
 from cpfls_cli.trajectory.consistency import check_waypoints
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rotation, plan, repeated
@@ -57,6 +39,158 @@ from cpfls_cli.words import did_you_mean, joined
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+class Signal(StrEnum):
+    """What excites a path."""
+
+    MULTISINE = "multisine"
+    LINEAR = "sweep-linear"
+    LOGARITHMIC = "sweep-logarithmic"
+
+
+class MissionFormat(StrEnum):
+    """What a path is written as for an autopilot."""
+
+    CSV = "csv"
+    PX4 = "px4"
+    ARDUPILOT = "ardupilot"
+
+
+WaypointsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--waypoints",
+        metavar="FILE",
+        help="CSV of points to fly to, in place of the path of the config: x_m, y_m, z_m, and if wanted yaw_rad, "
+        "pause_s.",
+    ),
+]
+ToTellOption = Annotated[
+    str | None,
+    typer.Option("--to-tell", metavar="A,B", help="Plan the flight that tells these effects apart (`cpfls effects`)."),
+]
+ForOption = Annotated[
+    Path | None,
+    typer.Option("--for", metavar="DIAGNOSIS", help="Plan the flight that settles what this diagnosis leaves open."),
+]
+BoxOption = Annotated[
+    str | None, typer.Option("--box", metavar="X,Y,Z", help="Space for such a flight, m; about x = y = 0.")
+]
+HeightOption = Annotated[
+    float | None, typer.Option("--height", metavar="M", help="Height of the middle of the box above the ground, m.")
+]
+DurationOption = Annotated[
+    float | None, typer.Option("--duration", metavar="S", help="Duration, s, in place of that of the config.")
+]
+HoverOption = Annotated[
+    float | None, typer.Option("--hover", metavar="S", help="Hover for S seconds, in place of the path of the config.")
+]
+RepeatOption = Annotated[
+    int | None,
+    typer.Option(
+        "--repeat", metavar="N", help="Fly the path N times, each run the same from rest to rest, with a way back."
+    ),
+]
+ExciteOption = Annotated[
+    str | None,
+    typer.Option(
+        "--excite", metavar="AXES", help="Add a test signal: roll, pitch, yaw, vertical, with commas between."
+    ),
+]
+SignalOption = Annotated[
+    Signal | None, typer.Option("--signal", help="What excites; default: that of the config, a multisine if none.")
+]
+BandOption = Annotated[
+    str | None, typer.Option("--band", metavar="LOW,HIGH", help="Band of the test signal, Hz; 0.5,5 if none is set.")
+]
+SizeOption = Annotated[
+    float | None,
+    typer.Option(
+        "--size",
+        metavar="DEG",
+        help="Its largest angle, degrees; smaller, with a warning, where the vehicle cannot.",
+    ),
+]
+MissionOption = Annotated[
+    list[MissionFormat] | None,
+    typer.Option(
+        "--format",
+        help="For an autopilot, beside OUTPUT: the path as csv; a mission for px4 (QGroundControl); ardupilot: sweeps "
+        "for its System ID mode. May be repeated; --repeat and --excite write csv if none is named.",
+    ),
+]
+HomeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--home",
+        metavar="LAT,LON,HEIGHT",
+        help="For px4: degrees of x = y = 0 (x east, y north), and metres of z = 0 above the take-off.",
+    ),
+]
+PlotOption = Annotated[
+    bool, typer.Option("--plot", help="Draw the derivatives and the attitude, as SVG beside OUTPUT.")
+]
+
+
+def option_overrides(
+    waypoints: Path | None,
+    to_tell: str | None,
+    diagnosis: Path | None,
+    box: str | None,
+    height: float | None,
+    duration: float | None,
+    hover: float | None,
+    repeat: int | None,
+    excite: str | None,
+    signal: Signal | None,
+    band: str | None,
+    size: float | None,
+    **_: Any,
+) -> list[str]:
+    """Write the options as overrides of the config, ``section.key=value`` each, so that the file's config has them."""
+    settles = to_tell is not None or diagnosis is not None
+    if settles and waypoints is not None:
+        raise InputError(f"--waypoints {waypoints}: --to-tell and --for choose the path themselves; leave it out")
+    others = {
+        f"--waypoints {waypoints}": waypoints is not None,
+        "--to-tell and --for": settles,
+        f"--duration {duration or 0:g}": duration is not None,
+    }
+    for other, given in others.items():
+        if given and hover is not None:
+            raise InputError(f"--hover {hover:g}: stays at one place for so long; leave out {other}")
+    length = duration if hover is None else hover
+    paths = {"next-flight": settles, "waypoints": waypoints is not None, "hover": hover is not None}
+    lists = {"next_flight.to_tell": to_tell, "next_flight.box_m": box, "excite.axes": excite, "excite.band_hz": band}
+    values = {
+        "path": next((path for path, asked in paths.items() if asked), None),
+        **{key: None if text is None else f"[{text}]" for key, text in lists.items()},
+        "next_flight.height_m": None if height is None else repr(float(height)),
+        "duration_s": None if length is None else repr(float(length)),
+        "repeat": repeat,
+        "excite.signal": None if signal is None else signal.value,
+        "excite.size_rad": None if size is None else repr(radians(size)),
+    }
+    return [f"trajectory.{key}={value}" for key, value in values.items() if value is not None]
+
+
+def require_no_room(box: str | None, height: float | None) -> None:
+    """Refuse room for a path that is not planned for it."""
+    for option, value in (("--box", box), ("--height", height)):
+        if value is not None:
+            raise InputError(
+                f"{option} {value}: is room for the flight that --to-tell or --for plans, and this path is planned "
+                "without; give one of them, or set trajectory.displacement_m and trajectory.direction"
+            )
+
+
+def require_axes(study: Study, **given: object) -> None:
+    """Refuse what describes an excitation where there is none."""
+    for option, value in given.items():
+        if value is not None and not study.trajectory.excite.axes:
+            raise InputError(f"--{option} {value}: describes an excitation; say which axes with --excite AXES")
+
 
 PlanAt = Callable[[float], PlannedRotation]
 """Samples a plan with a sample time in s."""
@@ -68,20 +202,6 @@ _SAMPLES_IN_A_PART = 8
 _MOST_SAMPLES = 1_000_000
 
 
-@dataclass(frozen=True)
-class Flight:
-    """A path as it is to be flown, all runs of it.
-
-    `at` samples it anew, two runs at most, for a look between its samples; `excitation`: of a held vehicle, where the
-    path is optimised; `excited`: what is added to the setpoints.
-    """
-
-    planned: PlannedRotation
-    at: PlanAt
-    excitation: Excitation | None = None
-    excited: Excited | None = None
-
-
 def _draw_derivatives(r: PlannedPath, figure: Figure) -> None:
     """Draw pop to displacement over the first move: Figure 2 of the paper."""
     move = r.first_leg()
@@ -90,8 +210,7 @@ def _draw_derivatives(r: PlannedPath, figure: Figure) -> None:
         curve = move.curves[peak.name]
         line(axes, move.time, curve, **style_of(0))
         jumps = "" if np.any(curve) else ": not limited, infinite where the derivative below jumps"
-        axes.set_title(f"{peak.name}{jumps}")
-        axes.set_ylabel(peak.unit)
+        axes.set(title=f"{peak.name}{jumps}", ylabel=peak.unit)
         axes.axhline(0.0, color="#999999", linewidth=0.6)
         for limit in (-peak.limit, peak.limit) if np.isfinite(peak.limit) else ():
             axes.axhline(limit, **BASELINE)
@@ -109,28 +228,13 @@ FIGURES = {
 }
 
 
-def _overrides(**given: Any) -> list[str]:
-    """Write the options as overrides of the config, which the file holds with them."""
-    settles = given["to_tell"] is not None or given["diagnosis"] is not None
-    asked = option_overrides(
-        *(given[key] for key in ("waypoints", "to_tell", "diagnosis", "box", "height", "duration"))
-    )
-    return [*asked, *_added(given).overrides(given["waypoints"], settles, given["duration"])]
-
-
-def _added(given: dict[str, Any]) -> Added:
-    signal = given["signal"]
-    asked = (None if signal is None else signal.value, given["band"], given["size"], given["hover"])
-    return Added(given["repeat"], given["excite"], *asked)
-
-
 @stage(
     PlannedPath,
     title="Training path",
     figures=FIGURES,
     words={"plain": plain, "axes": AXES, "effect_title": effect_title},
     study=True,
-    overrides=_overrides,
+    overrides=option_overrides,
 )
 def trajectory(
     run: Run,
@@ -140,9 +244,9 @@ def trajectory(
     box: BoxOption = None,
     height: HeightOption = None,
     duration: DurationOption = None,  # noqa: ARG001  # the config has it
-    hover: HoverOption = None,
-    repeat: RepeatOption = None,
-    excite: ExciteOption = None,
+    hover: HoverOption = None,  # noqa: ARG001
+    repeat: RepeatOption = None,  # noqa: ARG001
+    excite: ExciteOption = None,  # noqa: ARG001
     signal: SignalOption = None,
     band: BandOption = None,
     size: SizeOption = None,
@@ -155,11 +259,11 @@ def trajectory(
     settles = run.study.trajectory.path == "next-flight"
     if not settles:
         require_no_room(box, height)
-        Added(repeat, excite, None if signal is None else signal.value, band, size, hover).require_axes(run.study)
+        require_axes(run.study, signal=signal, band=band, size=size)
     settings = run.study.trajectory if settles else _settings(run.study, waypoints)
     names = () if not plot else ("rotation",) if settings.held else ("derivatives", "attitude")
     figures = [run.output.with_name(f"{run.output.stem}-{name}.svg") for name in names]
-    texts = _next_flight().waypoints_path(run) if settles else mission_paths(run, mission)
+    texts = {run.beside(f"{run.output.stem}-waypoints.csv"): "csv"} if settles else mission_paths(run, mission)
     check_outputs(run, *figures, *texts)
     planned = _next_flight().planned(run, diagnosis) if settles else _planned(run, settings, waypoints)
     written = None if planned is None else mission_texts(run, mission, planned, texts)
@@ -191,8 +295,8 @@ def _planned(run: Run, settings: TrajectorySettings, waypoints: Path | None) -> 
     if run.dry_run and settings.path == "optimised":
         return None
     with settings_of("trajectory", run.study):
-        flight = _flight(run, settings)
-        demand, problems = _demand(run.study, settings, flight.planned, flight.at)
+        planned, at, excitation, excited = _flight(run, settings)
+        demand, problems = _demand(run.study, settings, planned, at)
     if problems and settings.infeasible == "stop":
         change = f"{_remedy(run.study, settings)}, change the vehicle, or set trajectory.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{run.output}: no path was written; {change}"]))
@@ -201,7 +305,7 @@ def _planned(run: Run, settings: TrajectorySettings, waypoints: Path | None) -> 
     if run.study.vehicle.unknown and run.open_numbers == "refused":
         unknown = joined(name.replace("_", " ") for name in run.study.vehicle.unknown)
         run.note(f"{unknown}: null in the config; what the path asks of the rotors was checked with guesses")
-    return PlannedPath.of(flight.planned, demand, settings, excitation=flight.excitation, excited=flight.excited)
+    return PlannedPath.of(planned, demand, settings, excitation=excitation, excited=excited)
 
 
 def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
@@ -217,15 +321,18 @@ def _settings(study: Study, waypoints: Path | None) -> TrajectorySettings:
     return settings
 
 
-def _flight(job: Run, settings: TrajectorySettings) -> Flight:
+def _flight(
+    job: Run, settings: TrajectorySettings
+) -> tuple[PlannedRotation, PlanAt, Excitation | None, Excited | None]:
+    """Give a path as it is to be flown, all runs of it, with what is optimised of a held vehicle and what is added.
+
+    The function samples it anew, two runs at most, for a look between its samples.
+    """
     if settings.held:
         with settings_of("trajectory.rotation", job.study):
             path, excitation = _rotation(job, settings)
-        return Flight(
-            held_rotation(path, settings.sample_time_s),
-            lambda sample_time: held_rotation(path, sample_time),
-            excitation,
-        )
+        planned = held_rotation(path, settings.sample_time_s)
+        return planned, lambda sample_time: held_rotation(path, sample_time), excitation, None
     gravity = job.study.vehicle.gravity_m_s2
     plain = plan(settings, gravity)
     room: RoomLeft | None = None
@@ -241,9 +348,9 @@ def _flight(job: Run, settings: TrajectorySettings) -> Flight:
 
     without = repeated(plain, settings, gravity)
     if room is None:
-        return Flight(without, at)
+        return without, at, None, None
     excited = repeated(room.added.onto(plain, gravity), settings, gravity)
-    return Flight(excited, at, None, Excited.of(settings.excite, excited, without, room))
+    return excited, at, None, Excited.of(settings.excite, excited, without, room)
 
 
 def _rotation(job: Run, settings: TrajectorySettings) -> tuple[RotationPath, Excitation | None]:

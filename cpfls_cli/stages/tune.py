@@ -88,13 +88,11 @@ def _bode(axis: int, r: Gains, figure: Figure) -> None:
     upper.axhline(0.0, **BASELINE)
     lower.axhline(-180.0, **BASELINE)
     upper.set_ylim(-40.0, 40.0)
-    lower.set_ylim(-360.0, 0.0)
-    lower.set_yticks([-360, -270, -180, -90, 0])
+    lower.set(ylim=(-360.0, 0.0), yticks=[-360, -270, -180, -90, 0])
     upper.set_ylabel("dB")
     lower.set_ylabel("degrees")
     low, high = r.sets[PROPOSED].frequency[[0, -1]]
-    lower.set_xlim(low, high)
-    lower.set_xlabel("Hz")
+    lower.set(xlim=(low, high), xlabel="Hz")
     logarithmic(lower, low, high)
     legend_over(figure, upper)
 
@@ -110,10 +108,7 @@ def _nichols(axis: int, r: Gains, figure: Figure) -> None:
     degrees = np.degrees(np.angle(edge)) % 360.0 - 360.0
     axes.fill(degrees, 20 * np.log10(np.abs(edge)), facecolor="#e4e4e4", edgecolor=GREY, label="asked margin: stay out")
     axes.plot([-180.0], [0.0], marker="+", color="black", linestyle="none", markersize=9)
-    axes.set_xlim(-300.0, -60.0)
-    axes.set_ylim(-30.0, 30.0)
-    axes.set_xticks([-270, -225, -180, -135, -90])
-    axes.set_xlabel("degrees")
+    axes.set(xlim=(-300.0, -60.0), ylim=(-30.0, 30.0), xticks=[-270, -225, -180, -135, -90], xlabel="degrees")
     axes.set_ylabel("dB")
     legend_over(figure, axes)
 
@@ -128,8 +123,7 @@ def _steps(r: Gains, figure: Figure) -> None:
         label = "proposed, vehicles that are possible"
         band(axes, time, own.step_low, own.step_high, color="#c9c9c9", label=label)
         axes.axhline(1.0, **BASELINE)
-        axes.set_ylim(-0.1, 1.7)
-        axes.set_ylabel(AXES[axis])
+        axes.set(ylim=(-0.1, 1.7), ylabel=AXES[axis])
         plain_ticks(axes.yaxis)
     panels[-1].set_xlabel("ms")
     legend_over(figure, panels[0])
@@ -144,14 +138,8 @@ def _noise(r: Gains, figure: Figure) -> None:
         line(axes, noise.frequency, 10 * np.log10(noise.density[:, axis]), label=title, **style_of(axis))
     for each in noise.lines:
         axes.axvline(each.hz, **BASELINE)
-    axes.set_xlabel("Hz")
-    axes.set_ylabel("dB (rad²/s² per Hz)")
+    axes.set(xlabel="Hz", ylabel="dB (rad²/s² per Hz)")
     legend_over(figure, axes)
-
-
-def _general(value: float) -> str:
-    """Write a parameter with as many digits as it has."""
-    return f"{value:.6g}" if np.isfinite(value) else UNKNOWN
 
 
 def _drawn(description: str, height: float, draw: Callable[[Any, Figure], None], part: str = "parameters") -> Drawn:
@@ -176,7 +164,12 @@ FIGURES = {
     Gains,
     title="Gains for an autopilot",
     figures=FIGURES,
-    words={"HOLDS": HOLDS, "TOO_SLOW": TOO_SLOW, "general": _general, "finite": np.isfinite},
+    words={
+        "HOLDS": HOLDS,
+        "TOO_SLOW": TOO_SLOW,
+        "general": lambda value: f"{value:.6g}" if np.isfinite(value) else UNKNOWN,
+        "finite": np.isfinite,
+    },
     study=lambda given: given["model"] is not None,
     output=Annotated[
         Path | None,

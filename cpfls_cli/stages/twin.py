@@ -20,10 +20,8 @@ from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_m
 from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.flights.training import known_by
 from cpfls_cli.logs.formats import is_log, log_contents
-from cpfls_cli.pages.disturbance import still_air_text
 from cpfls_cli.pages.gap import MEASURED
-from cpfls_cli.pages.sensors import contradicted
-from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.pages.trust import contradicted, seen_warnings
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import VehicleModel
@@ -55,6 +53,7 @@ from cpfls_cli.simulation.twin_flight import (
     measured_channels,
 )
 from cpfls_cli.stage import Run, stage
+from cpfls_cli.stages._flight import STILL_AIR
 from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.stages.compare import to_gap
 
@@ -240,7 +239,7 @@ def twin(run: Run, path: Path, model: Path | None = None) -> Twin | None:
     found = twin_of(flight, asked, flown, settings, gains, warnings, air)
     _go_on(run, found, path, model)
     if not settings.gusts and any(own is not None and own.gusts is not None for own in vehicles.values()):
-        run.say(still_air_text().text)
+        run.say(STILL_AIR)
     return found
 
 

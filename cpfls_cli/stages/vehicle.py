@@ -22,7 +22,7 @@ from cpfls_cli.arguments import (
 )
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import InputFile
-from cpfls_cli.artifacts.job import Job
+from cpfls_cli.artifacts.job import Job, origin_before
 from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.artifacts.output import check_output, refuse_own
 from cpfls_cli.artifacts.vehicle_model import (
@@ -50,13 +50,12 @@ from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, shown_slowly
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
 from cpfls_cli.flights.training import numbered_roles
-from cpfls_cli.pages.disturbance import gust_words
 from cpfls_cli.pages.gap_words import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.model import said_by
-from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height
+from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height, gust_words
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
-from cpfls_cli.pages.sensors import NOTHING_COMES, contradicted, tell_before_search
+from cpfls_cli.pages.trust import NOTHING_COMES, contradicted, tell_before_search
 from cpfls_cli.playback.errors import AlongFlights
 from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.loop import ANY, LoopBounds, shows_loop_anyhow
@@ -70,7 +69,7 @@ from cpfls_cli.report.content import percent
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
 from cpfls_cli.response.spectra import ACCEPTABLE
 from cpfls_cli.rounding import levelled
-from cpfls_cli.search import VehicleCheckpoint, Watch, begin_vehicle_search
+from cpfls_cli.search import VehicleCheckpoint, Watch
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._checkpoint import stop_note
 from cpfls_cli.stages._numbers import to_fly
@@ -217,9 +216,7 @@ def _structures(r: Vehicle, figure: Figure) -> None:
         look = {"label": _TRIED[name], "color": style_of(place)["color"], "markersize": 7, "linestyle": "none"}
         axes.plot([by_name[name].numbers], [by_name[name].error], marker, **look)
     axes.axhline(1.1, label="rates stay", **BASELINE)
-    axes.set_xlabel("free numbers")
-    axes.set_ylabel("error on flights kept aside")
-    axes.set_yscale("log")
+    axes.set(xlabel="free numbers", ylabel="error on flights kept aside", yscale="log")
     legend_over(figure, axes)
 
 
@@ -292,7 +289,8 @@ def vehicle(
     """Find a vehicle in flights, and judge it on those held out."""
     others = held_out or []
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", others)
-    checkpoint, kept = begin_vehicle_search(run, run.take(learned | unseen), resume=resume)
+    begun = origin_before(run.study, run.take(learned | unseen), "vehicle-checkpoint")
+    checkpoint, kept = VehicleCheckpoint.begun(run, begun, resume=resume)
     refuse_seen(*([run.files[role] for role in roles] for roles in (learned, unseen)))
     twice = seen_twice(run.files[role] for role in learned)
     if write_config is not None:

@@ -217,7 +217,8 @@ class Processes(Workforce):
         given: dict[_Process, IntArray] = {}
         self._hand_out(genes, waiting, given)
         while waiting or given:
-            for process in self._answering():
+            ready = wait([process.connection for process in self._processes if process.busy])
+            for process in [each for each in self._processes if each.connection in ready]:
                 answer, rows = process.answer(), given.pop(process, None)
                 self._hand_out(genes, waiting, given)
                 # Whatever was not given here answers to loading, or to a stream that was given up.
@@ -229,10 +230,6 @@ class Processes(Workforce):
             if waiting and not process.busy:
                 given[process] = waiting.pop(0)
                 process.give(genes[given[process]])
-
-    def _answering(self) -> list[_Process]:
-        ready = wait([process.connection for process in self._processes if process.busy])
-        return [process for process in self._processes if process.connection in ready]
 
 
 @contextmanager

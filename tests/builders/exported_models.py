@@ -19,7 +19,7 @@ from cpfls_cli.identification.identify import Judged
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
-from cpfls_cli.stages._sheets import bare_sheet
+from cpfls_cli.stages.export import bare_sheet
 from cpfls_cli.validation.verdict import Reason, Verdict
 from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -5,7 +5,7 @@ import re
 from cpfls_cli import page
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.report.terminal import terminal_lines
-from cpfls_cli.stages.effects import Catalogue, described, effects
+from cpfls_cli.stages.effects import described, effects
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -45,5 +45,5 @@ def test_an_unknown_name_is_refused(refuse):
 def test_all_of_it_fits_a_terminal_of_80_columns():
     vehicle = VehicleSettings()
     shown = [described(each, vehicle) for each in CATALOGUE.values()]
-    pages = [effects.text(Catalogue(vehicle="default", effects=own)) for own in (shown, *([each] for each in shown))]
+    pages = [effects.text({"vehicle": "default", "effects": own}) for own in (shown, *([each] for each in shown))]
     assert max(len(line) for text in pages for line in terminal_lines(page.blocks(text), 80, whole=True)) <= 80

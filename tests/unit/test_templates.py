@@ -1,5 +1,6 @@
 """Templates have no types: each variable, filter and attribute of a result that one names has to exist."""
 
+import ast
 import dataclasses
 from functools import cached_property
 from types import NoneType
@@ -31,8 +32,18 @@ def inner(hint):
     return None
 
 
+def keys_of(stage):
+    """Names that a module writes: keys of what it only answers with, a dict of plain data."""
+    tree = list(ast.walk(ast.parse((STAGES / f"{stage.function.__module__.rpartition('.')[2]}.py").read_text("utf-8"))))
+    texts = (node.value for node in tree if isinstance(node, ast.Constant) and isinstance(node.value, str))
+    return frozenset([*texts, *(node.arg for node in tree if isinstance(node, ast.keyword))])
+
+
 def attribute(kind, name):
     """Type of an attribute of a class, None where it is nothing of ours; what does not exist is an error."""
+    if isinstance(kind, frozenset):
+        assert name in {*kind, *dir(dict), *dir(str)}, f"nothing writes {name}"
+        return kind
     try:
         hints = get_type_hints(kind)
     except NameError:
@@ -119,7 +130,7 @@ def test_what_templates_name_exists(name):
         made = names["store"] | names["param"] | {macro.name for macro in tree.find_all(nodes.Macro)} | imported(tree)
         assert names["load"] - made - GIVEN - own.globals.keys() == set(), template
         if template == f"{name}.md.j2":
-            walk = Walk(stage.kind)
+            walk = Walk(keys_of(stage) if stage.kind is dict else stage.kind)
             walk(tree)
             assert walk.seen, "it shows nothing of its result"
 
@@ -129,6 +140,8 @@ def test_a_name_that_does_not_exist_is_found():
     own = environment(TEMPLATES, {})
     with pytest.raises(AssertionError, match="has no selektion"):
         Walk(kind)(own.parse("{{ r.selektion }}"))
+    with pytest.raises(AssertionError, match="nothing writes sentense"):
+        Walk(keys_of(loaded("effects")))(own.parse("{% for each in r.effects %}{{ each.sentense }}{% endfor %}"))
     look = loaded("look").kind
     field = next(each for each in described_fields(look) if each.table)
     with pytest.raises(AssertionError, match="has no nothing"):
