@@ -162,7 +162,7 @@ def _worst(played: Sequence[Played], windows: ReplayWindows, starts: Array, hori
     for flight in {int(windows.flight[at]) for at in chosen}:
         own = sorted(at for at in chosen if windows.flight[at] == flight)
         runs = drawn_runs(played[flight], windows.start[own], horizon)
-        ran |= zip(own, zip(runs.measured, runs.model, strict=True), strict=True)
+        ran |= zip(own, zip(runs["measured"], runs["model"], strict=True), strict=True)
     for at in chosen:
         measured, model = ran[at]
         yield WorstRun(
@@ -178,6 +178,5 @@ def _worst(played: Sequence[Played], windows: ReplayWindows, starts: Array, hori
 def _drawn(played: Sequence[Played], windows: ReplayWindows, starts: Array, horizon: int) -> DrawnRuns:
     chosen = windows.typical(horizon, _DRAWN_RUNS)
     own = played[windows.flight[chosen[0]]]
-    return DrawnRuns(
-        flight=own.flight.name, start_s=starts[chosen], **vars(drawn_runs(own, windows.start[chosen], horizon))
-    )
+    runs = drawn_runs(own, windows.start[chosen], horizon)
+    return DrawnRuns(flight=own.flight.name, start_s=starts[chosen], **runs)

@@ -378,18 +378,8 @@ def _added(
     return np.full(len(starts), flight), starts, size, diverged
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """Runs of the model and of the flight, their starts included; its fields are described at `DrawnRuns`."""
-
-    measured: Array
-    model: Array
-    measured_position: Array | None
-    model_position: Array | None
-
-
-def drawn_runs(played: Played, starts: IntArray, horizon: int) -> Drawn:
-    """Give what the model and the flight do from samples on.
+def drawn_runs(played: Played, starts: IntArray, horizon: int) -> dict[str, Array]:
+    """Give what the model and the flight do from samples on, by the names of `DrawnRuns`, their starts included.
 
     Parameters
     ----------
@@ -402,9 +392,10 @@ def drawn_runs(played: Played, starts: IntArray, horizon: int) -> Drawn:
     of_position, of_rate = (errors[:, :, SIGNALS.index(name)] for name in ("position", "body_rate"))
     samples = starts[:, None] + np.arange(horizon + 1)
     rate, position = played.flight.motion.rate[samples], played.flight.motion.position[samples]
-    if not played.knows["position"]:
-        return Drawn(rate, _predicted(rate, of_rate), None, None)
-    return Drawn(rate, _predicted(rate, of_rate), position, _predicted(position, of_position))
+    found = {"measured": rate, "model": _predicted(rate, of_rate)}
+    if played.knows["position"]:
+        found |= {"measured_position": position, "model_position": _predicted(position, of_position)}
+    return found
 
 
 def _predicted(measured: Array, errors: Array) -> Array:

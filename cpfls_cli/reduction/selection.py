@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -13,27 +13,6 @@ from cpfls_cli.reduction.survey import RowSpace
 from cpfls_cli.result import about, result
 
 StopReason = Literal["size", "condition-number", "all-samples", "pool"]
-
-
-@dataclass(frozen=True)
-class Subset:
-    """Samples of a regressor and how well they determine its parameters; fields as described at `Selection`.
-
-    The condition number is over as many singular values as the full set's rank; infinite when the subset has a smaller
-    rank.
-    """
-
-    criterion: str
-    indices: IntArray
-    condition_number: float
-    condition_number_full: float
-    rank: int
-    rank_full: int
-
-    @property
-    def full_rank(self) -> bool:
-        """Whether the chosen samples determine everything that all samples determine."""
-        return self.rank == self.rank_full
 
 
 @result

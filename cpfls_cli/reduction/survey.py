@@ -45,7 +45,6 @@ class Survey(Spectrum):
 
     chunks: Chunks
     samples: int
-    parameters: int
     basis: Array
     singular_values: Array
     rank_tolerance: float
@@ -78,7 +77,7 @@ def survey(chunks: Chunks, rank_tolerance: float) -> Survey:
     rank = int(np.count_nonzero(values > rank_tolerance * values[0]))
     if rank == 0:
         raise ComputationError("Q: every value is zero, so no sample is worth more than another")
-    return Survey(chunks, samples, triangle.shape[1], basis[:rank].T, values[:rank], rank_tolerance)
+    return Survey(chunks, samples, basis[:rank].T, values[:rank], rank_tolerance)
 
 
 def project(rows: Array, vectors: Array) -> Array:
@@ -150,7 +149,6 @@ class RowSpace(Spectrum):
 
     rows: Array
     singular_values: Array
-    parameters: int
     rank_tolerance: float
 
     @property
@@ -166,4 +164,4 @@ class RowSpace(Spectrum):
 
 def space_of(surveyed: Survey, rows: Array) -> RowSpace:
     """Place some or all samples, projected, in the row space of a surveyed regressor."""
-    return RowSpace(rows, surveyed.singular_values, surveyed.parameters, surveyed.rank_tolerance)
+    return RowSpace(rows, surveyed.singular_values, surveyed.rank_tolerance)

@@ -17,7 +17,7 @@ from cpfls_cli.reduction.criteria import (
     make_criterion,
 )
 from cpfls_cli.reduction.exchange import exchange_samples
-from cpfls_cli.reduction.selection import Selection, SelectionRun, StopReason, Subset
+from cpfls_cli.reduction.selection import Selection, SelectionRun, StopReason
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
 from cpfls_cli.reduction.survey import RowSpace, Survey, space_of
 from cpfls_cli.rounding import at_most
@@ -192,12 +192,11 @@ def _exchanged(
 ) -> Selection:
     """Exchange samples, then put those chosen in the D-optimal order, and stop there as for every criterion."""
     information = EXCHANGE_INFORMATION[settings.criterion]
-    exchanged = exchange_samples(space, start, limit, information, settings.condition_number)
-    chosen = replace(space, rows=space.rows[exchanged.indices])
+    indices, exchanges = exchange_samples(space, start, limit, information, settings.condition_number)
+    chosen = replace(space, rows=space.rows[indices])
     run = SelectionRun(chosen, make_criterion(chosen, "D"), starting_samples(chosen, "D", chosen.samples))
     selection = _one_by_one(run, chosen.samples, settings, progress)
-    indices = exchanged.indices[selection.indices]
-    return replace(selection, indices=indices, exchanges=exchanged.exchanges)
+    return replace(selection, indices=indices[selection.indices], exchanges=exchanges)
 
 
 def _one_by_one(run: SelectionRun, limit: int, settings: ReductionSettings, progress: Progress | None) -> Selection:
@@ -337,7 +336,9 @@ def pool_of(surveyed: Survey, wanted: IntArray) -> Pool:
     return Pool(wanted, space_of(surveyed, np.concatenate(blocks)))
 
 
-def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Generator) -> tuple[Subset, ...]:
+def random_streamed(
+    surveyed: Survey, size: int, count: int, rng: np.random.Generator
+) -> list[tuple[IntArray, TriangularFactor]]:
     """Choose samples at random, each with the same probability and none twice, several times over, in one pass.
 
     Parameters
@@ -345,7 +346,12 @@ def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Gene
     size : int
         Samples to choose.
     count : int
-        Subsets to choose, independently of each other.
+        Choices, independent of each other.
+
+    Returns
+    -------
+    list of (array of int, TriangularFactor)
+        Of each choice its samples, and the factor of their rows, which has its rank and condition number.
 
     Raises
     ------
@@ -354,42 +360,16 @@ def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Gene
     """
     if not 1 <= size <= surveyed.samples:
         raise ComputationError(f"size = {size}: expected 1 to {surveyed.samples}, the number of samples")
-    draws = [_Draw(rng.choice(surveyed.samples, size, replace=False), surveyed) for _ in range(count)]
-    first = 0
+    chosen = [rng.choice(surveyed.samples, size, replace=False) for _ in range(count)]
+    factors = [TriangularFactor(surveyed.rank, surveyed.rank_tolerance) for _ in chosen]
+    ascending, waiting, first = [np.sort(own) for own in chosen], [list[Array]() for _ in chosen], 0
     for rows in surveyed.projected():
-        for draw in draws:
-            draw.take(first, rows)
+        last = first + len(rows) == surveyed.samples
+        for own, factor, held in zip(ascending, factors, waiting, strict=True):
+            begin, end = np.searchsorted(own, [first, first + len(rows)])
+            held.append(rows[own[begin:end] - first])
+            if last or sum(map(len, held)) >= _WAITING_SAMPLES:
+                factor.add(np.concatenate(held).reshape(-1, surveyed.rank))
+                held.clear()
         first += len(rows)
-    return tuple(draw.subset() for draw in draws)
-
-
-class _Draw:
-    """One random choice, its rows taken from passing blocks."""
-
-    def __init__(self, indices: IntArray, surveyed: Survey) -> None:
-        self._indices, self._surveyed = indices, surveyed
-        self._ascending = np.sort(indices)
-        self._factor = TriangularFactor(surveyed.rank, surveyed.rank_tolerance)
-        self._waiting: list[Array] = []
-
-    def take(self, first: int, rows: Array) -> None:
-        begin, end = np.searchsorted(self._ascending, [first, first + len(rows)])
-        self._waiting.append(rows[self._ascending[begin:end] - first])
-        if sum(map(len, self._waiting)) >= _WAITING_SAMPLES:
-            self._add_waiting()
-
-    def _add_waiting(self) -> None:
-        self._factor.add(np.concatenate(self._waiting).reshape(-1, self._surveyed.rank))
-        self._waiting = []
-
-    def subset(self) -> Subset:
-        if self._waiting:
-            self._add_waiting()
-        return Subset(
-            criterion="random",
-            indices=self._indices,
-            condition_number=self._factor.condition_number,
-            condition_number_full=self._surveyed.condition_number,
-            rank=self._factor.rank,
-            rank_full=self._surveyed.rank,
-        )
+    return list(zip(chosen, factors, strict=True))

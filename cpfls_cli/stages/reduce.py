@@ -74,7 +74,7 @@ def reduce(run: Run, flights: TrainingArgument) -> Selection | None:
         found,
         indices=split.training_indices[found.indices],
         candidates=surveyed.samples,
-        random=np.array([draw.condition_number for draw in draws]),
+        random=np.array([factor.condition_number for _, factor in draws]),
     )
 
 
