@@ -31,9 +31,8 @@ from cpfls_cli.identification.data import TRAINING, TorqueSource, gathered
 from cpfls_cli.identification.identify import Identification, identify
 from cpfls_cli.identification.search import NothingFoundError, is_end
 from cpfls_cli.inertia import six_parameters
-from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.reduction.survey import Survey, survey
-from cpfls_cli.reduction.training_set import reduce_streamed
+from cpfls_cli.reduction.training_set import Selection, reduce_streamed
 from cpfls_cli.search import Checkpoint, Resumable, SearchOptions, StoppedSearch, Watch
 from cpfls_cli.store import Origin, read, write
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.consistency.axes import AXES
+from cpfls_cli.consistency.channels import AXES
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.consistency.motion import (
     ANOTHER_NORTH,

@@ -32,10 +32,9 @@ from cpfls_cli.identification.data import (
 )
 from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
 from cpfls_cli.playback.constants import find_constants
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
 from cpfls_cli.playback.instruments import InstrumentKind, Instruments, instruments, past_setpoints
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
-from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.parameters import INERTIA, PRODUCTS, blocks_of
 from cpfls_cli.regressor.regressor import RIGID, Motion
 from cpfls_cli.vehicle.rotors import rotor_demand

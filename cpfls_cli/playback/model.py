@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.consistency.audit import Audit
+from cpfls_cli.consistency.check import Audit
 from cpfls_cli.dynamics import InertiaFunctions, InertiaModel, body_inertia, momentum_form, positive_definite
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Columns, Effect
@@ -19,8 +19,8 @@ from cpfls_cli.effects.registry import CENTRE_OF_MASS, VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.flight import Body
 from cpfls_cli.playback.gusts import Gusts
-from cpfls_cli.playback.motion import Body
 from cpfls_cli.playback.remainder import Remainder, learned_wrench
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.windows import Flown, Rotors, Turned, Turning

@@ -11,10 +11,9 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
+from cpfls_cli.playback.flight import Body, LoggedFlight, MeasuredMotion, PlaybackFlight, State, playback_flight
 from cpfls_cli.playback.history import Observer, missed_before
 from cpfls_cli.playback.model import VehicleModel, wrench_along
-from cpfls_cli.playback.motion import Body, MeasuredMotion, State
 from cpfls_cli.playback.windows import MOST_RUNS, Flown, Steps, errors_of_runs, rotation_errors
 from cpfls_cli.playback.windows import Runs as FlownRuns
 

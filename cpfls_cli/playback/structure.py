@@ -18,15 +18,17 @@ from cpfls_cli.playback.fit import (
     Fitted,
     FittedNumbers,
     FitWindows,
+    Outlook,
     WindowSet,
+    block_errors,
     fit,
     fit_parts,
+    parts_of,
     stays_error,
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointNumbers
-from cpfls_cli.playback.judging import Outlook, block_errors, parts_of
 from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.playback.settings import PlaybackSettings

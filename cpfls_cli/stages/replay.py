@@ -18,11 +18,10 @@ from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.playback import ERRORS, WORDS, draw_errors, errors_height
 from cpfls_cli.pages.trust import seen_warnings
-from cpfls_cli.playback.along_flights import Playback, playback
 from cpfls_cli.playback.errors import NOTHING_MOVES, STATED
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.history import Observer, past_of
-from cpfls_cli.playback.replay import Played, ReplayOptions, ReplayWindows
+from cpfls_cli.playback.replay import Playback, Played, ReplayOptions, ReplayWindows, playback
 from cpfls_cli.playback.replay import replay as played_back
 from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.report.canvas import HELD, Drawn, legend_over, line, plain_ticks, stacked, style_of
