@@ -145,7 +145,7 @@ def _by_instruments(
     rigid_body, half = _solved(crossed)
     if not _known_to_two(half)[2]:
         # What is hardly known would shake what is: about yaw the body stays as least squares has it.
-        runs = [run.without_yaw() for run in runs]
+        runs = [run._replace(others=run.others * [[1.0], [1.0], [0.0]]) for run in runs]
         rigid_body, beside = _solved(_crossed(runs, repeated=repeated), least_squares)
         half = np.array([*beside[:2], half[2]])
     if why_unphysical(rigid_body) is not None:
@@ -247,10 +247,6 @@ class _Run(NamedTuple):
     own: Array
     others: Array
     block: IntArray
-
-    def without_yaw(self) -> _Run:
-        """Leave out what is known about yaw."""
-        return self._replace(others=self.others * [[1.0], [1.0], [0.0]])
 
 
 def _freed(runs: Sequence[_Run], rigid_body: Array) -> Array:

@@ -88,11 +88,6 @@ class ModelEffect(NamedTuple):
         assert columns is not None, "what only an audit sees is in no model"
         return columns(signals, self.shape).at_samples(self.linear, signals.time)
 
-    @property
-    def is_simulated(self) -> bool:
-        """Whether it follows from what free runs know."""
-        return self.effect.follows_state and not self.is_filter
-
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that it needs and a flight lacks; a filter may lack the command: it leaves speeds alone."""
         return tuple(each for each in self.effect.missing(signals) if not (self.is_filter and each == "command"))
@@ -165,7 +160,7 @@ class VehicleModel:
     @property
     def along(self) -> tuple[ModelEffect, ...]:
         """Effects that are evaluated along a measured motion."""
-        return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.is_simulated))
+        return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.effect.follows_state))
 
     @property
     def filters(self) -> tuple[ModelEffect, ...]:

@@ -172,7 +172,9 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
                 f"of {tried} vehicles drawn only {len(kept)} are possible; of {often} no vehicle has {first}"
             )
     made = [each for _, each in kept]
-    heavier = _heavier(model, made)
+    # What is seen of gusts is acceleration, so that their torque goes with the inertia.
+    axes = [symmetric(each.vehicle.inertia_kg_m2).diagonal() for each in (model, *made)]
+    heavier = np.array([np.append(own / axes[0], np.ones(3)) for own in axes[1:]])
     gusts = _gusts_drawn(known.gusts, model, heavier, rng)
     return Spread(
         tuple(number.name for number in numbers),
@@ -224,10 +226,12 @@ def _numbers_drawn(
     shares = normal / np.sqrt(rng.chisquare(freedom, (count, 1)) / freedom) / unit
     least, most = np.log(known.loop)
     loop = np.exp(rng.uniform(least, most, (count, 3)))
-    widened = _of_loop(known.loop)
+    # By which the loop has widened intervals; see `beside_loop`.
+    widened = dict(zip(MOMENTS, known.loop.T.tolist(), strict=True))
+    widened[DRAG] = [1.0 / widened[MOMENTS[2]][1], 1.0 / widened[MOMENTS[2]][0]]
     values = np.empty_like(shares)
     for place, number in enumerate(numbers):
-        below, above = widened.get(number.name, (1.0, 1.0))
+        below, above = widened.get(number.name, [1.0, 1.0])
         low, value, high = number.low / below, number.value, number.high / above
         if number.name in POSITIVE:
             low, value, high = np.log(np.clip([low, value, high], 1e-30, 1e30))
@@ -236,13 +240,6 @@ def _numbers_drawn(
         values[:, place] = np.exp(moved) if number.name in POSITIVE else moved
     _misled(numbers, values, loop)
     return values
-
-
-def _of_loop(loop: Array) -> dict[str, tuple[float, float]]:
-    """Give the factors by which the loop has widened intervals; see `beside_loop`."""
-    low, high = loop
-    found = {name: (float(low[axis]), float(high[axis])) for axis, name in enumerate(MOMENTS)}
-    return found | {DRAG: (1.0 / float(high[2]), 1.0 / float(low[2]))}
 
 
 def _misled(numbers: Sequence[FoundNumber], values: Array, loop: Array) -> None:
@@ -267,15 +264,12 @@ def _impossible(model: VehicleModel, numbers: Sequence[FoundNumber], row: Array)
         return "a principal moment of inertia that is not above 0"
     if largest > (smallest + middle) * (1.0 + _EDGE):
         return "a principal moment of inertia above the sum of the others"
-    of_none = [each.name for each in bodily(model.vehicle, _at(numbers, row)) if not each.possible]
+    drawn = [number._replace(value=values[number.name]) for number in numbers]
+    of_none = [each.name for each in bodily(model.vehicle, drawn) if not each.possible]
     if of_none:
         return f"such a {of_none[0]}"
     beyond = next(broken_limits(figures_of_vehicle(model_at(model, numbers, row).vehicle)), None)
     return "" if beyond is None else f"such a {beyond.what}"
-
-
-def _at(numbers: Sequence[FoundNumber], row: Array) -> list[FoundNumber]:
-    return [number._replace(value=value) for number, value in zip(numbers, row.tolist(), strict=True)]
 
 
 def _inertia(model: VehicleModel, values: Mapping[str, float]) -> Array:
@@ -335,15 +329,6 @@ def _remainder_at(remainder: Remainder, values: Mapping[str, float]) -> Remainde
             name = f"{block}.{row}_{column}_{power}"
             coefficients[place, column, power] = values.get(name, coefficients[place, column, power])
     return replace(remainder, coefficients=coefficients)
-
-
-def _heavier(model: VehicleModel, models: Sequence[VehicleModel]) -> Array:
-    """Divide moments of inertia and masses of vehicles by those of the estimate, shape (vehicle, 6).
-
-    What is seen of gusts is acceleration, so that their torque goes with the inertia.
-    """
-    axes = [symmetric(each.vehicle.inertia_kg_m2).diagonal() for each in (model, *models)]
-    return np.array([np.append(own / axes[0], np.ones(3)) for own in axes[1:]])
 
 
 def _gusts_drawn(

@@ -173,16 +173,9 @@ class Choice:
         """The baselines, then the front."""
         baselines = [(name, found) for name in BASELINES if (found := getattr(self, name)) is not None]
         return tuple(
-            TriedStructure(
-                name,
-                each.structure.blocks,
-                each.error,
-                each.worse_than(self.best)[0],
-                each.worse_than(self.best)[1],
-                each.numbers,
-                each.condition_number,
-            )
-            for name, each in [*baselines, *(("front", each) for each in self.front)]
+            TriedStructure(name, own.structure.blocks, own.error, worse, uncertain, own.numbers, own.condition_number)
+            for name, own in [*baselines, *(("front", own) for own in self.front)]
+            for worse, uncertain in [own.worse_than(self.best)]
         )
 
 

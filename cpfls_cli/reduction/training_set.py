@@ -115,17 +115,14 @@ class SelectionRun:
 
     def step(self) -> None:
         """Choose one more sample."""
-        index = self._next_sample()
+        taken = len(self.indices)
+        at_start = taken < len(self._start)
+        index = int(self._start[taken]) if at_start else self._criterion.next_sample(self.factor, self._available)
         self._available[index] = False
         self.indices.append(index)
         self.factor.add(self._space.rows[index])
         factor = self.factor
         self._trace.append((factor.condition_number, factor.singular_value_min, factor.singular_value_max, factor.rank))
-
-    def _next_sample(self) -> int:
-        if len(self.indices) < len(self._start):
-            return int(self._start[len(self.indices)])
-        return self._criterion.next_sample(self.factor, self._available)
 
     def selection(self, criterion: str, reason: StopReason) -> Selection:
         """Return the result under a criterion's name, with what ended the selection."""
