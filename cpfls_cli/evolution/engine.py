@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -303,27 +302,6 @@ def stalled(history: History, generations: int | None, improvement: float) -> bo
         return False
     size = np.abs(before[known])
     return bool(np.all(at_most(before[known] - now[known], improvement * size, size)))
-
-
-def evolve(
-    evaluate: Evaluate,
-    gene_count: int,
-    settings: EvolutionSettings,
-    rng: np.random.Generator,
-    initial: IntArray | None = None,
-) -> Iterator[Generation]:
-    """Search for non-dominated chromosomes, one generation at a time.
-
-    `evaluate` takes chromosomes, shape (n, genes), 16 bits each, never seen before, and returns their `Evaluation`. It
-    may rewrite them (Lamarckian local search); the rewritten genes take their place. `initial`: chromosomes to start
-    with; the rest of the initial population, which comes first, is random. `ComputationError` where they, or the
-    evaluator's result, do not fit. Paper, section 9; method.md section 7.
-    """
-    state = start(evaluate, gene_count, settings, rng, initial)
-    yield state.report()
-    while ended(state, settings) is None:
-        state = step(state, evaluate, settings)
-        yield state.report()
 
 
 def start(

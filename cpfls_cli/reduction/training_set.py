@@ -81,27 +81,6 @@ class Selection:
         """Condition number of random selections of equal size, the median; NaN where none was drawn."""
         return float(np.median(self.random)) if self.random is not None and len(self.random) else float("nan")
 
-    def beginning(self, size: int) -> Selection | None:
-        """Give what a smaller size would have chosen, or None where this selection did not begin with it.
-
-        Samples that are chosen one by one do not depend on what comes after them. Exchanges and every n-th sample know
-        the size from the start, and some criteria refuse a size below the full rank.
-        """
-        one_by_one = self.criterion not in {*EXCHANGE_INFORMATION, "even"}
-        if not one_by_one or size > len(self.indices) or self.rank_trace[size - 1] < self.rank_full:
-            return None
-        return replace(
-            self,
-            indices=self.indices[:size],
-            condition_number=float(self.condition_number_trace[size - 1]),
-            rank=self.rank_full,
-            condition_number_trace=self.condition_number_trace[:size],
-            singular_value_min_trace=self.singular_value_min_trace[:size],
-            singular_value_max_trace=self.singular_value_max_trace[:size],
-            rank_trace=self.rank_trace[:size],
-            stop_reason="size" if size < len(self.indices) else self.stop_reason,
-        )
-
 
 class SelectionRun:
     """Samples chosen so far, from those before the criterion is asked on, their factor and the trace."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
+from cpfls_cli.autopilots.motors import fitting_yaw
 from cpfls_cli.dynamics import turning_law
 from cpfls_cli.effects.hooks import Actuation
 from cpfls_cli.effects.scales import hover_speed
@@ -134,8 +135,6 @@ class Plant:
         return self.derivative(state, speed, np.zeros_like(speed), speed**2, push)
 
 
-# Of a squared speed, in parts of the largest.
-_ROUNDING = 1e-12
 # Share of the full battery: what a load takes beyond it would turn rotors backwards.
 _LOWEST_VOLTAGE = 0.05
 
@@ -150,21 +149,14 @@ class Mixer:
     inverse: Array
     limit: float
 
-    def mixed(self, wrench: Vector, functions: Functions = SYMBOLS) -> tuple[Value, Value]:
+    def mixed(self, wrench: Vector) -> tuple[Value, Value]:
         """Find speeds that are possible for thrust and torque (N, N m), rad/s, and squared speeds that they ask for."""
         by_rotor = transposed(self.inverse.tolist())
-        upright = functions.rotors(dot(wrench[:3], own[:3]) for own in by_rotor)
-        yaw = functions.rotors(times(wrench[3], own[3]) for own in by_rotor)
-        share: Value = 1.0
-        # What yaw does not change by more than rounding sets no limit.
-        least = _ROUNDING * self.limit
-        for straight, turning in zip(upright, yaw, strict=True):
-            size = functions.absolute(turning)
-            room = functions.where(turning > 0.0, self.limit - straight, straight) / functions.largest(size, least)
-            share = functions.where(size > least, functions.smallest(room, share), share)
-        share = functions.largest(share, 0.0)
-        squared = functions.smallest(functions.largest(upright + share * yaw, 0.0), self.limit)
-        return functions.sqrt(squared), upright + yaw
+        upright = SYMBOLS.rotors(dot(wrench[:3], own[:3]) for own in by_rotor)
+        yaw = SYMBOLS.rotors(times(wrench[3], own[3]) for own in by_rotor)
+        possible = upright + fitting_yaw(upright, yaw, self.limit) * yaw
+        squared = SYMBOLS.smallest(SYMBOLS.largest(possible, 0.0), self.limit)
+        return SYMBOLS.sqrt(squared), upright + yaw
 
 
 def mixer(vehicle: VehicleSettings) -> Mixer:

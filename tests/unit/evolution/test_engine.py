@@ -10,7 +10,7 @@ from scipy.stats import rankdata
 
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.archive import Archive, Evaluation, positions, rank
-from cpfls_cli.evolution.engine import History, ended, evolve, stalled, start, step
+from cpfls_cli.evolution.engine import History, ended, stalled, start, step
 from cpfls_cli.evolution.settings import EvolutionSettings
 
 # The operators of the paper, after the Sheffield toolbox.
@@ -60,6 +60,15 @@ class Recorder:
     def __call__(self, genes):
         self.seen.extend(map(tuple, genes.tolist()))
         return self.evaluate(genes)
+
+
+def evolve(evaluate, gene_count, settings, rng, initial=None):
+    """Search from the start to the end, one generation at a time."""
+    state = start(evaluate, gene_count, settings, rng, initial)
+    yield state.report()
+    while ended(state, settings) is None:
+        state = step(state, evaluate, settings)
+        yield state.report()
 
 
 def run(evaluate, seed=1, settings=SETTINGS, gene_count=6, **options):

@@ -14,7 +14,7 @@ from cpfls_cli.reduction.training_set import (
     random_streamed,
     reduce_streamed,
 )
-from tests.builders.reductions import random_selections, reduce, row_space
+from tests.builders.reductions import beginning, random_selections, reduce, row_space
 
 
 def regressor(samples=3000, columns=7, seed=0):
@@ -58,19 +58,19 @@ def test_a_smaller_size_is_the_beginning_of_a_larger_one(criterion, pool):
         ReductionSettings(criterion=criterion, size=30, pool=pool),
     )
     larger = reduce_streamed(surveyed, settings, generator())
-    smaller, beginning = reduce_streamed(surveyed, replace(settings, size=12), generator()), larger.beginning(12)
-    assert beginning is not None
+    smaller, begun = reduce_streamed(surveyed, replace(settings, size=12), generator()), beginning(larger, 12)
+    assert begun is not None
     for field in fields(smaller):
-        assert np.array_equal(getattr(beginning, field.name), getattr(smaller, field.name)), field.name
-    assert larger.beginning(31) is None
-    assert larger.beginning(2) is None
+        assert np.array_equal(getattr(begun, field.name), getattr(smaller, field.name)), field.name
+    assert beginning(larger, 31) is None
+    assert beginning(larger, 2) is None
 
 
 @pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "even"])
 def test_what_knows_its_size_from_the_start_has_no_beginning(criterion):
     settings = ReductionSettings(criterion=criterion, size=30)
     selection = reduce_streamed(survey(chunked(regressor(), 700), 1e-10), settings, generator())
-    assert selection.beginning(12) is None
+    assert beginning(selection, 12) is None
 
 
 @pytest.mark.parametrize("size", [100, 999, 3000])
