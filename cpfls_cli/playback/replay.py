@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,7 +27,6 @@ from cpfls_cli.playback.errors import (
 )
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, contradictions_of
 from cpfls_cli.playback.player import Player, Runs, free_runs, still_runs
-from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.result import about, part, result
 
 SIGNALS = ("position", "velocity", "attitude", "body_rate")
@@ -41,28 +40,6 @@ _FADING = (1e2, 1e-1, 2000)
 
 _HORIZONS = 2
 """Length of a block at least, in horizons."""
-
-
-@dataclass(frozen=True)
-class ReplayOptions:
-    """How flights are played back.
-
-    Attributes
-    ----------
-    horizon_s : float
-        Longest horizon, s.
-    every : int
-        Samples from one begin to the next.
-    hold : {"linear", "previous"} or None
-        What a speed is between samples; None for what is usual.
-    history_s : float
-        How much of the flight before a start its prediction uses, s.
-    """
-
-    horizon_s: float = 0.5
-    every: int = 1
-    hold: Hold | None = None
-    history_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -507,14 +484,13 @@ class Playback(ByHorizon):
 
 
 def playback(
-    name: str,
-    asked: ReplayOptions,
+    asked: Mapping[str, Any],
     flights: Sequence[LoggedFlight],
     played: Sequence[Played],
     found: Replay,
     warnings: Sequence[str],
 ) -> Playback:
-    """Put a replay together with the runs that are worth a look."""
+    """Put a replay together with what was asked for, by the result's fields, and the runs that are worth a look."""
     windows, period = found.windows, float(found.horizon_s[0])
     after = windows.diverged[PREDICTIONS.index(MODEL)]
     counts = np.bincount(windows.flight, minlength=len(flights)).tolist()
@@ -522,11 +498,7 @@ def playback(
     return Playback(
         horizon_s=found.horizon_s,
         models=found.models,
-        played=name,
-        asked_s=asked.horizon_s,
-        every=asked.every,
-        hold=asked.hold or USUAL,
-        history_s=asked.history_s,
+        **asked,
         fading_s=played[0].fading_s,
         flights=tuple(
             PlayedFlight(
