@@ -11,32 +11,13 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics import body_torque, inertia_tensor
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.simulation.measured import noisy
+from cpfls_cli.simulation.measured import SimulatedFlight, noisy
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.trajectory.excited import AddedMotion
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.trajectory.settings import TrajectorySettings
 from cpfls_cli.vehicle.rotors import RotorViolation, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-
-@dataclass(frozen=True)
-class SimulatedFlight:
-    """A flight of the exact vehicle, with noise where asked.
-
-    Attributes
-    ----------
-    signals : mapping of str to array
-        By the names of the flight artifact; time is the first axis.
-    violations : tuple of RotorViolation
-        What no rotor can do; `rotor_speed` is NaN there.
-    noise_std : mapping of str to array
-        Standard deviation of the noise added to each channel, by signal.
-    """
-
-    signals: Mapping[str, Array]
-    violations: tuple[RotorViolation, ...]
-    noise_std: Mapping[str, Array]
 
 
 def simulate(
@@ -71,7 +52,7 @@ def simulate(
     signals, noise_std = noisy(exact, settings, rng)
     signals["torque"], signals["body_torque"] = _torques(signals, frozenset(noise_std))
     signals["body_rate"] = rotations.body_rate(signals["attitude"], signals["attitude_rate"])
-    return SimulatedFlight(signals, demand.violations, noise_std)
+    return SimulatedFlight(signals, noise_std, demand.violations)
 
 
 @dataclass(frozen=True)
