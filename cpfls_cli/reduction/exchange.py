@@ -119,7 +119,10 @@ class _Design:
     @cached_property
     def _decomposition(self) -> tuple[Array, Array]:
         if self._precise:
-            return _precise_spectrum(self._space.rows[self.chosen])
+            rows = self._space.rows[self.chosen].reshape(-1, self._space.rank)
+            triangle = scipy.linalg.qr(rows, mode="r", check_finite=False)[0][: self._space.rank]
+            _, values, basis = scipy.linalg.svd(triangle, check_finite=False)
+            return np.asarray(values[::-1] ** 2), np.asarray(basis[::-1].T)
         values, vectors = scipy.linalg.eigh(self._gram, driver="evd", check_finite=False)
         return values, vectors
 
@@ -158,12 +161,6 @@ class _Design:
 def _gram(rows: Array) -> Array:
     flat = rows.reshape(-1, rows.shape[2])
     return np.asarray(flat.T @ flat)
-
-
-def _precise_spectrum(rows: Array) -> tuple[Array, Array]:
-    triangle = scipy.linalg.qr(rows.reshape(-1, rows.shape[2]), mode="r", check_finite=False)[0][: rows.shape[2]]
-    _, values, basis = scipy.linalg.svd(triangle, check_finite=False)
-    return np.asarray(values[::-1] ** 2), np.asarray(basis[::-1].T)
 
 
 def _exchange(design: _Design, information: float) -> tuple[_Design, int]:

@@ -120,7 +120,10 @@ def _checked(chunks: Iterable[Array]) -> Iterator[Array]:
     samples, broken = 0, np.zeros(0, dtype=np.int64)
     columns: int | None = None
     for chunk in chunks:
-        columns = _require_shape(chunk, columns)
+        if chunk.ndim != 3 or chunk.shape[1] != 3 or 0 in chunk.shape or chunk.shape[2] != (columns or chunk.shape[2]):
+            expected = "parameters" if columns is None else columns
+            raise ComputationError(f"Q: expected shape (samples, 3, {expected}), got {chunk.shape}")
+        columns = chunk.shape[2]
         bad = np.flatnonzero(~np.isfinite(chunk).all(axis=(1, 2)))
         broken = np.concatenate([broken, samples + bad])
         samples += len(chunk)
@@ -131,13 +134,6 @@ def _checked(chunks: Iterable[Array]) -> Iterator[Array]:
             f"Q: sample {broken[0]} is not finite ({broken.size} of {samples} samples in all); "
             "remove such samples before the reduction"
         )
-
-
-def _require_shape(chunk: Array, columns: int | None) -> int:
-    expected = "parameters" if columns is None else columns
-    if chunk.ndim != 3 or chunk.shape[1] != 3 or 0 in chunk.shape or chunk.shape[2] != (columns or chunk.shape[2]):
-        raise ComputationError(f"Q: expected shape (samples, 3, {expected}), got {chunk.shape}")
-    return int(chunk.shape[2])
 
 
 @dataclass(frozen=True)
