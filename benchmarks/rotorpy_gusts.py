@@ -20,10 +20,9 @@ from scipy.spatial.transform import Rotation
 from benchmarks.shared.gusty_sets import KINDS, MOMENTS, PATHS, REPEATED, RUNS, cells_of_moments
 from benchmarks.shared.measure import program, progress, table
 from cpfls_cli.arrays import Array
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
 from cpfls_cli.playback.loop import loop_bounds
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gusty_flights import SMALL, Flight, path_of
 from tests.builders.gusty_flights import STEP_S as PATH_STEP_S

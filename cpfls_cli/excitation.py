@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import count, product
 
 import numpy as np
 
@@ -345,7 +345,13 @@ def optimised_rotation(
     """
     structure, limits = model_structure(structure_settings), RotationLimits(settings, vehicle.inertia_kg_m2)
     samples = max(_SAMPLES, _SAMPLES_PER_PARAMETER * structure.parameters, round(_SAMPLES_PER_SECOND * duration))
-    report = _Report(progress, settings.starts + settings.iterations)
+    done, total = count(1), settings.starts + settings.iterations
+
+    def report(reached: float) -> float:
+        if progress is not None:
+            progress(next(done), total, f"condition number {reached:.3g}")
+        return reached
+
     paths = [full_rotation(settings, duration, rng, vehicle.inertia_kg_m2) for _ in range(settings.starts)]
     random = [report(condition_number(path, structure, samples)) for path in paths]
     path = best = paths[int(np.argmin(levelled(np.array(random))))]
@@ -359,19 +365,6 @@ def optimised_rotation(
     if not at_most(reached, before):
         reached, path = before, best
     return Excitation(path, reached, np.array(random), np.array(objective.history))
-
-
-class _Report:
-    """Count evaluations, and report the condition number that each reached."""
-
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress, self._total, self._done = progress, total, 0
-
-    def __call__(self, condition_number: float) -> float:
-        self._done += 1
-        if self._progress is not None:
-            self._progress(self._done, self._total, f"condition number {condition_number:.3g}")
-        return condition_number
 
 
 def adam(gradient: Callable[[Array], Array], start: Array, iterations: int, step: float) -> Iterator[Array]:

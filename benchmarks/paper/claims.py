@@ -24,7 +24,7 @@ from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.identification.data import TRAINING
 from cpfls_cli.identification.identify import MODEL
-from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.reduction.training_set import Selection
 from cpfls_cli.report.content import UNKNOWN, change, number, percent
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.words import joined

@@ -31,11 +31,11 @@ from cpfls_cli.identification.data import TRAINING, TorqueSource, gathered
 from cpfls_cli.identification.identify import Identification, identify
 from cpfls_cli.identification.search import NothingFoundError, is_end
 from cpfls_cli.inertia import six_parameters
-from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.reduction.survey import Survey, survey
-from cpfls_cli.reduction.training_set import reduce_streamed
+from cpfls_cli.reduction.training_set import Selection, reduce_streamed
 from cpfls_cli.search import Checkpoint, Resumable, StoppedSearch, Watch
 from cpfls_cli.store import Origin, read, write
+from tests.builders.reductions import beginning
 
 
 class Compared(StrEnum):
@@ -144,7 +144,7 @@ class Samples:
         """Choose samples; a smaller size is the beginning of a larger one: Table 5 takes three of one rule."""
         settings = study.reduction
         known = self._selections.get((key, settings.criterion))
-        selection = known.beginning(settings.size) if known and settings.size else None
+        selection = beginning(known, settings.size) if known and settings.size else None
         if selection is None:
             print(f"choosing {settings.size} samples by {settings.criterion}", file=sys.stderr)
             selection = reduce_streamed(self._surveys[key], settings, generator(study, "reduce"), lambda *_: None)

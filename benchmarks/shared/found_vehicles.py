@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from time import perf_counter
 
 from cpfls_cli.config.load import validate
-from cpfls_cli.playback.fit import fit
+from cpfls_cli.playback.fit import fit, parts_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.history_fit import fit_observer
-from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import INERTIA
 from cpfls_cli.playback.settings import PlaybackSettings

@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.motion import MeasuredMotion
+from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 
 PERIOD, STEP = 0.0025, 4

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
-from cpfls_cli.consistency.audit import Audit
+from cpfls_cli.consistency.check import Audit
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, LeftOut, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import Comparison

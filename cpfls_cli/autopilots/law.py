@@ -101,17 +101,6 @@ class AxisLaw:
     output: tuple[Filter, ...] = ()
     slope_of_error: bool = False
 
-    def rate_response(self, frequency: Array, period: float, *, integrates_first: bool = True) -> RateResponse:
-        """Evaluate the rate control at frequencies, shape (frequency,), Hz, below half the rate of the loop."""
-        back = np.exp(-2j * np.pi * frequency * period)
-        measured, target, error, slope, output = (chain(getattr(self, stage), back, period) for stage in STAGES)
-        integral = self.i * period * (1.0 if integrates_first else back) / (1 - back)
-        of_error = error * (self.p + integral)
-        difference = self.d * slope * (1 - back) / period
-        forward = of_error + self.ff + (error * difference if self.slope_of_error else 0.0)
-        feedback = of_error + (error if self.slope_of_error else 1.0) * difference
-        return RateResponse(output * measured * feedback, output * target * forward)
-
     def angle_response(self, frequency: Array, period: float) -> Numbers:
         """Evaluate asked rate by error of the angle, shape (frequency,), 1/s."""
         back = np.exp(-2j * np.pi * frequency * period)
@@ -162,8 +151,15 @@ class Law:
         return 1.0 / self.rate_hz
 
     def response(self, axis: int, frequency: Array) -> RateResponse:
-        """Evaluate the rate control about an axis, shape (frequency,), Hz."""
-        return self.axes[axis].rate_response(frequency, self.period, integrates_first=self.integrates_first)
+        """Evaluate the rate control about an axis at frequencies, shape (frequency,), Hz, below half the rate."""
+        own, period, back = self.axes[axis], self.period, np.exp(-2j * np.pi * frequency * self.period)
+        measured, target, error, slope, output = (chain(getattr(own, stage), back, period) for stage in STAGES)
+        integral = own.i * period * (1.0 if self.integrates_first else back) / (1 - back)
+        of_error = error * (own.p + integral)
+        difference = own.d * slope * (1 - back) / period
+        forward = of_error + own.ff + (error * difference if own.slope_of_error else 0.0)
+        feedback = of_error + (error if own.slope_of_error else 1.0) * difference
+        return RateResponse(output * measured * feedback, output * target * forward)
 
 
 class Controller:
@@ -179,9 +175,12 @@ class Controller:
     def __init__(self, law: Law, period: float | None = None) -> None:
         step = law.period if period is None else period
         self._asking = Machine.of(lambda memory, given: _asked_rate(law, memory, given[:3], given[3:]), 6, step)
-        self._commanding = Machine.of(
-            lambda memory, given: _command(law, memory, given[:3], given[3:6], given[6:]), 9, step
-        )
+
+        def command(memory: Memory, given: Vector) -> Vector:
+            axes = zip(law.axes, given[:3], given[3:6], given[6:], strict=True)
+            return tuple(_axis_command(law, axis, memory, *own) for axis, *own in axes)
+
+        self._commanding = Machine.of(command, 9, step)
 
     def asked_rate(self, error: Iterable[float], body_rate: Iterable[float]) -> Flat:
         """Turn the error of the attitude into a rate, rad/s, body frame.
@@ -226,11 +225,6 @@ def _asked_rate(law: Law, memory: Memory, error: Vector, body_rate: Vector) -> V
         for axis, off, integral, rate in zip(law.axes, error, grown, body_rate, strict=True)
     )
     return tuple(_within(rate, axis.rate_limit) for axis, rate in zip(law.axes, rates, strict=True))
-
-
-def _command(law: Law, memory: Memory, asked: Vector, gyroscope: Vector, saturated: Vector) -> Vector:
-    axes = zip(law.axes, asked, gyroscope, saturated, strict=True)
-    return tuple(_axis_command(law, axis, memory, *given) for axis, *given in axes)
 
 
 def _axis_command(law: Law, axis: AxisLaw, memory: Memory, asked: Value, gyroscope: Value, saturated: Value) -> Value:

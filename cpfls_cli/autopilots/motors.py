@@ -27,7 +27,7 @@ _CHANGE = 1e-4
 _HALVES = 40
 """Times that the range is halved to invert a thrust curve that only grows."""
 _LEAST_YAW = 1e-12
-"""Share of the thrust of a rotor, up to which yaw does not need it."""
+"""Share of the most that a rotor gives, up to which yaw does not need it: rounding."""
 _SHARES, _TRIED = np.linspace(0.0, 1.0, 101), 1e-3
 """Shares of the full thrust along which a curve is to make thrust straight, and the step in which it is looked for."""
 
@@ -176,6 +176,16 @@ class Mixed(NamedTuple):
     saturated: BoolArray
 
 
+def fitting_yaw(upright: Value, yaw: Value, limit: float) -> Value:
+    """Give the part of a yaw command that fits, by rotor, between 0 and a limit beside all else; symbols."""
+    functions, least, share = SYMBOLS, _LEAST_YAW * limit, 1.0
+    for straight, turned in zip(upright, yaw, strict=True):
+        size = functions.absolute(turned)
+        room = functions.where(turned > 0.0, limit - straight, straight) / functions.largest(size, least)
+        share = functions.where(size > least, functions.smallest(room, share), share)
+    return functions.largest(share, 0.0)
+
+
 @dataclass(frozen=True)
 class Motors:
     """Mixer and motors of a vehicle.
@@ -214,13 +224,7 @@ class Motors:
         lift, roll, pitch, yawing = (functions.rotors(column) for column in self.mix.T.tolist())
         upright = lift * _clipped(thrust, functions) + roll * turning[0] + pitch * turning[1]
         yaw = yawing * turning[2]
-        share: Value = 1.0
-        # The part of the yaw command that fits between 0 and 1.
-        for straight, turned in zip(upright, yaw, strict=True):
-            size = functions.absolute(turned)
-            room = functions.where(turned > 0.0, 1.0 - straight, straight) / functions.largest(size, _LEAST_YAW)
-            share = functions.where(size > _LEAST_YAW, functions.smallest(room, share), share)
-        share = functions.largest(share, 0.0)
+        share = fitting_yaw(upright, yaw, 1.0)
         shares = upright + share * yaw
         largest, smallest = (reduce(choose, shares) for choose in (functions.largest, functions.smallest))
         # Where one end is exceeded the whole moves; where both are, roll and pitch are cut.

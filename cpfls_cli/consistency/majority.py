@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.consistency.axes import AXES
+from cpfls_cli.consistency.channels import AXES
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.consistency.motion import (
     ANOTHER_NORTH,
@@ -176,7 +176,7 @@ def _mended(now: _Compared) -> tuple[tuple[ChannelRepair, ...], tuple[Finding, .
         read = _read_rightly(now, channel)
         opposed = () if read is None else _opposed(now, read[0])
         if read is not None and opposed:
-            dropped.append(_contradicted(now, *read, witnesses, opposed))
+            dropped.append(_verdict(now, *read, witnesses, opposed))
         elif read is not None and (sure or read[0].is_mistake):
             return _outvoted(now, *read, witnesses), ()
         elif read is not None and _changed_to_thrust(now, read[0], lambda before, after: _surely_less(after, before)):
@@ -382,43 +382,31 @@ def _with_delay(repair: ChannelRepair, check: PairCheck) -> _Read:
     return (replace(repair, delay_s=repair.delay_s + late) if check.pair.exact else repair), ()
 
 
-def _clock_words(now: _Compared, repair: ChannelRepair) -> list[str]:
-    half_s = _clearest(now.checked(repair)).delay.half
-    return [f"is {off_clock(repair.delay_s, half_s)}"] if repair.delay_s else []
+def _verdict(
+    now: _Compared, repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str], opposed: Sequence[str] = ()
+) -> Finding:
+    """Say what is wrong with a channel, and who opposes that it is set right."""
+    channel, half_s = CHANNELS[repair.channel], _clearest(now.checked(repair)).delay.half
+    clock = [f"is {off_clock(repair.delay_s, half_s)}"] if repair.delay_s else []
+    with_others = not opposed and len(now.with_position(repair)) > 1
+    who = "the world of velocity and position" if with_others else f"the {channel.words}"
+    found, remedy = f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}", f"check {channel.keys}"
+    if opposed:
+        verb = "contradicts" if len(opposed) == 1 else "contradict"
+        found += f", which the {joined(opposed)} {verb}, so nothing is corrected"
+    elif repair.channel == "acceleration" and repair.gravity_m_s2 and not repair.in_body:
+        remedy = "correct the log, or leave import.signals.acceleration out, since the import takes no gravity from it"
+    else:
+        remedy = f"correct the log, or {channel.keys}"
+    grave, held = bool(what) and _grave(repair.channel, now.checks), (channel.words, *witnesses, *opposed)
+    return Finding(found, remedy, held, contradiction=grave, repairable=not opposed)
 
 
 def _outvoted(
     now: _Compared, repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str]
 ) -> tuple[ChannelRepair, ...]:
-    channel = CHANNELS[repair.channel]
     first, *others = now.with_position(repair)
-    clock = _clock_words(now, repair)
-    who = "the world of velocity and position" if others else f"the {channel.words}"
-    finding = Finding(
-        f"{who} {joined([*what, *clock])}, judged by the {joined(witnesses)}",
-        "correct the log, or leave import.signals.acceleration out, since the import takes no gravity from it"
-        if repair.channel == "acceleration" and repair.gravity_m_s2 and not repair.in_body
-        else f"correct the log, or {channel.keys}",
-        (channel.words, *witnesses),
-        contradiction=bool(what) and _grave(repair.channel, now.checks),
-        repairable=True,
-    )
-    return (first.with_finding(finding, _DONE), *others)
-
-
-def _contradicted(
-    now: _Compared, repair: ChannelRepair, what: Sequence[str], witnesses: Sequence[str], opposed: Sequence[str]
-) -> Finding:
-    channel = CHANNELS[repair.channel]
-    clock = _clock_words(now, repair)
-    verb = "contradicts" if len(opposed) == 1 else "contradict"
-    return Finding(
-        f"the {channel.words} {joined([*what, *clock])}, judged by the {joined(witnesses)}, which the "
-        f"{joined(opposed)} {verb}, so nothing is corrected",
-        f"check {channel.keys}",
-        (channel.words, *witnesses, *opposed),
-        contradiction=bool(what) and _grave(repair.channel, now.checks),
-    )
+    return (first.with_finding(_verdict(now, repair, what, witnesses), _DONE), *others)
 
 
 def _grave(channel: str, checks: Sequence[PairCheck]) -> bool:

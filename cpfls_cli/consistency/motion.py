@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import BLOCK_S, half_width, jackknife_error
-from cpfls_cli.consistency.axes import AXES, SAME, TWICE, axes_apart
+from cpfls_cli.consistency.channels import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import Ground, first_derivative, fit_lean, second_derivative

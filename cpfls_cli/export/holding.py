@@ -16,9 +16,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.numbers import Numbers, motion_terms, spins, weights_of, weights_of_model
 from cpfls_cli.export.points import parts_of
 from cpfls_cli.inertia import nearest_body
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import Body, MeasuredMotion, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel, turning_by_attitude
-from cpfls_cli.playback.motion import Body, MeasuredMotion
 from cpfls_cli.playback.player import in_the_air
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.windows import Flown, Rotors, Runs, Steps, errors_of_runs

@@ -15,8 +15,8 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics import CELLS, InertiaFunctions, body_inertia, body_torque, coriolis_matrix
 from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters, symmetric
+from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import one_step
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.regressor.regressor import InertiaValues, Motion, Regressor

@@ -30,7 +30,7 @@ from cpfls_cli.export.mcap_form import (
 from cpfls_cli.flights.flight import Flight, Imported
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.recorded import HELD_OUT, RecordedFlight
-from cpfls_cli.playback.along_flights import Playback
+from cpfls_cli.playback.replay import Playback
 from cpfls_cli.response.flown import Responses
 from cpfls_cli.result import BODY, EULER, WORLD, About, described_fields
 from cpfls_cli.simulation.twin import Twin

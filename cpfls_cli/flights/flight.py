@@ -18,8 +18,7 @@ from cpfls_cli.result import BODY, EULER, WORLD, About, about, described_fields,
 from cpfls_cli.store import read
 
 if TYPE_CHECKING:
-    from cpfls_cli.simulation.inverse import SimulatedFlight
-    from cpfls_cli.simulation.measured import MeasuredFlight
+    from cpfls_cli.simulation.measured import MeasuredFlight, SimulatedFlight
     from cpfls_cli.simulation.model import SimulatedEffects
     from cpfls_cli.vehicle.rotors import RotorViolation
 
@@ -225,7 +224,7 @@ class Simulated(Flight):
     tracking: Tracking | None = part(default=None)
 
     @classmethod
-    def of(cls, time: Array, flight: SimulatedFlight | MeasuredFlight) -> Self:
+    def of(cls, time: Array, flight: SimulatedFlight) -> Self:
         """Describe a flight of the exact vehicle, or one in closed loop as logged."""
         signals: dict[str, Any] = dict(flight.signals)
         return cls(

@@ -14,8 +14,7 @@ from cpfls_cli.result import BODY, EULER, WORLD, about, part, result
 
 if TYPE_CHECKING:
     from cpfls_cli.excitation import Excitation
-    from cpfls_cli.simulation.inverse import Flyability
-    from cpfls_cli.simulation.room_left import RoomLeft
+    from cpfls_cli.simulation.inverse import Flyability, RoomLeft
     from cpfls_cli.trajectory.legs import Leg
     from cpfls_cli.trajectory.planning import PlannedRotation
     from cpfls_cli.trajectory.settings import ExciteSettings, TrajectorySettings

@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import contradictions, doubts
-from cpfls_cli.consistency.numbers import beyond_belief
+from cpfls_cli.consistency.rotors import beyond_belief
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.repair import common_rate, same_rate

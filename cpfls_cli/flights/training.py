@@ -38,7 +38,7 @@ from cpfls_cli.identification.data import (
     split_flight,
 )
 from cpfls_cli.logs.formats import is_log
-from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.reduction.training_set import Selection
 from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, joined_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.store import IN_MEMORY, Origin, check_rows, count_rows, held_rows, read, read_rows

@@ -149,9 +149,9 @@ def worst_stretch(
 
 def _worst(pair: PlayedPair, time: Array, samples: int, most: int) -> FreeRuns:
     starts = pair.flight.starts(samples - 1, samples)
-    before = drawn_runs(Played(pair.logged, pair.stated, pair.stated), starts, samples - 1).model
+    before = drawn_runs(Played(pair.logged, pair.stated, pair.stated), starts, samples - 1)["model"]
     after = drawn_runs(pair, starts, samples - 1)
-    square = ((before - after.measured) ** 2).sum(axis=1)
+    square = ((before - after["measured"]) ** 2).sum(axis=1)
     joined = min(len(starts), most)
     begin = int(np.convolve(square.sum(axis=1), np.ones(joined), mode="valid").argmax())
     runs = slice(begin, begin + joined)
@@ -162,9 +162,9 @@ def _worst(pair: PlayedPair, time: Array, samples: int, most: int) -> FreeRuns:
         axis=int(square[runs].sum(axis=0).argmax()),
         time=time,
         restart=time[::samples],
-        measured=after.measured[runs].reshape(-1, 3),
+        measured=after["measured"][runs].reshape(-1, 3),
         before=before[runs].reshape(-1, 3),
-        after=after.model[runs].reshape(-1, 3),
+        after=after["model"][runs].reshape(-1, 3),
     )
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
-from cpfls_cli.consistency.audit import Audit, audit
+from cpfls_cli.consistency.check import Audit, audit
 from cpfls_cli.consistency.findings import contradictions
-from cpfls_cli.consistency.numbers import impossible
+from cpfls_cli.consistency.rotors import impossible
 from cpfls_cli.dynamics import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.consistency.audit import Audit
+from cpfls_cli.consistency.check import Audit
 from cpfls_cli.dynamics import InertiaModel
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, InputError

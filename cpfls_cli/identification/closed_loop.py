@@ -32,10 +32,9 @@ from cpfls_cli.identification.data import (
 )
 from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
 from cpfls_cli.playback.constants import find_constants
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
 from cpfls_cli.playback.instruments import InstrumentKind, Instruments, instruments, past_setpoints
 from cpfls_cli.playback.loop import BalancedTorque, LoopBounds, bounds_between
-from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.parameters import INERTIA, PRODUCTS, blocks_of
 from cpfls_cli.regressor.regressor import RIGID, Motion
 from cpfls_cli.vehicle.rotors import rotor_demand
@@ -146,7 +145,7 @@ def _by_instruments(
     rigid_body, half = _solved(crossed)
     if not _known_to_two(half)[2]:
         # What is hardly known would shake what is: about yaw the body stays as least squares has it.
-        runs = [run.without_yaw() for run in runs]
+        runs = [run._replace(others=run.others * [[1.0], [1.0], [0.0]]) for run in runs]
         rigid_body, beside = _solved(_crossed(runs, repeated=repeated), least_squares)
         half = np.array([*beside[:2], half[2]])
     if why_unphysical(rigid_body) is not None:
@@ -248,10 +247,6 @@ class _Run(NamedTuple):
     own: Array
     others: Array
     block: IntArray
-
-    def without_yaw(self) -> _Run:
-        """Leave out what is known about yaw."""
-        return self._replace(others=self.others * [[1.0], [1.0], [0.0]])
 
 
 def _freed(runs: Sequence[_Run], rigid_body: Array) -> Array:

@@ -57,51 +57,41 @@ def score_of(source: TorqueSource, torque: Callable[[Motion], Array]) -> Score:
 
 
 class VarianceExplained:
-    """Sums for the share of the variance explained, ``1 - sum e^2 / sum (y - mean y)^2``, chunk by chunk."""
-
-    def __init__(self) -> None:
-        self._measured, self._error, self._square = _AboutMean(), _AboutMean(), np.zeros(3)
-
-    def add(self, measured: Array, error: Array) -> None:
-        """Add samples, if any; both arrays have the shape (samples, 3)."""
-        if len(measured) == 0:
-            return
-        self._measured.add(measured)
-        self._error.add(error)
-        self._square = self._square + np.sum(error**2, axis=0)
-
-    @property
-    def mean_squared_error(self) -> Array:
-        """Mean squared error by channel."""
-        return np.asarray(self._square / self._error.count)
-
-    @property
-    def r2(self) -> Array:
-        """Share of the variance explained by channel; NaN where the measured channel does not vary."""
-        return 1.0 - _ratio(self._square, self._measured.square)
-
-    @property
-    def vaf(self) -> Array:
-        """Variance accounted for by channel: the same of the error about its mean, without its constant part."""
-        return 1.0 - _ratio(self._error.square, self._measured.square)
-
-
-class _AboutMean:
-    """Sum of squares about the mean, chunk by chunk.
+    """Sums for the share of the variance explained, ``1 - sum e^2 / sum (y - mean y)^2``, chunk by chunk.
 
     Chan, Golub and LeVeque, The American Statistician 37 (1983), 242 (sums of squares about a mean, pairwise).
     """
 
     def __init__(self) -> None:
-        self.count, self.square = 0, np.zeros(3)
-        self._mean = np.zeros(3)
+        self._count, self._square = 0, np.zeros(3)
+        # Of what is measured, then of the errors.
+        self._mean, self._about_mean = np.zeros((2, 3)), np.zeros((2, 3))
 
-    def add(self, values: Array) -> None:
-        count, mean = len(values), np.mean(values, axis=0)
-        both, apart = self.count + count, mean - self._mean
-        self.square = self.square + np.sum((values - mean) ** 2, axis=0)
-        self.square += apart**2 * (self.count * count / both)
-        self._mean, self.count = self._mean + apart * (count / both), both
+    def add(self, measured: Array, error: Array) -> None:
+        """Add samples, if any; both arrays have the shape (samples, 3)."""
+        if len(measured) == 0:
+            return
+        values, count = np.stack([measured, error]), self._count + len(measured)
+        mean = values.mean(axis=1)
+        apart = mean - self._mean
+        self._about_mean += ((values - mean[:, None]) ** 2).sum(axis=1) + apart**2 * self._count * len(error) / count
+        self._mean, self._count = self._mean + apart * (len(error) / count), count
+        self._square = self._square + np.sum(error**2, axis=0)
+
+    @property
+    def mean_squared_error(self) -> Array:
+        """Mean squared error by channel."""
+        return np.asarray(self._square / self._count)
+
+    @property
+    def r2(self) -> Array:
+        """Share of the variance explained by channel; NaN where the measured channel does not vary."""
+        return 1.0 - _ratio(self._square, self._about_mean[0])
+
+    @property
+    def vaf(self) -> Array:
+        """Variance accounted for by channel: the same of the error about its mean, without its constant part."""
+        return 1.0 - _ratio(self._about_mean[1], self._about_mean[0])
 
 
 class ScoreSums:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import linalg
 from scipy.linalg import lapack
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from cpfls_cli.arrays import Array, Numbers
 
@@ -20,9 +21,9 @@ _WELL_CONDITIONED = 3e3
 _LOWEST_DIRECTIONS = 3
 # Columns from which a tridiagonal form is worth its calls, and what it may work in, numbers a column.
 _FEW, _WORK = 64, 64
-# Columns from which Lanczos is worth its calls; its steps at most, and the residual at which an eigenvalue is exact.
+# Columns from which Lanczos is worth its calls; its restarts at most, and the residual at which eigenvalues are exact.
 _MANY = 700
-_STEPS = 80
+_STEPS = 20
 _SETTLED = 1e-9
 
 
@@ -256,22 +257,13 @@ def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
 
 def _extreme(apply: Callable[[Array], Array], size: int) -> tuple[float, Array] | None:
     """Find the largest eigenvalue of a symmetric operator, and directions, by Lanczos; None if it does not settle."""
-    basis = np.zeros((_STEPS + 1, size))
-    basis[0] = np.random.default_rng(0).standard_normal(size)
-    basis[0] /= np.linalg.norm(basis[0])
-    diagonal, off_diagonal = np.zeros(_STEPS), np.zeros(_STEPS)
-    for step in range(min(_STEPS, size)):
-        known, ahead = basis[: step + 1], apply(basis[step])
-        diagonal[step] = ahead @ basis[step]
-        for _ in range(2):
-            ahead = ahead - (known @ ahead) @ known
-        off_diagonal[step] = np.linalg.norm(ahead)
-        if step % 5 == 4 or step + 1 == size:
-            values, vectors = linalg.eigh_tridiagonal(diagonal[: step + 1], off_diagonal[:step], check_finite=False)
-            if off_diagonal[step] * np.abs(vectors[-1, -1]) <= _SETTLED * values[-1]:
-                return float(values[-1]), known.T @ vectors[:, : -1 - _LOWEST_DIRECTIONS : -1]
-        basis[step + 1] = ahead / off_diagonal[step]
-    return None
+    operator = LinearOperator((size, size), matvec=apply, dtype=np.float64)
+    start, count = np.random.default_rng(0).standard_normal(size), _LOWEST_DIRECTIONS
+    try:
+        values, vectors = eigsh(operator, count, which="LA", v0=start, maxiter=_STEPS, tol=_SETTLED)
+    except ArpackNoConvergence:
+        return None
+    return float(values[-1]), np.asarray(vectors[:, ::-1])
 
 
 def quick_solution(equations: NormalEquations) -> tuple[Array, tuple[Array, bool], Array]:

@@ -13,7 +13,7 @@ from cpfls_cli.dynamics import rigid_columns
 from cpfls_cli.fuzzy.basis import InputRange
 from cpfls_cli.identification.data import TorqueSource
 from cpfls_cli.regressor import kernels
-from cpfls_cli.regressor.kernels import Chunk, Runs, Table, motion_lines
+from cpfls_cli.regressor.kernels import NOTHING, Chunk, Runs, Table, motion_lines
 from cpfls_cli.regressor.regressor import RIGID, Breakpoints
 from cpfls_cli.regressor.structure import ModelStructure
 from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
@@ -134,9 +134,7 @@ class Samples:
         """Add up the products of all columns with each other and with the torque."""
         P, dense = self.table.parameters, self._dense_products
         gram, moment = np.zeros((self.labels, P, P)), np.zeros((self.labels, P, dense.shape[1]))
-        breakpoints = padded_breakpoints(partitions)
-        for chunk, runs, label in self._runs(breakpoints):
-            kernels.add_gram(self.table, breakpoints, chunk, runs, self.scale, label, gram, moment)
+        self._add_up(kernels.GRAM, padded_breakpoints(partitions), (NOTHING, NOTHING), (gram, moment, NOTHING))
         gram = gram + gram.swapaxes(1, 2)
         gram[:, np.arange(P), np.arange(P)] *= 0.5
         rigid = moment[:, :, 1:]
@@ -158,13 +156,10 @@ class Samples:
         square : array, shape (labels,)
         largest : array, shape (labels,)
         """
-        square, largest = np.zeros((self.labels, 1)), np.zeros((self.labels, 1))
-        breakpoints, weights = padded_breakpoints(partitions), self._weights(rigid_body)
-        for chunk, runs, label in self._runs(breakpoints):
-            kernels.add_errors(
-                self.table, breakpoints, chunk, runs, self.scale, label, coefficients[None], weights, square, largest
-            )
-        return square[:, 0], largest[:, 0]
+        sums = square, largest, _ = np.zeros((self.labels, 1, 1)), np.zeros((self.labels, 1, 1)), NOTHING
+        models = coefficients[None], self._weights(rigid_body)
+        self._add_up(kernels.ERRORS, padded_breakpoints(partitions), models, sums)
+        return square[:, 0, 0], largest[:, 0, 0]
 
     def projected(self, partitions: Breakpoints, parameters: Array, directions: Array) -> tuple[Array, Array]:
         """Multiply residual and columns directly, without the loss of digits of products of products.
@@ -188,11 +183,8 @@ class Samples:
         weights[0, 0] = 1.0
         square, columns = np.zeros((len(models), len(models))), 1 + rigid
         back, dense_back = np.zeros((self.table.parameters, 1)), np.zeros((columns, 1))
-        breakpoints, coefficients = padded_breakpoints(partitions), np.ascontiguousarray(models[:, rigid:])
-        for chunk, runs, _ in self._runs(breakpoints):
-            kernels.add_combined(
-                self.table, breakpoints, chunk, runs, self.scale, coefficients, weights, square, back, dense_back
-            )
+        coefficients, sums = np.ascontiguousarray(models[:, rigid:]), (square[None], back[None], dense_back)
+        self._add_up(kernels.COMBINED, padded_breakpoints(partitions), (coefficients, weights), sums)
         return _mirrored(square)[1:, 1:], np.concatenate([dense_back[1:, 0], back[:, 0]])
 
     def moved(self, partitions: Breakpoints, coefficients: Array, rigid_body: Array) -> MovedProducts:
@@ -204,18 +196,22 @@ class Samples:
         rigid_body : array, shape (6,)
             Not used without a rigid body.
         """
-        B, weights = self.table.breakpoints, self._weights(rigid_body)[0]
+        B, weights = self.table.breakpoints, self._weights(rigid_body)
         cross, square = np.zeros((self.table.parameters, B + 1)), np.zeros((B + 1, B + 1))
-        dense = np.zeros((len(weights), B + 1))
-        breakpoints = padded_breakpoints(partitions)
-        for chunk, runs, _ in self._runs(breakpoints):
-            kernels.add_moved(
-                self.table, breakpoints, chunk, runs, self.scale, coefficients, weights, cross, dense, square
-            )
+        dense = np.zeros((weights.shape[1], B + 1))
+        sums = square[None], cross[None], dense
+        self._add_up(kernels.MOVED, padded_breakpoints(partitions), (coefficients[None], weights), sums)
         square = _mirrored(square)
         return MovedProducts(
             np.vstack([dense[1:, :B], cross[:, :B]]), square[:B, :B], square[:B, B], float(square[B, B])
         )
+
+    def _add_up(
+        self, what: int, breakpoints: Array, models: tuple[Array, Array], sums: tuple[Array, Array, Array]
+    ) -> None:
+        """Add up sums over all samples, in place; see `kernels.add_sums`."""
+        for chunk, runs, label in self._runs(breakpoints):
+            kernels.add_sums(what, self.table, breakpoints, chunk, runs, self.scale, label, models, sums)
 
     @cached_property
     def _dense_products(self) -> Array:

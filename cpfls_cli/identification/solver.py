@@ -222,26 +222,6 @@ class Fit:
     column_size: Array
 
 
-def decomposed(learned: Samples, partitions: Breakpoints, fit: Fit, rank_tolerance: float) -> tuple[Fit, LeastSquares]:
-    """Solve for the linear parameters by a singular value decomposition of all rows, at ridge and sizes of a fit.
-
-    Gives the fit, and the least squares of the parameters in use without any penalty.
-    """
-    rigid, off = learned.ready.rigid, np.isinf(fit.ridge_weight)
-    triangle = Triangle.of(_rows(learned, partitions, fit, fuzzy=not off))
-    unpenalised = triangle.solve(rank_tolerance)
-    if off:
-        return replace(fit, rigid_body=unpenalised.coefficients), unpenalised
-    parameters, rows = learned.structure.parameters, 3 * len(learned.ready.source)
-    if not rigid:
-        # Sums of products leave only rounding of an error far below the torque.
-        error = triangle.square(unpenalised.coefficients) / rows
-        return replace(fit, coefficients=unpenalised.coefficients, mean_squared_error=error), unpenalised
-    penalty = np.sqrt(fit.ridge_weight * rows) * np.eye(parameters, RIGID + parameters, RIGID)
-    penalised = triangle.below(penalty).solve(rank_tolerance).coefficients
-    return replace(fit, coefficients=penalised[RIGID:] / fit.column_size, rigid_body=penalised[:RIGID]), unpenalised
-
-
 def regressor_blocks(learned: Samples) -> Iterator[tuple[TorqueData, Regressor]]:
     """Yield the samples block by block, small enough to write out, with their regressors."""
     for data in learned.ready.source.chunks():
@@ -338,7 +318,7 @@ class Solver:
         return solution[RIGID:] / size, solution[:RIGID]
 
     def exact(self, partitions: Breakpoints, fit: Fit) -> tuple[Fit, LeastSquares]:
-        """Solve again by a singular value decomposition of all rows.
+        """Solve again by a singular value decomposition of all rows, at ridge and sizes of a fit.
 
         Parameters
         ----------
@@ -351,7 +331,19 @@ class Solver:
         unpenalised : LeastSquares
             Of the parameters in use, without any penalty: what the data determine.
         """
-        return decomposed(self.learned, partitions, fit, self.rank_tolerance)
+        rigid, off = self.learned.ready.rigid, np.isinf(fit.ridge_weight)
+        triangle = Triangle.of(_rows(self.learned, partitions, fit, fuzzy=not off))
+        unpenalised = triangle.solve(self.rank_tolerance)
+        if off:
+            return replace(fit, rigid_body=unpenalised.coefficients), unpenalised
+        parameters, rows = self.learned.structure.parameters, 3 * len(self.learned.ready.source)
+        if not rigid:
+            # Sums of products leave only rounding of an error far below the torque.
+            error = triangle.square(unpenalised.coefficients) / rows
+            return replace(fit, coefficients=unpenalised.coefficients, mean_squared_error=error), unpenalised
+        penalty = np.sqrt(fit.ridge_weight * rows) * np.eye(parameters, RIGID + parameters, RIGID)
+        penalised = triangle.below(penalty).solve(self.rank_tolerance).coefficients
+        return replace(fit, coefficients=penalised[RIGID:] / fit.column_size, rigid_body=penalised[:RIGID]), unpenalised
 
     def _curve(self, products: Products, partitions: Breakpoints, size: Array) -> RidgeCurve:
         assert self.ridge is not None

@@ -216,10 +216,8 @@ class Artifact(Mapping[str, Any]):
     def _source(self, number: str) -> Source:
         from cpfls_cli.report.source import source_of_result
 
-        return source_of_result(self._record, self._origin, self._path or self.format, self._label(number), number)
-
-    def _label(self, number: str) -> str:
-        return self._path.name if self._path else f"{self.format} {number}"
+        label = self._path.name if self._path else f"{self.format} {number}"
+        return source_of_result(self._record, self._origin, self._path or self.format, label, number)
 
     def _dimensions(self, name: str) -> list[str]:
         """Name the dimensions of a dataset apart, also from datasets that are no coordinates.

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from cpfls_cli.config.study import Study
     from cpfls_cli.flights.prediction import AlongFlight
+    from cpfls_cli.playback.flight import State
     from cpfls_cli.playback.model import VehicleModel
-    from cpfls_cli.playback.motion import State
     from cpfls_cli.playback.rotors import Hold
     from cpfls_cli.report.content import Outcome
     from cpfls_cli.stage import Run
@@ -201,7 +201,7 @@ class Model:
         """
         import numpy as np
 
-        from cpfls_cli.playback.motion import State
+        from cpfls_cli.playback.flight import State
         from cpfls_cli.rotations import rotation_matrix
 
         given = [np.atleast_2d(np.asarray(part, dtype=float)) for part in (position, velocity, attitude, body_rate)]
@@ -264,7 +264,7 @@ class Model:
         """
         import numpy as np
 
-        from cpfls_cli.playback.motion import State
+        from cpfls_cli.playback.flight import State
         from cpfls_cli.playback.player import one_step
 
         speed = np.atleast_2d(np.asarray(rotor_speed, dtype=float))

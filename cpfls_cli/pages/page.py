@@ -22,7 +22,7 @@ from cpfls_cli.pages.identification import WORDS as OF_IDENTIFIED
 from cpfls_cli.pages.identified_figures import COMPARED
 from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.pages.trust import model_words
-from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.reduction.training_set import Selection
 from cpfls_cli.report.canvas import figure_html, pictures
 from cpfls_cli.report.content import (
     STRUCK,

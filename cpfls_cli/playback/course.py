@@ -10,8 +10,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.motion import FASTEST, MeasuredMotion, State
+from cpfls_cli.playback.flight import FASTEST, MeasuredMotion, PlaybackFlight, State
 from cpfls_cli.playback.player import less_measured
 from cpfls_cli.playback.rotors import RotorResponse
 

@@ -391,13 +391,6 @@ def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Ar
     return [found.get(number, np.nan * own) for number, own in enumerate(left)]
 
 
-class _Fit(NamedTuple):
-    """Numbers of a process, and which of them lie between their bounds."""
-
-    numbers: Array
-    free: BoolArray
-
-
 class _Axis:
     """The non-repeatable part about one axis, and the process that has this power."""
 
@@ -421,33 +414,31 @@ class _Axis:
 
         Errors are larger than the scatter of blocks by the factor `shared`.
         """
-        fit = self._fit
-        half = half_width(shared * self._errors(*fit) * [0.5, 1.0], len(self._count))
-        size, memory = float(np.exp(0.5 * fit.numbers[0])), float(np.exp(fit.numbers[1]))
+        numbers, free = self._fit
+        half = half_width(shared * self._errors(numbers, free) * [0.5, 1.0], len(self._count))
+        size, memory = float(np.exp(0.5 * numbers[0])), float(np.exp(numbers[1]))
         inside = _EDGE * _MEMORY_S[0] < memory < _MEMORY_S[1] / _EDGE
         everything = self.bound()
         if not inside or 2 * half[0] > np.log(_KNOWN) or size**2 < _SEEN * everything[2] ** 2:
             return everything
         ends = np.clip([memory * np.exp(-half[1]), memory * np.exp(half[1])], *_MEMORY_S)
-        return np.array(
-            [size, size * np.exp(-half[0]), size * np.exp(half[0]), memory, *ends, *np.exp(fit.numbers[2:])]
-        )
+        return np.array([size, size * np.exp(-half[0]), size * np.exp(half[0]), memory, *ends, *np.exp(numbers[2:])])
 
     @property
     def white(self) -> float:
         """White noise, as of a step of a second."""
-        return float(np.sqrt(np.exp(self._fit.numbers[2]) * self._period))
+        return float(np.sqrt(np.exp(self._fit[0][2]) * self._period))
 
     def lack(self, power: Array, parts: _Complex) -> AxisLack:
         """Find what the model lacks, in power of what is left by piece and its parts as they are predicted."""
-        known = self._expected(self._fit.numbers)[0]
+        known = self._expected(self._fit[0])[0]
         both = np.where(np.arange(parts.shape[2]) > 0, 2.0, 1.0)
         squares = np.abs(parts) ** 2 @ both / (len(self._process.lags) * self._noise[0, 0])
         return lack_of(power, squares, known, self._process, _MEMORY_S)
 
     @cached_property
-    def _fit(self) -> _Fit:
-        """Maximise the likelihood over logarithms of squared size, memory and the two noises."""
+    def _fit(self) -> tuple[Array, BoolArray]:
+        """Maximise the likelihood over logarithms of squared size, memory and two noises; which are on no bound."""
         powers = self._mean.max() / self._process.alike.sum(axis=1).max(), *(self._mean[-1] / self._noise[:, -1])
         # Of an axis that a flight does not know all is 0.
         begin = np.log(np.maximum(powers, np.sqrt(np.finfo(float).tiny)))
@@ -460,7 +451,7 @@ class _Axis:
 
         starts = [np.array([begin[0], np.log(memory), *(begin[1:] - 1.0)]) for memory in _BEGIN_S]
         best = most_likely(spectrum, self._mean[None], starts, list(zip(low, high, strict=True)))
-        return _Fit(best, (best > low + _AT_END) & (best < high - _AT_END))
+        return best, ((best > low + _AT_END) & (best < high - _AT_END))
 
     def _expected(self, numbers: Array) -> tuple[Array, Array]:
         """Give the power by frequency, shape (frequency,), and its derivatives by the numbers, shape (4, frequency)."""

@@ -13,9 +13,8 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, six_parameters, symmetric
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import Body, PlaybackFlight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel, of_thrust
-from cpfls_cli.playback.motion import Body
 from cpfls_cli.playback.parameters import (
     DELAY,
     DRAG,

@@ -17,8 +17,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.motion import Body
+from cpfls_cli.playback.flight import Body, PlaybackFlight
 from cpfls_cli.result import about, result
 
 

@@ -25,13 +25,14 @@ from cpfls_cli.playback.fit import (
     FitWindows,
     SideBySide,
     WindowSet,
+    block_errors,
+    parts_of,
     side_by_side,
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import PRIOR
 from cpfls_cli.playback.history import Observer, missed_before
-from cpfls_cli.playback.judging import block_errors, parts_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Judged
 from cpfls_cli.playback.windows import Leg, Runs, Steps, errors_of_runs, legs, losses_of, sums_of

@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.consistency.audit import Audit
+from cpfls_cli.consistency.check import Audit
 from cpfls_cli.dynamics import InertiaFunctions, InertiaModel, body_inertia, momentum_form, positive_definite
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Columns, Effect
@@ -19,8 +19,8 @@ from cpfls_cli.effects.registry import CENTRE_OF_MASS, VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.playback.flight import Body
 from cpfls_cli.playback.gusts import Gusts
-from cpfls_cli.playback.motion import Body
 from cpfls_cli.playback.remainder import Remainder, learned_wrench
 from cpfls_cli.playback.rotors import Hold, RotorResponse
 from cpfls_cli.playback.windows import Flown, Rotors, Turned, Turning
@@ -87,11 +87,6 @@ class ModelEffect(NamedTuple):
         columns = self.effect.columns
         assert columns is not None, "what only an audit sees is in no model"
         return columns(signals, self.shape).at_samples(self.linear, signals.time)
-
-    @property
-    def is_simulated(self) -> bool:
-        """Whether it follows from what free runs know."""
-        return self.effect.follows_state and not self.is_filter
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
         """Name the signals that it needs and a flight lacks; a filter may lack the command: it leaves speeds alone."""
@@ -165,7 +160,7 @@ class VehicleModel:
     @property
     def along(self) -> tuple[ModelEffect, ...]:
         """Effects that are evaluated along a measured motion."""
-        return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.is_simulated))
+        return tuple(one for one in self.effects if not (one.is_lever or one.is_filter or one.effect.follows_state))
 
     @property
     def filters(self) -> tuple[ModelEffect, ...]:

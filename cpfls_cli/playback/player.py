@@ -11,10 +11,9 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, playback_flight
+from cpfls_cli.playback.flight import LoggedFlight, MeasuredMotion, PlaybackFlight, State, playback_flight
 from cpfls_cli.playback.history import Observer, missed_before
 from cpfls_cli.playback.model import VehicleModel, wrench_along
-from cpfls_cli.playback.motion import Body, MeasuredMotion, State
 from cpfls_cli.playback.windows import MOST_RUNS, Flown, Steps, errors_of_runs, rotation_errors
 from cpfls_cli.playback.windows import Runs as FlownRuns
 
@@ -33,11 +32,6 @@ class Player:
     along: Array | None = None
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
     observer: Observer | None = None
-
-    @property
-    def body(self) -> Body:
-        """What is moved."""
-        return self.flown.body
 
     def steps(self, samples: IntArray, push: Array | None = None) -> Steps:
         """Take the rotors over steps that begin at samples, shape (step, run).
@@ -197,7 +191,7 @@ def observed(player: Player, flight: PlaybackFlight, starts: IntArray) -> Array:
     def single_steps(samples: IntArray) -> Array:
         return free_runs(replace(player, observer=None), flight, samples, 1).errors[:, 0]
 
-    missed = missed_before(flight, starts, observer.samples(period), single_steps, player.body)
+    missed = missed_before(flight, starts, observer.samples(period), single_steps, player.flown.body)
     return np.asarray(np.einsum("rsa,sa->ra", missed, observer.weights(period)))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 
@@ -54,49 +53,6 @@ _EDGE = 1e-9
 """Rounding, of a moment of inertia beside the sum of the others."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Estimates:
-    """What flights say of the numbers of a vehicle, and how sure that is.
-
-    Attributes
-    ----------
-    numbers : sequence of FoundNumber
-        With 95 % intervals.
-    correlation : array, shape (number, number)
-        See `FoundVehicle`.
-    blocks : int
-        That the intervals come from.
-    loop : array, shape (2, 3)
-        Least and largest factor on each moment of inertia by which the autopilot's loop may have misled the fit, which
-        has widened the intervals; 1 for none.
-    gusts : GustRanges or None
-    lack : Lack or None
-        What the model lacks.
-    """
-
-    numbers: Sequence[FoundNumber]
-    correlation: Array
-    blocks: int
-    loop: Array
-    gusts: GustRanges | None
-    lack: Lack | None = None
-
-    @classmethod
-    def of(cls, found: FoundVehicle) -> Self:
-        """Take those of a vehicle that was found."""
-        # Where instruments identify the constants no loop has widened their intervals.
-        own, gusts = found.loop, found.disturbance
-        loop = np.ones((2, 3)) if found.instruments else np.array([np.fmin(own.low, 1.0), np.fmax(own.high, 1.0)])
-        return cls(
-            numbers=found.numbers,
-            correlation=found.correlation,
-            blocks=found.blocks,
-            loop=loop,
-            gusts=None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
-            lack=None if gusts is None else gusts.lack,
-        )
-
-
 @dataclass(frozen=True)
 class Spread:
     """Vehicles that were drawn.
@@ -127,7 +83,7 @@ class Spread:
     lack: Lack | None = None
 
 
-def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Generator) -> Spread:
+def drawn(model: VehicleModel, found: FoundVehicle, count: int, rng: np.random.Generator) -> Spread:
     """Draw vehicles that the flights allow: by a multivariate t, each number within its interval in 95 % of draws.
 
     What is positive is drawn by factors. An interval that is longer on one side is two halves of the distribution. A
@@ -151,14 +107,14 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
     Gelman et al., Bayesian Data Analysis, chapter 3 (t of a normal with unknown scale); Wallis 2014, the two-piece
     normal distribution.
     """
-    require_sure(known)
-    places = [place for place, each in enumerate(known.numbers) if each.value and _OF_A_GROUP not in each.name]
-    model, numbers = _of_a_body(model, [known.numbers[place] for place in places])
-    root = _root(known.correlation[np.ix_(places, places)])
+    require_sure(found)
+    places = [place for place, each in enumerate(found.numbers) if each.value and _OF_A_GROUP not in each.name]
+    model, numbers = _of_a_body(model, [found.numbers[place] for place in places])
+    root = _root(found.correlation[np.ix_(places, places)])
     kept: list[tuple[Array, VehicleModel]] = []
     rejected, tried = Counter[str](), 0
     while len(kept) < count:
-        for row in _numbers_drawn(numbers, known, root, rng, max(count, _AT_ONCE)):
+        for row in _numbers_drawn(numbers, found, root, rng, max(count, _AT_ONCE)):
             if len(kept) < count:
                 tried += 1
                 why = _impossible(model, numbers, row)
@@ -172,8 +128,10 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
                 f"of {tried} vehicles drawn only {len(kept)} are possible; of {often} no vehicle has {first}"
             )
     made = [each for _, each in kept]
-    heavier = _heavier(model, made)
-    gusts = _gusts_drawn(known.gusts, model, heavier, rng)
+    # What is seen of gusts is acceleration, so that their torque goes with the inertia.
+    axes = [symmetric(each.vehicle.inertia_kg_m2).diagonal() for each in (model, *made)]
+    heavier = np.array([np.append(own / axes[0], np.ones(3)) for own in axes[1:]])
+    gusts = _gusts_drawn(found, model, heavier, rng)
     return Spread(
         tuple(number.name for number in numbers),
         np.array([number.value for number in numbers]),
@@ -181,13 +139,13 @@ def drawn(model: VehicleModel, known: Estimates, count: int, rng: np.random.Gene
         tuple(replace(each, gusts=own) for each, own in zip(made, gusts, strict=True)),
         tried,
         dict(rejected.most_common()),
-        known.lack,
+        None if found.disturbance is None else found.disturbance.lack,
     )
 
 
-def require_sure(known: Estimates) -> None:
+def require_sure(found: FoundVehicle) -> None:
     """Refuse numbers that one block alone identifies."""
-    if known.blocks < 2:
+    if found.blocks < 2:
         raise InputError("its flights are too short to show how sure its numbers are; find it in longer ones")
 
 
@@ -214,20 +172,25 @@ def _root(correlation: Array) -> Array:
 
 
 def _numbers_drawn(
-    numbers: Sequence[FoundNumber], known: Estimates, root: Array, rng: np.random.Generator, count: int
+    numbers: Sequence[FoundNumber], found: FoundVehicle, root: Array, rng: np.random.Generator, count: int
 ) -> Array:
     """Draw numbers, possible or not, shape (count, number)."""
-    freedom = known.blocks - 1
+    # By which factors the loop may have misled the fit; where instruments identify the constants no loop has.
+    ends = np.array([np.fmin(found.loop.low, 1.0), np.fmax(found.loop.high, 1.0)])
+    ends = np.ones((2, 3)) if found.instruments else ends
+    freedom = found.blocks - 1
     normal = rng.standard_normal((count, len(numbers))) @ root.T
     # In units of half an interval: of a t of so many blocks, 95 % lie between -1 and 1.
-    unit = float(half_width(np.ones(()), known.blocks))
+    unit = float(half_width(np.ones(()), found.blocks))
     shares = normal / np.sqrt(rng.chisquare(freedom, (count, 1)) / freedom) / unit
-    least, most = np.log(known.loop)
+    least, most = np.log(ends)
     loop = np.exp(rng.uniform(least, most, (count, 3)))
-    widened = _of_loop(known.loop)
+    # By which it has widened intervals; see `beside_loop`.
+    widened = dict(zip(MOMENTS, ends.T.tolist(), strict=True))
+    widened[DRAG] = [1.0 / widened[MOMENTS[2]][1], 1.0 / widened[MOMENTS[2]][0]]
     values = np.empty_like(shares)
     for place, number in enumerate(numbers):
-        below, above = widened.get(number.name, (1.0, 1.0))
+        below, above = widened.get(number.name, [1.0, 1.0])
         low, value, high = number.low / below, number.value, number.high / above
         if number.name in POSITIVE:
             low, value, high = np.log(np.clip([low, value, high], 1e-30, 1e30))
@@ -236,13 +199,6 @@ def _numbers_drawn(
         values[:, place] = np.exp(moved) if number.name in POSITIVE else moved
     _misled(numbers, values, loop)
     return values
-
-
-def _of_loop(loop: Array) -> dict[str, tuple[float, float]]:
-    """Give the factors by which the loop has widened intervals; see `beside_loop`."""
-    low, high = loop
-    found = {name: (float(low[axis]), float(high[axis])) for axis, name in enumerate(MOMENTS)}
-    return found | {DRAG: (1.0 / float(high[2]), 1.0 / float(low[2]))}
 
 
 def _misled(numbers: Sequence[FoundNumber], values: Array, loop: Array) -> None:
@@ -267,15 +223,12 @@ def _impossible(model: VehicleModel, numbers: Sequence[FoundNumber], row: Array)
         return "a principal moment of inertia that is not above 0"
     if largest > (smallest + middle) * (1.0 + _EDGE):
         return "a principal moment of inertia above the sum of the others"
-    of_none = [each.name for each in bodily(model.vehicle, _at(numbers, row)) if not each.possible]
+    drawn = [number._replace(value=values[number.name]) for number in numbers]
+    of_none = [each.name for each in bodily(model.vehicle, drawn) if not each.possible]
     if of_none:
         return f"such a {of_none[0]}"
     beyond = next(broken_limits(figures_of_vehicle(model_at(model, numbers, row).vehicle)), None)
     return "" if beyond is None else f"such a {beyond.what}"
-
-
-def _at(numbers: Sequence[FoundNumber], row: Array) -> list[FoundNumber]:
-    return [number._replace(value=value) for number, value in zip(numbers, row.tolist(), strict=True)]
 
 
 def _inertia(model: VehicleModel, values: Mapping[str, float]) -> Array:
@@ -337,19 +290,12 @@ def _remainder_at(remainder: Remainder, values: Mapping[str, float]) -> Remainde
     return replace(remainder, coefficients=coefficients)
 
 
-def _heavier(model: VehicleModel, models: Sequence[VehicleModel]) -> Array:
-    """Divide moments of inertia and masses of vehicles by those of the estimate, shape (vehicle, 6).
-
-    What is seen of gusts is acceleration, so that their torque goes with the inertia.
-    """
-    axes = [symmetric(each.vehicle.inertia_kg_m2).diagonal() for each in (model, *models)]
-    return np.array([np.append(own / axes[0], np.ones(3)) for own in axes[1:]])
-
-
 def _gusts_drawn(
-    known: GustRanges | None, model: VehicleModel, heavier: Array, rng: np.random.Generator
+    found: FoundVehicle, model: VehicleModel, heavier: Array, rng: np.random.Generator
 ) -> Iterator[Gusts | None]:
     """Draw the gusts of each vehicle."""
+    gusts = found.disturbance
+    known = None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES))
     if known is None:
         yield from [None] * len(heavier)
         return

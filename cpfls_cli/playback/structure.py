@@ -18,15 +18,17 @@ from cpfls_cli.playback.fit import (
     Fitted,
     FittedNumbers,
     FitWindows,
+    Outlook,
     WindowSet,
+    block_errors,
     fit,
     fit_parts,
+    parts_of,
     stays_error,
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.groups import Group, JointNumbers
-from cpfls_cli.playback.judging import Outlook, block_errors, parts_of
 from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -171,16 +173,9 @@ class Choice:
         """The baselines, then the front."""
         baselines = [(name, found) for name in BASELINES if (found := getattr(self, name)) is not None]
         return tuple(
-            TriedStructure(
-                name,
-                each.structure.blocks,
-                each.error,
-                each.worse_than(self.best)[0],
-                each.worse_than(self.best)[1],
-                each.numbers,
-                each.condition_number,
-            )
-            for name, each in [*baselines, *(("front", each) for each in self.front)]
+            TriedStructure(name, own.structure.blocks, own.error, worse, uncertain, own.numbers, own.condition_number)
+            for name, own in [*baselines, *(("front", own) for own in self.front)]
+            for worse, uncertain in [own.worse_than(self.best)]
         )
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Annotated, NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
@@ -168,6 +169,7 @@ def find_vehicle(
         determined = {number.name: number.determined for number in numbers}
         gusts = find_gusts(model, given, determined, identified=forecast is not None)
     shares, airspeed = _shares(model, own)
+    correlation = estimate_correlation(solved, spread)
     used = None if forecast is None or constants is None else constants.used
     past = choice.complete and settings.history_s and not settings.quick
     return FoundVehicle(
@@ -175,8 +177,9 @@ def find_vehicle(
         numbers=numbers,
         shares=shares,
         airspeed_m_s=airspeed,
-        trades=tuple(_trades(solved, spread)),
-        correlation=_beside(len(sensed), estimate_correlation(solved, spread)),
+        trades=tuple(_trades(solved.free.physical(solved.values), correlation)),
+        # What was sensed goes with no number of the fit.
+        correlation=block_diag(np.eye(len(sensed)), correlation),
         structures=choice.tried,
         evaluated=choice.evaluated,
         complete=choice.complete,
@@ -270,7 +273,7 @@ def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
     free, values = fitted.free, fitted.values
     physical = free.physical(values)
     stated = free.physical(free.starts)
-    half = _half_intervals(free.physical, fitted, spread)
+    half = half_width(np.sqrt(np.diag(_covariance(free.physical, fitted, spread))), spread.blocks)
     own = half_width(np.sqrt(np.diag(spread.covariance)), spread.blocks)
     for place, (number, (name, found)) in enumerate(zip(free.numbers, physical.items(), strict=True)):
         span = _AT_BOUND * number.scale
@@ -338,12 +341,6 @@ def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[Fo
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and identified)
 
 
-def _half_intervals(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
-    """Turn the covariance of a fit into half widths of 95 % intervals of what follows from its numbers."""
-    deviation = np.sqrt(np.diag(_covariance(physical, fitted, spread)))
-    return half_width(deviation, spread.blocks)
-
-
 def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
     """Turn the covariance of a fit into that of what follows from its numbers."""
     values = fitted.values
@@ -358,7 +355,7 @@ def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fit
 
 def differences(fitted: Fitted, spread: Uncertainty) -> Iterator[Difference]:
     """Say what differs between configurations, with 95 % intervals."""
-    half = _half_intervals(fitted.free.differences, fitted, spread)
+    half = half_width(np.sqrt(np.diag(_covariance(fitted.free.differences, fitted, spread))), spread.blocks)
     for (name, found), width in zip(fitted.free.differences(fitted.values).items(), half.tolist(), strict=True):
         yield Difference(name, found.unit, found.value, found.value - width, found.value + width)
 
@@ -393,15 +390,8 @@ def estimate_correlation(fitted: Fitted, spread: Uncertainty) -> Array:
     return np.asarray(correlation)
 
 
-def _beside(sensed: int, correlation: Array) -> Array:
-    """Put numbers that go with no other before those of a fit."""
-    whole = np.eye(sensed + len(correlation))
-    whole[sensed:, sensed:] = correlation
-    return whole
-
-
-def _trades(fitted: Fitted, spread: Uncertainty) -> Iterator[Trade]:
+def _trades(names: Iterable[str], correlation: Array) -> Iterator[Trade]:
     """Name pairs of numbers, as people know them, whose estimates go together."""
-    names, correlation = list(fitted.free.physical(fitted.values)), estimate_correlation(fitted, spread)
+    known = list(names)
     for first, second in np.argwhere(np.triu(np.abs(correlation) > _TRADED, 1)).tolist():
-        yield Trade(names[first], names[second], float(correlation[first, second]))
+        yield Trade(known[first], known[second], float(correlation[first, second]))

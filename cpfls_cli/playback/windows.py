@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.playback.motion import FASTEST, Body, MeasuredMotion
+from cpfls_cli.playback.flight import FASTEST, Body, MeasuredMotion
 from cpfls_cli.vehicle.motion import Instant, Vehicle
 from cpfls_cli.vehicle.values import (
     ARRAYS,

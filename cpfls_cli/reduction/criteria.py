@@ -233,7 +233,9 @@ class OptimalDesign:
         """
         if self._steps % _REFRESH_STEPS == 0:
             self._refresh(factor)
-        gain = variance_reduction(self._K, self._M) if self._optimality == "A" else information_growth(self._K)
+        grown = np.eye(3) + self._K
+        by_variance = self._optimality == "A"
+        gain = np.einsum("nij,nij->n", np.linalg.inv(grown), self._M) if by_variance else np.linalg.det(grown)
         index = first_best(gain, available)
         self._update(factor, index)
         self._steps += 1
@@ -260,17 +262,6 @@ class OptimalDesign:
         cross = CS @ E.swapaxes(1, 2)
         self._K = self._K - CS @ C.swapaxes(1, 2)
         self._M = self._M - cross - cross.swapaxes(1, 2) + project(CS, B.T @ B) @ CS.swapaxes(1, 2)
-
-
-def information_growth(K: Array) -> Array:
-    """Compute ``det(I + K_i)``, the factor by which a sample raises ``det G``."""
-    return np.asarray(np.linalg.det(np.eye(3) + K))
-
-
-def variance_reduction(K: Array, M: Array) -> Array:
-    """Compute ``trace((I + K_i)^-1 M_i)``, by which a sample lowers ``trace G^-1``."""
-    inverse = np.linalg.inv(np.eye(3) + K)
-    return np.asarray(np.einsum("nij,nij->n", inverse, M))
 
 
 class PrintedRule:

@@ -76,18 +76,12 @@ class Compound:
         return np.asarray(gain + sign * self.information / len(eigenvalues) * np.log(np.linalg.det(rest)))
 
 
-@dataclass(frozen=True)
-class Exchanged:
-    """The samples chosen by exchanges, ascending, and how many were replaced."""
-
-    indices: IntArray
-    exchanges: int
-
-
 def exchange_samples(
     space: RowSpace, start: IntArray, size: int, information: float, target: float | None = None
-) -> Exchanged:
+) -> tuple[IntArray, int]:
     """Choose samples of a small condition number: grow a start of full rank to the size, then exchange.
+
+    Gives the samples, ascending, and how many were replaced.
 
     Growing at most doubles the set at a time, by the samples of largest merit, and stops at the first size that reaches
     the target condition number. An exchange replaces the samples of least merit by as many outside of largest merit: a
@@ -103,7 +97,7 @@ def exchange_samples(
             design, exchanged = _exchange(design, information)
             exchanges += exchanged
         if design.size >= size or (target is not None and at_most(design.condition_number, target)):
-            return Exchanged(np.flatnonzero(design.chosen), exchanges)
+            return np.flatnonzero(design.chosen), exchanges
         outside = design.ranked(np.flatnonzero(~design.chosen), Compound(_POWERS[0], information))
         design = design.swapped(outside[: min(design.size, size - design.size)], outside[:0]).refreshed()
 
@@ -125,7 +119,10 @@ class _Design:
     @cached_property
     def _decomposition(self) -> tuple[Array, Array]:
         if self._precise:
-            return _precise_spectrum(self._space.rows[self.chosen])
+            rows = self._space.rows[self.chosen].reshape(-1, self._space.rank)
+            triangle = scipy.linalg.qr(rows, mode="r", check_finite=False)[0][: self._space.rank]
+            _, values, basis = scipy.linalg.svd(triangle, check_finite=False)
+            return np.asarray(values[::-1] ** 2), np.asarray(basis[::-1].T)
         values, vectors = scipy.linalg.eigh(self._gram, driver="evd", check_finite=False)
         return values, vectors
 
@@ -164,12 +161,6 @@ class _Design:
 def _gram(rows: Array) -> Array:
     flat = rows.reshape(-1, rows.shape[2])
     return np.asarray(flat.T @ flat)
-
-
-def _precise_spectrum(rows: Array) -> tuple[Array, Array]:
-    triangle = scipy.linalg.qr(rows.reshape(-1, rows.shape[2]), mode="r", check_finite=False)[0][: rows.shape[2]]
-    _, values, basis = scipy.linalg.svd(triangle, check_finite=False)
-    return np.asarray(values[::-1] ** 2), np.asarray(basis[::-1].T)
 
 
 def _exchange(design: _Design, information: float) -> tuple[_Design, int]:

@@ -45,7 +45,6 @@ class Survey(Spectrum):
 
     chunks: Chunks
     samples: int
-    parameters: int
     basis: Array
     singular_values: Array
     rank_tolerance: float
@@ -78,7 +77,7 @@ def survey(chunks: Chunks, rank_tolerance: float) -> Survey:
     rank = int(np.count_nonzero(values > rank_tolerance * values[0]))
     if rank == 0:
         raise ComputationError("Q: every value is zero, so no sample is worth more than another")
-    return Survey(chunks, samples, triangle.shape[1], basis[:rank].T, values[:rank], rank_tolerance)
+    return Survey(chunks, samples, basis[:rank].T, values[:rank], rank_tolerance)
 
 
 def project(rows: Array, vectors: Array) -> Array:
@@ -121,7 +120,10 @@ def _checked(chunks: Iterable[Array]) -> Iterator[Array]:
     samples, broken = 0, np.zeros(0, dtype=np.int64)
     columns: int | None = None
     for chunk in chunks:
-        columns = _require_shape(chunk, columns)
+        if chunk.ndim != 3 or chunk.shape[1] != 3 or 0 in chunk.shape or chunk.shape[2] != (columns or chunk.shape[2]):
+            expected = "parameters" if columns is None else columns
+            raise ComputationError(f"Q: expected shape (samples, 3, {expected}), got {chunk.shape}")
+        columns = chunk.shape[2]
         bad = np.flatnonzero(~np.isfinite(chunk).all(axis=(1, 2)))
         broken = np.concatenate([broken, samples + bad])
         samples += len(chunk)
@@ -134,13 +136,6 @@ def _checked(chunks: Iterable[Array]) -> Iterator[Array]:
         )
 
 
-def _require_shape(chunk: Array, columns: int | None) -> int:
-    expected = "parameters" if columns is None else columns
-    if chunk.ndim != 3 or chunk.shape[1] != 3 or 0 in chunk.shape or chunk.shape[2] != (columns or chunk.shape[2]):
-        raise ComputationError(f"Q: expected shape (samples, 3, {expected}), got {chunk.shape}")
-    return int(chunk.shape[2])
-
-
 @dataclass(frozen=True)
 class RowSpace(Spectrum):
     """Samples of a regressor, expressed in an orthonormal basis of the row space of all its samples.
@@ -150,7 +145,6 @@ class RowSpace(Spectrum):
 
     rows: Array
     singular_values: Array
-    parameters: int
     rank_tolerance: float
 
     @property
@@ -166,4 +160,4 @@ class RowSpace(Spectrum):
 
 def space_of(surveyed: Survey, rows: Array) -> RowSpace:
     """Place some or all samples, projected, in the row space of a surveyed regressor."""
-    return RowSpace(rows, surveyed.singular_values, surveyed.parameters, surveyed.rank_tolerance)
+    return RowSpace(rows, surveyed.singular_values, surveyed.rank_tolerance)

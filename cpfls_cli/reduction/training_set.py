@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -12,15 +13,113 @@ from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.reduction.criteria import (
     EXCHANGE_INFORMATION,
     TIE_TOLERANCE,
+    Criterion,
     TriangularFactor,
     first_best,
     make_criterion,
 )
 from cpfls_cli.reduction.exchange import exchange_samples
-from cpfls_cli.reduction.selection import Selection, SelectionRun, StopReason, Subset
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
 from cpfls_cli.reduction.survey import RowSpace, Survey, space_of
+from cpfls_cli.result import about, result
 from cpfls_cli.rounding import at_most
+
+StopReason = Literal["size", "condition-number", "all-samples", "pool"]
+
+
+@result
+class Selection:
+    """The samples of flights that are worth learning from, with the history of their selection."""
+
+    FORMAT: ClassVar = "cpfls/selection"
+    SHOWN: ClassVar = ("selected", "stalled", "condition_number_random")
+
+    indices: IntArray = about("indices of the samples, in order of selection", "selected", least=0, brief=False)
+    candidates: int = about("number of samples that could be selected", default=0)
+    criterion: str = about("the rule, as in reduction.criterion")
+    rank: int = about("numerical rank of the selection")
+    rank_full: int = about("numerical rank of all candidates")
+    condition_number: float = about(
+        "largest over smallest singular value, over as many as the rank of all; infinite below that rank",
+        gaps=True,
+        least=1.0,
+    )
+    condition_number_full: float = about("of all candidates, over the kept rank", least=1.0)
+    stop_reason: StopReason = about("which limit ended the selection; the pool where it, and not all, was used up")
+    exchanges: int = about("samples that were replaced by others on the way", default=0)
+    condition_number_trace: Array = about(
+        "condition number after each sample; infinite while rank deficient",
+        "selected",
+        gaps=True,
+        least=1.0,
+        brief=False,
+    )
+    singular_value_min_trace: Array = about("smallest singular value after each", "selected", unit="SI", brief=False)
+    singular_value_max_trace: Array = about("largest singular value after each", "selected", unit="SI", brief=False)
+    rank_trace: IntArray = about("numerical rank after each", "selected", brief=False)
+    random: Array | None = about(
+        "condition numbers of random selections of equal size", "draw", gaps=True, least=1.0, brief=False, default=None
+    )
+
+    @property
+    def selected(self) -> int:
+        """Number of samples."""
+        return len(self.indices)
+
+    @property
+    def full_rank(self) -> bool:
+        """Whether the samples determine everything that all candidates determine."""
+        return self.rank == self.rank_full
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the rule ended below full rank, so that the selection must not be trained on."""
+        return not self.full_rank
+
+    @property
+    def condition_number_random(self) -> float:
+        """Condition number of random selections of equal size, the median; NaN where none was drawn."""
+        return float(np.median(self.random)) if self.random is not None and len(self.random) else float("nan")
+
+
+class SelectionRun:
+    """Samples chosen so far, from those before the criterion is asked on, their factor and the trace."""
+
+    def __init__(self, space: RowSpace, criterion: Criterion, start: IntArray) -> None:
+        self._space, self._criterion, self._start = space, criterion, start
+        self._available = np.ones(space.samples, dtype=bool)
+        self.factor = TriangularFactor(space.rank, space.rank_tolerance)
+        self.indices: list[int] = []
+        self._trace: list[tuple[float, float, float, int]] = []
+
+    def step(self) -> None:
+        """Choose one more sample."""
+        taken = len(self.indices)
+        at_start = taken < len(self._start)
+        index = int(self._start[taken]) if at_start else self._criterion.next_sample(self.factor, self._available)
+        self._available[index] = False
+        self.indices.append(index)
+        self.factor.add(self._space.rows[index])
+        factor = self.factor
+        self._trace.append((factor.condition_number, factor.singular_value_min, factor.singular_value_max, factor.rank))
+
+    def selection(self, criterion: str, reason: StopReason) -> Selection:
+        """Return the result under a criterion's name, with what ended the selection."""
+        condition_number, smallest, largest, rank = (np.array(column) for column in zip(*self._trace, strict=True))
+        return Selection(
+            criterion=criterion,
+            indices=np.array(self.indices, dtype=np.int64),
+            condition_number=self.factor.condition_number,
+            condition_number_full=self._space.condition_number,
+            rank=self.factor.rank,
+            rank_full=self._space.rank,
+            condition_number_trace=condition_number,
+            singular_value_min_trace=smallest,
+            singular_value_max_trace=largest,
+            rank_trace=rank.astype(np.int64),
+            stop_reason=reason,
+        )
+
 
 # The Gram matrix of a residual squares its singular values, so below this fraction they are rounding.
 _SMALLEST_RATIO = 1e-7
@@ -192,12 +291,11 @@ def _exchanged(
 ) -> Selection:
     """Exchange samples, then put those chosen in the D-optimal order, and stop there as for every criterion."""
     information = EXCHANGE_INFORMATION[settings.criterion]
-    exchanged = exchange_samples(space, start, limit, information, settings.condition_number)
-    chosen = replace(space, rows=space.rows[exchanged.indices])
+    indices, exchanges = exchange_samples(space, start, limit, information, settings.condition_number)
+    chosen = replace(space, rows=space.rows[indices])
     run = SelectionRun(chosen, make_criterion(chosen, "D"), starting_samples(chosen, "D", chosen.samples))
     selection = _one_by_one(run, chosen.samples, settings, progress)
-    indices = exchanged.indices[selection.indices]
-    return replace(selection, indices=indices, exchanges=exchanged.exchanges)
+    return replace(selection, indices=indices[selection.indices], exchanges=exchanges)
 
 
 def _one_by_one(run: SelectionRun, limit: int, settings: ReductionSettings, progress: Progress | None) -> Selection:
@@ -337,7 +435,9 @@ def pool_of(surveyed: Survey, wanted: IntArray) -> Pool:
     return Pool(wanted, space_of(surveyed, np.concatenate(blocks)))
 
 
-def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Generator) -> tuple[Subset, ...]:
+def random_streamed(
+    surveyed: Survey, size: int, count: int, rng: np.random.Generator
+) -> list[tuple[IntArray, TriangularFactor]]:
     """Choose samples at random, each with the same probability and none twice, several times over, in one pass.
 
     Parameters
@@ -345,7 +445,12 @@ def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Gene
     size : int
         Samples to choose.
     count : int
-        Subsets to choose, independently of each other.
+        Choices, independent of each other.
+
+    Returns
+    -------
+    list of (array of int, TriangularFactor)
+        Of each choice its samples, and the factor of their rows, which has its rank and condition number.
 
     Raises
     ------
@@ -354,42 +459,16 @@ def random_streamed(surveyed: Survey, size: int, count: int, rng: np.random.Gene
     """
     if not 1 <= size <= surveyed.samples:
         raise ComputationError(f"size = {size}: expected 1 to {surveyed.samples}, the number of samples")
-    draws = [_Draw(rng.choice(surveyed.samples, size, replace=False), surveyed) for _ in range(count)]
-    first = 0
+    chosen = [rng.choice(surveyed.samples, size, replace=False) for _ in range(count)]
+    factors = [TriangularFactor(surveyed.rank, surveyed.rank_tolerance) for _ in chosen]
+    ascending, waiting, first = [np.sort(own) for own in chosen], [list[Array]() for _ in chosen], 0
     for rows in surveyed.projected():
-        for draw in draws:
-            draw.take(first, rows)
+        last = first + len(rows) == surveyed.samples
+        for own, factor, held in zip(ascending, factors, waiting, strict=True):
+            begin, end = np.searchsorted(own, [first, first + len(rows)])
+            held.append(rows[own[begin:end] - first])
+            if last or sum(map(len, held)) >= _WAITING_SAMPLES:
+                factor.add(np.concatenate(held).reshape(-1, surveyed.rank))
+                held.clear()
         first += len(rows)
-    return tuple(draw.subset() for draw in draws)
-
-
-class _Draw:
-    """One random choice, its rows taken from passing blocks."""
-
-    def __init__(self, indices: IntArray, surveyed: Survey) -> None:
-        self._indices, self._surveyed = indices, surveyed
-        self._ascending = np.sort(indices)
-        self._factor = TriangularFactor(surveyed.rank, surveyed.rank_tolerance)
-        self._waiting: list[Array] = []
-
-    def take(self, first: int, rows: Array) -> None:
-        begin, end = np.searchsorted(self._ascending, [first, first + len(rows)])
-        self._waiting.append(rows[self._ascending[begin:end] - first])
-        if sum(map(len, self._waiting)) >= _WAITING_SAMPLES:
-            self._add_waiting()
-
-    def _add_waiting(self) -> None:
-        self._factor.add(np.concatenate(self._waiting).reshape(-1, self._surveyed.rank))
-        self._waiting = []
-
-    def subset(self) -> Subset:
-        if self._waiting:
-            self._add_waiting()
-        return Subset(
-            criterion="random",
-            indices=self._indices,
-            condition_number=self._factor.condition_number,
-            condition_number_full=self._surveyed.condition_number,
-            rank=self._factor.rank,
-            rank_full=self._surveyed.rank,
-        )
+    return list(zip(chosen, factors, strict=True))

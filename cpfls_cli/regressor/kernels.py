@@ -365,7 +365,9 @@ def _add_products(
                     dense_cross[d, at] += products[rows + len(column) + d, b]
 
 
-_GRAM, _ERRORS, _COMBINED, _MOVED = range(4)
+GRAM, ERRORS, COMBINED, MOVED = range(4)
+"""What `add_sums` adds up."""
+NOTHING = np.zeros((0, 0))
 
 
 @compiled
@@ -406,7 +408,7 @@ def _add_up(
         _fire(program.partitions, breakpoints, at, space.interval)
         _sum_up(program.sums, 0, program.once, factors, rows, at)
         _columns(program.columns, program.partitions, space.interval, column)
-        if what == _MOVED:
+        if what == MOVED:
             _move_all(program, breakpoints, coefficients[0], factors, rows, space.interval, at, space.places)
         for k in range(len(coefficients)):
             for a in range(active):
@@ -414,11 +416,11 @@ def _add_up(
             for d in range(dense_weights.shape[1]):
                 space.weights[active + d] = dense_weights[k, d]
             _combine(wide, space.beside, space.weights, len(space.places) - len(coefficients) + k)
-        if what == _ERRORS:
+        if what == ERRORS:
             _add_errors(wide, square[own], cross[own])
             continue
         _multiply(wide, space.crossed, space.products)
-        if what == _GRAM:
+        if what == GRAM:
             _add_gram(space.products, column, square[own], cross[own])
         else:
             _add_products(space.products, space.places, column, square[own], cross[own], dense_cross)
@@ -461,7 +463,7 @@ def _by_label(runs: Runs, label: IntArray) -> Runs:
     return runs._replace(stop=np.union1d(runs.stop, changes)) if len(changes) else runs
 
 
-def _sums(
+def add_sums(
     what: int,
     table: Table,
     breakpoints: Array,
@@ -472,11 +474,22 @@ def _sums(
     models: tuple[Array, Array],
     sums: tuple[Array, Array, Array],
 ) -> None:
-    """Make what `_add_up` works in, and let it."""
+    """Add up sums over the samples of a chunk, by its runs and labels, in place.
+
+    `scale`: factor of the rows about each axis; `models`: coefficients c, shape (models, parameters), and weights D of
+    the dense columns, shape (models, dense), of residuals ``r = dense D - Q c``, `NOTHING` twice where there are none.
+    Labels count for the first two only; the others have one, 0. `sums`, see `_add_up`:
+
+    - `GRAM`: ``Q^T Q`` and ``Q^T dense``, `NOTHING`; an entry off the diagonal means the sum with its mirror image.
+    - `ERRORS`: squares of r over samples and axes, and the largest of all, shape (labels, models, 1) each, `NOTHING`.
+    - `COMBINED`: products of the residuals of all models, upper triangle; Q^T, and the dense columns, times the first.
+    - `MOVED`: products of ``[M, r]`` with itself, upper triangle, whose entries mean the sum with their mirror images,
+      and of Q and of the dense columns with it, where -M are the derivatives of the one r by the inner breakpoints.
+    """
     program, dense = table.program, (len(chunk.motion) - MOTION) // 3
     active, partitions = len(program.columns), len(program.partitions)
     # The derivatives and the residual, or the residual of each model.
-    places = np.arange(len(models[0])) if what != _MOVED else np.full(2 * partitions - 1, table.breakpoints)
+    places = np.arange(len(models[0])) if what != MOVED else np.full(2 * partitions - 1, table.breakpoints)
     width, beside = fours(active + dense), fours(len(places))
     space = _Space(
         lines=np.empty((program.moved + 3 * (width + beside)) * min(_BATCH, runs.longest)),
@@ -484,99 +497,15 @@ def _sums(
         interval=np.zeros(partitions, np.int64),
         places=places,
         weights=np.zeros(width),
-        products=np.empty((width + beside, width if what == _GRAM else beside)),
+        products=np.empty((width + beside, width if what == GRAM else beside)),
         beside=beside,
-        crossed=2 if what == _COMBINED else beside,
+        crossed=2 if what == COMBINED else beside,
     )
     factors = np.array([1.0, -0.5, -1.0, *scale])
-    labelled = runs if what in (_COMBINED, _MOVED) else _by_label(runs, label)
-    _add_up(what, program, breakpoints, chunk, labelled, label, factors, models, sums, space)
+    own = np.zeros_like(label) if what in (COMBINED, MOVED) else label
+    _add_up(what, program, breakpoints, chunk, _by_label(runs, own), own, factors, models, sums, space)
 
 
 def fours(count: int) -> int:
     """Round up to a multiple of four."""
     return (count + 3) // 4 * 4
-
-
-_NOTHING = np.zeros((0, 0))
-
-
-def add_gram(
-    table: Table,
-    breakpoints: Array,
-    chunk: Chunk,
-    runs: Runs,
-    scale: Array,
-    label: IntArray,
-    gram: Array,
-    moment: Array,
-) -> None:
-    """Add ``Q^T Q`` and ``Q^T dense`` of the samples of a chunk, by its runs, to sums by label, in place.
-
-    `scale`: factor of the rows about each axis; `gram`: an entry off the diagonal is meant as the sum of it and its
-    mirror image.
-    """
-    _sums(_GRAM, table, breakpoints, chunk, runs, scale, label, (_NOTHING, _NOTHING), (gram, moment, _NOTHING))
-
-
-def add_errors(
-    table: Table,
-    breakpoints: Array,
-    chunk: Chunk,
-    runs: Runs,
-    scale: Array,
-    label: IntArray,
-    coefficients: Array,
-    dense_weights: Array,
-    square: Array,
-    largest: Array,
-) -> None:
-    """Add the squared residuals ``dense D - Q c`` of a chunk by label, and find the largest of all, in place.
-
-    Of several models, with coefficients c and dense weights D; over samples and axes. The rest as of `add_gram`.
-    """
-    models, sums = (coefficients, dense_weights), (square[:, :, None], largest[:, :, None], _NOTHING)
-    _sums(_ERRORS, table, breakpoints, chunk, runs, scale, label, models, sums)
-
-
-def add_combined(
-    table: Table,
-    breakpoints: Array,
-    chunk: Chunk,
-    runs: Runs,
-    scale: Array,
-    coefficients: Array,
-    dense_weights: Array,
-    square: Array,
-    back: Array,
-    dense_back: Array,
-) -> None:
-    """Add the products of residuals ``Y = dense D - Q c`` of a chunk for several c, in place.
-
-    `square`: ``Y^T Y``, upper triangle; `back`, `dense_back`: Q^T, and the dense columns, times the first residual. The
-    rest as of `add_gram`.
-    """
-    label, models = np.zeros(chunk.inputs.shape[1], np.int64), (coefficients, dense_weights)
-    _sums(_COMBINED, table, breakpoints, chunk, runs, scale, label, models, (square[None], back[None], dense_back))
-
-
-def add_moved(
-    table: Table,
-    breakpoints: Array,
-    chunk: Chunk,
-    runs: Runs,
-    scale: Array,
-    coefficients: Array,
-    dense_weights: Array,
-    cross: Array,
-    dense_cross: Array,
-    square: Array,
-) -> None:
-    """Add the products of the residual and of its derivatives by the inner breakpoints at fixed coefficients, in place.
-
-    The residual is ``r = dense D - Q c`` and its derivatives are ``-M``; all products are with ``[M, r]``: `cross` is
-    ``Q^T [M, r]``, `dense_cross` ``dense^T [M, r]``, `square` ``[M, r]^T [M, r]``, upper triangle, whose entries mean
-    the sum with their mirror images. The rest as of `add_gram`.
-    """
-    label, models = np.zeros(chunk.inputs.shape[1], np.int64), (coefficients[None], dense_weights[None])
-    _sums(_MOVED, table, breakpoints, chunk, runs, scale, label, models, (square[None], cross[None], dense_cross))

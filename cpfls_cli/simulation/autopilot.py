@@ -14,7 +14,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.autopilots.law import Controller, Law, attitude_error
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.simulation.actuators import Mixer
+from cpfls_cli.simulation.plant import Mixer
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, VEHICLE_STATES, rotation_rows
 from cpfls_cli.vehicle.settings import VehicleSettings

@@ -14,7 +14,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.simulation.actuators import Actuators, actuators, mixer
 from cpfls_cli.simulation.autopilot import (
     Asked,
     Autopilot,
@@ -28,9 +27,12 @@ from cpfls_cli.simulation.autopilot import (
 from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.plant import (
     TURNING_NUMBERS,
+    Actuators,
     Plant,
+    actuators,
     flown_vehicle,
     given_turning,
+    mixer,
     turning_of,
 )
 from cpfls_cli.simulation.settings import ClosedLoopSettings

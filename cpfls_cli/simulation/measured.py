@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class MeasuredFlight:
-    """A simulated flight as logged.
+class SimulatedFlight:
+    """A simulated flight, with noise where asked.
 
     Attributes
     ----------
@@ -34,16 +34,27 @@ class MeasuredFlight:
     noise_std : mapping of str to array
         Standard deviation of the noise added to each channel, by signal.
     violations : tuple of RotorViolation
-        What the autopilot asked for and no rotor can do; the commands were clipped there.
+        What was asked for and no rotor can do: the exact vehicle has no `rotor_speed` there, and of an autopilot the
+        commands were clipped.
+    """
+
+    signals: Mapping[str, Array]
+    noise_std: Mapping[str, Array]
+    violations: tuple[RotorViolation, ...]
+
+
+@dataclass(frozen=True)
+class MeasuredFlight(SimulatedFlight):
+    """A flight simulated in closed loop as logged.
+
+    Attributes
+    ----------
     effects : SimulatedEffects
         What was simulated: the truth that a diagnosis has to find.
     position_error, attitude_error : array, shape (time, 3), m and rad
         Simulated minus planned, without the noise.
     """
 
-    signals: Mapping[str, Array]
-    noise_std: Mapping[str, Array]
-    violations: tuple[RotorViolation, ...]
     effects: SimulatedEffects
     position_error: Array
     attitude_error: Array

@@ -37,12 +37,6 @@ class SimulatedEffect:
         return physical if self.effect.physical is None else self.effect.physical.linear(physical)
 
     @property
-    def acting(self) -> Array:
-        """The same with 0 for coefficients that act on the log alone."""
-        of_log = [coefficient.of_log for coefficient in self.effect.coefficients]
-        return np.where(of_log, 0.0, self.linear) if any(of_log) else self.linear
-
-    @property
     def shape(self) -> Mapping[str, float]:
         """Values of the shapes."""
         return {shape.name: self.values[shape.name] for shape in self.effect.shapes}

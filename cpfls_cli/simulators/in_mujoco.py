@@ -14,7 +14,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback.course import Course
-from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.model import Rotor, SimulatorModel
 

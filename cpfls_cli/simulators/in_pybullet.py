@@ -20,7 +20,7 @@ from defusedxml.ElementTree import fromstring
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.playback.course import Course
-from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.flight import State
 from cpfls_cli.rotations import euler_angles
 from cpfls_cli.simulators.model import SimulatorModel
 from cpfls_cli.simulators.urdf import GRAVITY

@@ -19,7 +19,7 @@ from cpfls_cli.errors import install_command, visible
 from cpfls_cli.gap.before_after import PlaybackChange, PlayedPair, errors_by_horizon
 from cpfls_cli.playback.course import Course, Flies
 from cpfls_cli.playback.errors import MODEL, STATED
-from cpfls_cli.playback.motion import State
+from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.player import Runs
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.formats import as_stated

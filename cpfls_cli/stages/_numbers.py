@@ -14,7 +14,7 @@ from cpfls_cli.flights.training import log_formats
 from cpfls_cli.pages.gap_words import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import cautions_of
 from cpfls_cli.report.content import Command
-from cpfls_cli.trajectory.consistency import coarsest_excited
+from cpfls_cli.trajectory.settings import coarsest_excited
 from cpfls_cli.words import joined
 
 J = TypeVar("J", bound=Job)

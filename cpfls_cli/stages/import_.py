@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from cpfls_cli.arguments import LogArgument
 from cpfls_cli.consistency.findings import contradictions
-from cpfls_cli.consistency.numbers import beyond_belief
+from cpfls_cli.consistency.rotors import beyond_belief
 from cpfls_cli.flights.flight import Imported
 from cpfls_cli.flights.recordings import check_flight, doubts_on_voltage, imported, read_import
 from cpfls_cli.stage import Run, stage

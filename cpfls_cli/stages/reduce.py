@@ -14,9 +14,8 @@ from cpfls_cli.arguments import TrainingArgument
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.errors import ComputationError, ConfigError, about
 from cpfls_cli.flights.training import flight_roles, split_training, uniform_regressor
-from cpfls_cli.reduction.selection import Selection
 from cpfls_cli.reduction.survey import survey
-from cpfls_cli.reduction.training_set import check_streamed, random_streamed, reduce_streamed
+from cpfls_cli.reduction.training_set import Selection, check_streamed, random_streamed, reduce_streamed
 from cpfls_cli.report.canvas import BASELINE, Drawn, legend_above, style_of
 from cpfls_cli.report.content import count
 from cpfls_cli.rounding import at_most, less
@@ -73,7 +72,7 @@ def reduce(run: Run, flights: TrainingArgument) -> Selection | None:
         found,
         indices=split.training_indices[found.indices],
         candidates=surveyed.samples,
-        random=np.array([draw.condition_number for draw in draws]),
+        random=np.array([factor.condition_number for _, factor in draws]),
     )
 
 

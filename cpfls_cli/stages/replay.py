@@ -18,11 +18,10 @@ from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
 from cpfls_cli.pages.playback import ERRORS, WORDS, draw_errors, errors_height
 from cpfls_cli.pages.trust import seen_warnings
-from cpfls_cli.playback.along_flights import Playback, playback
 from cpfls_cli.playback.errors import NOTHING_MOVES, STATED
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.history import Observer, past_of
-from cpfls_cli.playback.replay import Played, ReplayOptions, ReplayWindows
+from cpfls_cli.playback.replay import USUAL, Playback, Played, ReplayWindows, playback
 from cpfls_cli.playback.replay import replay as played_back
 from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.report.canvas import HELD, Drawn, legend_over, line, plain_ticks, stacked, style_of
@@ -128,24 +127,24 @@ def replay(
 ) -> Playback | None:
     """Play a model back along flights and sum up its errors by horizon."""
     between: Any = None if hold is None else hold.value
-    options = ReplayOptions(horizon or 0.5, every, between, history or 0.0)
+    horizon, history = horizon or 0.5, history or 0.0
     roles = numbered_roles("flight", flights)
     inputs = run.take(({} if is_vehicle(model) else {"model": model}) | roles)
     with_numbers(run, "replay", model, whole=not is_vehicle(model))
     to_play = read_model(model, run.study, forecast=True)
-    observer = read_observer(model, options.history_s) if options.history_s > 0 else None
-    given = flights_to_play(flights, run.study, options.hold)
+    observer = read_observer(model, history) if history > 0 else None
+    given = flights_to_play(flights, run.study, between)
     fading_s = read_fading(model)
     pairs = [replace(played(to_play, flight, run.study.vehicle), fading_s=fading_s) for flight in given]
-    samples = _samples(options.horizon_s, given[0], "--horizon")
+    samples = _samples(horizon, given[0], "--horizon")
     if observer is not None:
         _samples(observer.past_s, given[0], "--history")
         pairs = [replace(pair, model=replace(pair.model, observer=observer)) for pair in pairs]
     for each in pairs:
-        each.flight.starts(samples, options.every)
+        each.flight.starts(samples, every)
     if run.dry_run:
         return None
-    found = played_back(pairs, samples, options.every, lambda done: run.progress(done, 1))
+    found = played_back(pairs, samples, every, lambda done: run.progress(done, 1))
     warnings = [
         *seen_twice(inputs[role] for role in roles),
         *seen_warnings(model.name, learned_by(model), known_by(roles, inputs)),
@@ -154,7 +153,8 @@ def replay(
         *([] if observer is None else _past_notes(observer, pairs, found.windows)),
         *model_notes(model.name, to_play, given),
     ]
-    return playback(model.name, options, given, pairs, found, warnings)
+    asked = {"played": model.name, "asked_s": horizon, "every": every, "hold": between or USUAL, "history_s": history}
+    return playback(asked, given, pairs, found, warnings)
 
 
 def _past_notes(observer: Observer, pairs: Iterable[Played], windows: ReplayWindows) -> Iterator[str]:

@@ -16,7 +16,7 @@ from cpfls_cli.export.text import identifier
 from cpfls_cli.flights.models import any_model, found_vehicle, is_found, is_model
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.playback.gusts import GUST_AXES
-from cpfls_cli.playback.spread import Estimates, drawn, require_sure
+from cpfls_cli.playback.spread import drawn, require_sure
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
 from cpfls_cli.stage import Run, stage
@@ -65,14 +65,14 @@ def spread(
     found = found_vehicle(model)
     sheet = sheet_of(model, identifier(model.stem), source, force=run.force, anyway=anyway)
     with about(model, InputError, ComputationError):
-        require_sure(known := Estimates.of(found))
+        require_sure(found)
         if run.dry_run:
             run.say(f"{count} vehicles would be drawn from {model}")
             return None
         samples = Samples(
             sheet=sheet,
-            spread=drawn(sheet.model, known, count, np.random.default_rng(seed)),
-            numbers={number.name: number for number in known.numbers},
+            spread=drawn(sheet.model, found, count, np.random.default_rng(seed)),
+            numbers={number.name: number for number in found.numbers},
             seed=seed,
             not_determined=found.not_determined,
             held=found.guessed,

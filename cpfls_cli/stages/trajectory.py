@@ -25,16 +25,14 @@ from cpfls_cli.logs.csv_log import read_csv, row_lines
 from cpfls_cli.pages.gap import effect_title
 from cpfls_cli.report.canvas import BASELINE, Drawn, line, picture_of, stacked, style_of
 from cpfls_cli.report.content import plain
-from cpfls_cli.simulation.inverse import Flyability, flyability, single_axis_torque
-from cpfls_cli.simulation.room_left import RoomLeft, room_left
+from cpfls_cli.simulation.inverse import Flyability, RoomLeft, flyability, room_left, single_axis_torque
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import demand_sentences, draw_attitude, draw_rotation
 from cpfls_cli.stages._mission import mission_of, mission_paths, mission_texts, mission_words
-from cpfls_cli.trajectory.consistency import check_waypoints
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rotation, plan, repeated
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
-from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
+from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings, check_waypoints
 from cpfls_cli.words import did_you_mean, joined
 
 if TYPE_CHECKING:

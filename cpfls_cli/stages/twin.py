@@ -26,7 +26,7 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import VEHICLE
-from cpfls_cli.playback.spread import Estimates, drawn
+from cpfls_cli.playback.spread import drawn
 from cpfls_cli.report.canvas import (
     BASELINE,
     HELD,
@@ -249,7 +249,7 @@ def _possible(path: Path, model: VehicleModel | None, study: Study) -> tuple[Seq
     if not is_found(path):
         return [model] * DRAWS, None
     with about(path, InputError, ComputationError):
-        spread = drawn(model, Estimates.of(found_vehicle(path)), DRAWS, generator(study, "spread"))
+        spread = drawn(model, found_vehicle(path), DRAWS, generator(study, "spread"))
     return spread.models, spread.lack
 
 

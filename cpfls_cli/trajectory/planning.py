@@ -12,11 +12,16 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.trajectory.consistency import check_duration, check_peaks, check_samples, check_waypoints
 from cpfls_cli.trajectory.legs import Leg, MoveInSpace, evaluate_legs, move_in_space, samples_of_legs
 from cpfls_cli.trajectory.profile import BaseProfile, Peaks, covering
 from cpfls_cli.trajectory.rotation import RotationMotion, RotationPath
-from cpfls_cli.trajectory.settings import TrajectorySettings
+from cpfls_cli.trajectory.settings import (
+    TrajectorySettings,
+    check_duration,
+    check_peaks,
+    check_samples,
+    check_waypoints,
+)
 
 # Fraction of gravity below which the direction of the thrust is rounding error.
 _NO_THRUST = 1e-9

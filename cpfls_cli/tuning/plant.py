@@ -286,7 +286,8 @@ class Noise:
     def lines(self) -> tuple[Line, ...]:
         """Lines of 10 dB and more over the floor, the strongest first."""
         total = self.density.sum(axis=1)
-        floor = np.array([np.median(total[self._near(hz)]) for hz in self.frequency])
+        near = (np.abs(self.frequency - hz) <= max(_FLOOR_SHARE * hz, 5.0) for hz in self.frequency)
+        floor = np.array([np.median(total[each]) for each in near])
         above = 10 * np.log10(np.maximum(total, 1e-30) / np.maximum(floor, 1e-30))
         inside = (self.frequency > _LOWEST_LINE_HZ) & (self.frequency < _FROM_THE_END * self.highest_hz)
         peaks = np.flatnonzero(inside[1:-1] & (above[1:-1] >= np.maximum(above[:-2], above[2:]))) + 1
@@ -297,9 +298,6 @@ class Noise:
             if above[peak] >= _LINE_DB and apart and len(found) < _MOST_LINES:
                 found.append(Line(hz=hz, width_hz=self._width(above, int(peak)), above_db=float(above[peak])))
         return tuple(found)
-
-    def _near(self, hz: float) -> Array:
-        return np.asarray(np.abs(self.frequency - hz) <= max(_FLOOR_SHARE * hz, 5.0))
 
     def _width(self, above: Array, peak: int) -> float:
         """Give the width of a line where it is half its decibels above the floor, at least a tenth of it, Hz."""

@@ -5,8 +5,8 @@
 # (an exact flight at 100 Hz, 0.5 s).
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -28,44 +28,12 @@ NOTHING_MOVES = "nothing-moves"
 """The predictor by which attitude and body rate stay what they were at the start of a window."""
 
 
-@dataclass(frozen=True)
-class MeasuredWindows:
-    """Measured motion and torque in windows of equal length, shape (window, sample, ...).
-
-    Time in s, rotation from body to world, body rate in rad/s and torque in N m in the body frame. `beyond`: whether
-    the pitch of the flight is beyond +-90 degrees; in no window it crosses them.
-    """
-
-    time: Array
-    rotation: Array
-    body_rate: Array
-    torque: Array
-    beyond: BoolArray
-
-    @property
-    def start(self) -> RotationState:
-        """Measured state at the start of the windows."""
-        return RotationState(self.rotation[:, 0], self.body_rate[:, 0])
-
-
-@dataclass(frozen=True)
-class WindowPlan:
-    """First samples of windows, ascending, and the samples behind each.
-
-    Those are fewer than asked for where no window of that length fits; `period` is the usual time between samples, s.
-    """
-
-    start: IntArray
-    horizon: int
-    period: float
-
-
-def plan_windows(source: TorqueSource, horizon: int, most: int) -> WindowPlan:
+def _windows(source: TorqueSource, time: Array, horizon: int, most: int) -> tuple[IntArray, int]:
     """Select windows, evenly spread over all that hold no pause and no pitch within 17 degrees of the vertical.
 
-    The horizon is halved until a window fits; none where not even a single step does.
+    Gives their first samples, ascending, and the samples behind each: the horizon is halved until a window fits; none
+    where not even a single step does.
     """
-    time = sample_times(source)
     stretch = stretch_numbers(time)
     steep = np.concatenate([np.abs(np.cos(data.motion.attitude[:, 1])) < CLEAR for data in source.chunks()])
     starts = _starts(stretch, steep, horizon)
@@ -73,24 +41,7 @@ def plan_windows(source: TorqueSource, horizon: int, most: int) -> WindowPlan:
         horizon //= 2
         starts = _starts(stretch, steep, horizon)
     spread = np.unique(np.linspace(0, len(starts) - 1, min(most, len(starts))).round().astype(np.int64))
-    return WindowPlan(starts[spread], horizon, sample_period(time))
-
-
-def read_windows(source: TorqueSource, plan: WindowPlan) -> Iterator[MeasuredWindows]:
-    """Read the measurements in the windows, some windows at a time."""
-    at_once = max(_SAMPLES_AT_ONCE // (plan.horizon + 1), 1)
-    for first in range(0, len(plan.start), at_once):
-        wanted = plan.start[first : first + at_once, None] + np.arange(plan.horizon + 1)
-        samples, index = np.unique(wanted, return_inverse=True)
-        data, index = gathered(source, samples), index.reshape(wanted.shape)
-        attitude, rate = data.motion.attitude, data.motion.rate
-        yield MeasuredWindows(
-            time=data.time[index],
-            rotation=rotations.rotation_matrix(attitude)[index],
-            body_rate=rotations.body_rate(attitude, rate)[index],
-            torque=rotations.body_torque(attitude, data.torque)[index],
-            beyond=np.cos(attitude[index[:, 0], 1]) < 0,
-        )
+    return starts[spread], horizon
 
 
 def _starts(stretch: IntArray, steep: BoolArray, horizon: int) -> IntArray:
@@ -157,59 +108,42 @@ def replay_steps(
     without a pause; NaN without any. Measure and predictor `NOTHING_MOVES`: Busetto, Cereda, Forgione and others,
     Nonlinear System Identification Nano-drone Benchmark, arXiv:2512.14450 (2025).
     """
-    plan, names = plan_windows(source, horizon_samples, windows), (*predictors, NOTHING_MOVES)
-    sums = [_SquaredErrors(plan.horizon) for _ in names]
-    for measured in read_windows(source, plan):
-        runs = [
-            _run(predictor, replace(measured, torque=measured.torque - missing.get(name, 0.0)))
-            for name, predictor in predictors.items()
+    names, time = (*predictors, NOTHING_MOVES), sample_times(source)
+    starts, horizon = _windows(source, time, horizon_samples, windows)
+    squares, lost = np.zeros((2, len(names), horizon, 3)), np.zeros((len(names), horizon), dtype=np.int64)
+    by_window, at_once = np.zeros((len(names), len(starts), 3)), max(_SAMPLES_AT_ONCE // (horizon + 1), 1)
+    for some in (slice(first, first + at_once) for first in range(0, len(starts), at_once)):
+        wanted = starts[some, None] + np.arange(horizon + 1)
+        samples, index = np.unique(wanted, return_inverse=True)
+        data, index = gathered(source, samples), index.reshape(wanted.shape)
+        attitude, euler_rate = data.motion.attitude, data.motion.rate
+        rotation = rotations.rotation_matrix(attitude)[index]
+        rate = rotations.body_rate(attitude, euler_rate)[index]
+        torque = rotations.body_torque(attitude, data.torque)[index]
+        begin, beyond = RotationState(rotation[:, 0], rate[:, 0]), np.cos(attitude[index[:, 0], 1]) < 0
+        fastest = float(np.max(np.linalg.norm(rate, axis=2), initial=0.0))
+        runs: list[Iterable[RotationState]] = [
+            free_runs(turning_law(own), begin, beyond, data.time[index], torque - missing.get(name, 0.0), fastest)
+            for name, own in predictors.items()
         ]
-        for errors, run in zip(sums, [*runs, _still(measured)], strict=True):
-            errors.add(measured, run)
+        for row, run in enumerate([*runs, [begin] * horizon]):
+            for step, state in enumerate(run):
+                apart = state.body_rate - rate[:, step + 1]
+                turned = rotation_vectors(rotation[:, step + 1], state.rotation)
+                lost[row, step] += np.sum(np.isnan(apart).any(axis=1))
+                squares[:, row, step] += np.sum(turned**2, axis=0), np.sum(apart**2, axis=0)
+                by_window[row, some] += apart**2
+    whole = (lost == 0) & (len(starts) > 0)
+    off_attitude, off_rate = np.where(whole[..., None], np.sqrt(squares / max(len(starts), 1)), np.nan)
     return StepErrors(
         part=part,
         model=names,
-        samples=np.arange(1, plan.horizon + 1),
-        horizon=plan.period * np.arange(1, plan.horizon + 1, dtype=float),
-        windows=len(plan.start),
-        attitude=np.array([errors.root_mean_square(errors.attitude) for errors in sums]),
-        body_rate=np.array([errors.root_mean_square(errors.body_rate) for errors in sums]),
-        lost=np.array([errors.lost for errors in sums]),
-        window_error=np.array([np.concatenate([np.zeros((0, 3)), *errors.window_error]) for errors in sums]),
-        start=plan.start,
+        samples=np.arange(1, horizon + 1),
+        horizon=sample_period(time) * np.arange(1, horizon + 1, dtype=float),
+        windows=len(starts),
+        attitude=off_attitude,
+        body_rate=off_rate,
+        lost=lost,
+        window_error=by_window / horizon,
+        start=starts,
     )
-
-
-class _SquaredErrors:
-    """Squared errors by horizon and axis, and by window."""
-
-    def __init__(self, horizon: int) -> None:
-        self.attitude, self.body_rate = np.zeros((horizon, 3)), np.zeros((horizon, 3))
-        self.lost = np.zeros(horizon, dtype=np.int64)
-        self.windows = 0
-        self.window_error: list[Array] = []
-
-    def add(self, measured: MeasuredWindows, run: Iterator[RotationState]) -> None:
-        by_window = np.zeros((len(measured.time), 3))
-        for step, state in enumerate(run):
-            turned = rotation_vectors(measured.rotation[:, step + 1], state.rotation)
-            rate = state.body_rate - measured.body_rate[:, step + 1]
-            self.lost[step] += np.sum(np.isnan(rate).any(axis=1))
-            self.attitude[step] += np.sum(turned**2, axis=0)
-            self.body_rate[step] += np.sum(rate**2, axis=0)
-            by_window += rate**2
-        self.windows += len(by_window)
-        self.window_error.append(by_window / len(self.lost))
-
-    def root_mean_square(self, squares: Array) -> Array:
-        whole = (self.lost == 0) & (self.windows > 0)
-        return np.where(whole[:, None], np.sqrt(squares / max(self.windows, 1)), np.nan)
-
-
-def _still(measured: MeasuredWindows) -> Iterator[RotationState]:
-    return iter([measured.start] * (measured.time.shape[1] - 1))
-
-
-def _run(predictor: Predictor, windows: MeasuredWindows) -> Iterator[RotationState]:
-    fastest = float(np.max(np.linalg.norm(windows.body_rate, axis=2), initial=0.0))
-    return free_runs(turning_law(predictor), windows.start, windows.beyond, windows.time, windows.torque, fastest)

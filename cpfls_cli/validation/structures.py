@@ -76,16 +76,11 @@ def _changed(structure: StructureSettings) -> Iterator[StructureSettings]:
     for settings in (structure, seesaw):
         for input_map in _INPUT_MAPS:
             yield replace(settings, input_map=input_map)
+    # One rule where consequents were not harmonic, for harmonics need no more.
+    one_rule: dict[str, Any] = {"structure": "cpfls", "products": "tensor", "membership_functions": 1}
+    harmonic = {"consequents": "harmonic", **(one_rule if structure.consequents == "seesaw" else {})}
     for order in _HARMONIC_ORDERS:
-        yield replace(structure, **_harmonic(structure, order))
-
-
-def _harmonic(structure: StructureSettings, order: int) -> dict[str, Any]:
-    """List the settings of harmonic consequents; one rule where they were not, for harmonics need no more."""
-    changed: dict[str, Any] = {"consequents": "harmonic", "harmonic_order": order}
-    if structure.consequents == "seesaw":
-        changed |= {"structure": "cpfls", "products": "tensor", "membership_functions": 1}
-    return changed
+        yield replace(structure, harmonic_order=order, **harmonic)
 
 
 def _identity(settings: StructureSettings) -> tuple[Any, ...]:

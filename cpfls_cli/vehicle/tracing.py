@@ -63,6 +63,11 @@ class Graph:
         return made
 
 
+def _operators(name: str) -> tuple[Callable[[Symbol, Value], Value], Callable[[Symbol, Value], Value]]:
+    """Make the operator of a symbol with another number, and that of another number with a symbol."""
+    return lambda self, other: self.by(name, self, other), lambda self, other: self.by(name, other, self)
+
+
 class Symbol:
     """A number that is not known yet."""
 
@@ -76,7 +81,8 @@ class Symbol:
         """Record an operation on numbers."""
         return self.graph.node(name, *(self.graph.known(x).place for x in arguments))
 
-    def _by(self, name: str, a: Value, b: Value) -> Value:
+    def by(self, name: str, a: Value, b: Value) -> Value:
+        """Record an operation of which it is one side, unless another number makes it nothing."""
         other = a if b is self else b
         if isinstance(other, (Each, Tangent)):
             return NotImplemented
@@ -89,35 +95,12 @@ class Symbol:
                 return 0
         return self.made(name, a, b)
 
-    def __add__(self, other: Value) -> Value:
-        return self._by("+", self, other)
-
-    def __radd__(self, other: Value) -> Value:
-        return self._by("+", other, self)
-
-    def __sub__(self, other: Value) -> Value:
-        return self._by("-", self, other)
-
-    def __rsub__(self, other: Value) -> Value:
-        return self._by("-", other, self)
-
-    def __mul__(self, other: Value) -> Value:
-        return self._by("*", self, other)
-
-    def __rmul__(self, other: Value) -> Value:
-        return self._by("*", other, self)
-
-    def __truediv__(self, other: Value) -> Value:
-        return self._by("/", self, other)
-
-    def __rtruediv__(self, other: Value) -> Value:
-        return self._by("/", other, self)
-
-    def __lt__(self, other: Value) -> Value:
-        return self._by("<", self, other)
-
-    def __gt__(self, other: Value) -> Value:
-        return self._by(">", self, other)
+    __add__, __radd__ = _operators("+")
+    __sub__, __rsub__ = _operators("-")
+    __mul__, __rmul__ = _operators("*")
+    __truediv__, __rtruediv__ = _operators("/")
+    __lt__, _ = _operators("<")
+    __gt__, _ = _operators(">")
 
     def __neg__(self) -> Symbol:
         return self.made("negative", self)

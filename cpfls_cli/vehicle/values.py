@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from math import prod
+from operator import gt, lt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -300,56 +301,6 @@ class Polynomial:
     __radd__, __rmul__, __rtruediv__, __lt__, __gt__ = __add__, __mul__, _refused, _refused, _refused
 
 
-class Each:
-    """One value for each rotor."""
-
-    __slots__ = ("values",)
-    __array_ufunc__ = None
-
-    def __init__(self, values: Iterable[Value]) -> None:
-        self.values = tuple(values)
-
-    def __iter__(self) -> Iterator[Value]:
-        return iter(self.values)
-
-    def by(self, other: Value, operation: Callable[[Value, Value], Value]) -> Each:
-        """Apply an operation with one value, or with that of each rotor."""
-        others = other.values if isinstance(other, Each) else (other,) * len(self.values)
-        return Each(map(operation, self.values, others))
-
-    def __add__(self, other: Value) -> Each:
-        return self.by(other, plus)
-
-    def __sub__(self, other: Value) -> Each:
-        return self.by(other, minus)
-
-    def __rsub__(self, other: Value) -> Each:
-        return self.by(other, lambda a, b: minus(b, a))
-
-    def __mul__(self, other: Value) -> Each:
-        return self.by(other, times)
-
-    def __truediv__(self, other: Value) -> Each:
-        return self.by(other, lambda a, b: 0 if zero(a) else a / b)
-
-    def __rtruediv__(self, other: Value) -> Each:
-        return self.by(other, lambda a, b: 0 if zero(b) else b / a)
-
-    def __neg__(self) -> Each:
-        return Each(minus(0, x) for x in self.values)
-
-    def __pow__(self, power: float) -> Each:
-        return Each(0 if zero(x) else x**power for x in self.values)
-
-    def __gt__(self, other: Value) -> Each:
-        return self.by(other, lambda a, b: a > b)
-
-    def __lt__(self, other: Value) -> Each:
-        return self.by(other, lambda a, b: a < b)
-
-    __radd__, __rmul__ = __add__, __mul__
-
-
 def zero(x: Value) -> bool:
     """Say whether a number is always 0."""
     return isinstance(x, (int, float)) and x == 0
@@ -372,6 +323,41 @@ def minus(a: Value, b: Value) -> Value:
 def times(a: Value, b: Value) -> Value:
     """Multiply two numbers."""
     return 0 if zero(a) or zero(b) else a * b
+
+
+def _of_each(operation: Callable[[Value, Value], Value]) -> Callable[[Each, Value], Each]:
+    return lambda self, other: self.by(other, operation)
+
+
+class Each:
+    """One value for each rotor."""
+
+    __slots__ = ("values",)
+    __array_ufunc__ = None
+
+    def __init__(self, values: Iterable[Value]) -> None:
+        self.values = tuple(values)
+
+    def __iter__(self) -> Iterator[Value]:
+        return iter(self.values)
+
+    def by(self, other: Value, operation: Callable[[Value, Value], Value]) -> Each:
+        """Apply an operation with one value, or with that of each rotor."""
+        others = other.values if isinstance(other, Each) else (other,) * len(self.values)
+        return Each(map(operation, self.values, others))
+
+    def __neg__(self) -> Each:
+        return Each(minus(0, x) for x in self.values)
+
+    def __pow__(self, power: float) -> Each:
+        return Each(0 if zero(x) else x**power for x in self.values)
+
+    __add__ = __radd__ = _of_each(plus)
+    __sub__, __rsub__ = _of_each(minus), _of_each(lambda a, b: minus(b, a))
+    __mul__ = __rmul__ = _of_each(times)
+    __truediv__ = _of_each(lambda a, b: 0 if zero(a) else a / b)
+    __rtruediv__ = _of_each(lambda a, b: 0 if zero(b) else b / a)
+    __gt__, __lt__ = _of_each(gt), _of_each(lt)
 
 
 def add(*vectors: Iterable[Value]) -> Vector:

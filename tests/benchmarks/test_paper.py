@@ -37,7 +37,7 @@ from benchmarks.paper.search_claims import (
 )
 from cpfls_cli.config.study import ReportSettings
 from cpfls_cli.flights.flight import Noise, Simulated
-from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.reduction.training_set import Selection
 from cpfls_cli.report.source import Source
 from cpfls_cli.result import plain
 from cpfls_cli.store import Origin

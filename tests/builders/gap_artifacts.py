@@ -6,7 +6,7 @@ import numpy as np
 
 from cpfls_cli import page
 from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement, Extended
-from cpfls_cli.consistency.audit import Audit
+from cpfls_cli.consistency.check import Audit
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import ChannelGaps, ResidualWindows

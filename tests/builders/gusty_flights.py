@@ -10,8 +10,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 from cpfls_cli.compiling import compiled, part
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
-from cpfls_cli.playback.motion import MeasuredMotion
+from cpfls_cli.playback.flight import LoggedFlight, MeasuredMotion, PlaybackFlight
 from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.rotations import attitude_acceleration, attitude_rate, euler_angles, generalised_torque
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.motion import MeasuredMotion
+from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 VEHICLE = VehicleSettings(inertia_kg_m2=(0.6, 0.7, 1.2, 0.02, -0.03, 0.01))

@@ -15,8 +15,8 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.export.registry import FORMS
 from cpfls_cli.flights.models import found_vehicle
 from cpfls_cli.pages.gap_words import WHAT_TO_FLY
-from cpfls_cli.playback.along_flights import Playback
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.replay import Playback
 from cpfls_cli.result import plain
 from cpfls_cli.store import read
 from tests.builders.artifacts import edited, read_result, with_fields

@@ -16,8 +16,8 @@ from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.export.registry import FORMS
+from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.model import ModelEffect
-from cpfls_cli.playback.motion import State
 from cpfls_cli.playback.player import one_step
 from tests.builders.artifacts import edited
 from tests.builders.autopilots import STUDY, crossed, found_vehicle

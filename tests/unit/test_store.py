@@ -10,7 +10,7 @@ import pytest
 
 from cpfls_cli import store
 from cpfls_cli.artifacts.gate import InputFile
-from cpfls_cli.consistency.audit import Audit
+from cpfls_cli.consistency.check import Audit
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.files import seal_of

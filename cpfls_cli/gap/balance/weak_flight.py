@@ -12,7 +12,7 @@ from scipy.linalg import toeplitz
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.consistency.audit import Audit
+from cpfls_cli.consistency.check import Audit
 from cpfls_cli.dynamics import InertiaModel, inertia_tensor, momentum_form
 from cpfls_cli.effects.catalogue.parameter_error import shown, with_thrust
 from cpfls_cli.effects.effect import Columns, Effect

@@ -18,8 +18,8 @@ from cpfls_cli.gap.next_flight.separation import Evidence, Question, SizedEffect
 from cpfls_cli.gap.residual.air import Air
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.simulation.inverse import squared_speeds
 from cpfls_cli.simulation.measured import measure, noisy
-from cpfls_cli.simulation.room_left import squared_speeds
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.vehicle.settings import VehicleSettings

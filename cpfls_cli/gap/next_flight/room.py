@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.rounding import ROUNDING, at_most
-from cpfls_cli.simulation.room_left import ROTOR_SHARE, hover_squared, rotor_load
+from cpfls_cli.simulation.inverse import ROTOR_SHARE, hover_squared, rotor_load
 from cpfls_cli.trajectory.planning import Trajectory, along, sample_times
 from cpfls_cli.trajectory.profile import LIMIT_NAMES
 from cpfls_cli.trajectory.settings import TrajectorySettings

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
-from cpfls_cli.playback.along_flights import Playback
+from cpfls_cli.playback.replay import Playback
 from cpfls_cli.result import plain
 from tests.builders.artifacts import edited
 from tests.builders.studies import VEHICLE

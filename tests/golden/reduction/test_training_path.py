@@ -14,7 +14,7 @@ from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, unifor
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings
-from tests.builders.reductions import random_selections, row_space
+from tests.builders.reductions import beginning, random_selections, row_space
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def worst_prediction(regressor, indices):
 @pytest.mark.parametrize(("criterion", "expected"), [("sigma_min", 3311), ("A", 3555), ("D", 5282)])
 def test_eighty_samples(reduced, criterion, expected):
     # The first of more where they are chosen below, too.
-    selection = reduced("sigma_min", 685).beginning(80) if criterion == "sigma_min" else reduced(criterion, 80)
+    selection = beginning(reduced("sigma_min", 685), 80) if criterion == "sigma_min" else reduced(criterion, 80)
     assert selection.condition_number_full == pytest.approx(5153.34, rel=1e-3)
     assert np.flatnonzero(selection.rank_trace == 113)[0] + 1 == 38
     assert selection.condition_number == pytest.approx(expected, rel=0.05)
@@ -52,7 +52,7 @@ def test_eighty_samples(reduced, criterion, expected):
 
 def test_random_samples_are_worse_conditioned_than_chosen_ones(regressor):
     draws = random_selections(regressor, 80, 5, np.random.default_rng(0))
-    assert min(draw.condition_number for draw in draws) > 6000
+    assert min(factor.condition_number for _, factor in draws) > 6000
 
 
 def test_an_eighth_of_the_samples_is_better_conditioned_than_all_of_them(regressor, reduced):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.consistency.audit import audit
+from cpfls_cli.consistency.check import audit
 from cpfls_cli.consistency.sensors import sensors_of
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight, faulty_flights

@@ -11,7 +11,7 @@ from scipy.signal import butter, filtfilt, lfilter
 
 from cpfls_cli import store
 from cpfls_cli.artifacts.diagnosis import Extended
-from cpfls_cli.consistency.audit import audit
+from cpfls_cli.consistency.check import audit
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.weak_form.windows import Recording, windows

@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from scipy.signal import butter, sosfiltfilt
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.simulation.room_left import room_left
+from cpfls_cli.simulation.inverse import room_left
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.legs import MoveOutcome, plan_moves
 from cpfls_cli.trajectory.planning import plan, repeated

@@ -31,7 +31,7 @@ from cpfls_cli.errors import ComputationError, InputError, OutputError
 from cpfls_cli.flights.models import any_model, found_vehicle, holds_forecast, is_found, is_model, modelled, read_model
 from cpfls_cli.playback.constants import ExplainedBand, UsedInstruments
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.reduction.selection import Selection
+from cpfls_cli.reduction.training_set import Selection
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.result import plain
 from tests.builders.results import drawn

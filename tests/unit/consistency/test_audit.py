@@ -8,11 +8,10 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from cpfls_cli.consistency.audit import audit
-from cpfls_cli.consistency.axes import gyroscope_apart
-from cpfls_cli.consistency.check import check
+from cpfls_cli.consistency.channels import gyroscope_apart
+from cpfls_cli.consistency.check import audit, check
 from cpfls_cli.consistency.gyroscope import GyroFit
-from cpfls_cli.consistency.numbers import impossible
+from cpfls_cli.consistency.rotors import impossible
 from cpfls_cli.consistency.sensors import CheckedFault, findings, sensors_of
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals, stretch_of

@@ -7,8 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from cpfls_cli.consistency.check import check
-from cpfls_cli.consistency.numbers import beyond_belief
-from cpfls_cli.consistency.rotors import beyond_propellers
+from cpfls_cli.consistency.rotors import beyond_belief, beyond_propellers
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.closed_loop_flights import COARSE, PERIOD, VEHICLE, flown, signals_of

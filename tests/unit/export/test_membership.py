@@ -18,8 +18,8 @@ from cpfls_cli.export.json_form import HOW_TO_EVALUATE_INERTIA
 from cpfls_cli.export.points import wrench_along
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.fuzzy.basis import Z_FUNCTION, memberships, z_function
+from cpfls_cli.playback.flight import MeasuredMotion
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.remainder import Remainder, learned_wrench
 from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from cpfls_cli.regressor import kernels
@@ -97,7 +97,8 @@ def test_the_compiled_loops(case):
     axes = np.tile(np.eye(3), (samples, 1, 1))
     chunk = kernels.Chunk(kernels.motion_lines(case.motion.rate, case.motion.acceleration, axes), inputs)
     runs = kernels.runs_of(table, breakpoints, inputs)
-    kernels.add_gram(table, breakpoints, chunk, runs, np.ones(3), np.arange(samples), gram, rows)
+    none, sums = (kernels.NOTHING,) * 2, (gram, rows, kernels.NOTHING)
+    kernels.add_sums(kernels.GRAM, table, breakpoints, chunk, runs, np.ones(3), np.arange(samples), none, sums)
     assert_same(rows.swapaxes(1, 2) @ case.model.coefficients, case)
     dense = Regressor(structure, case.motion, case.model.ranges).matrix(case.model.partitions)
     np.testing.assert_allclose(rows.swapaxes(1, 2), dense, rtol=0, atol=1e-12 * np.max(np.abs(dense)))

@@ -11,8 +11,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.mission import Home, qgc_plan, system_id_lines, waypoint_lines
 from cpfls_cli.flights.path import Excited, PlannedPath
 from cpfls_cli.gap.next_flight.room import harmonic_trajectory, random_path
-from cpfls_cli.simulation.inverse import flyability
-from cpfls_cli.simulation.room_left import room_left
+from cpfls_cli.simulation.inverse import flyability, room_left
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import plan, repeated
 from cpfls_cli.trajectory.settings import ExciteSettings, TrajectorySettings, WaypointSettings

@@ -11,8 +11,8 @@ from cpfls_cli.dynamics import turning_law
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.points import part_sizes, parts_along, reference_points, reference_run, wrench_along
 from cpfls_cli.export.source import c_source
+from cpfls_cli.playback.flight import MeasuredMotion, State
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import MeasuredMotion, State
 from cpfls_cli.playback.player import one_step
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs

@@ -29,7 +29,7 @@ from cpfls_cli.gap.next_flight.separation import (
 from cpfls_cli.gap.residual.air import Air
 from cpfls_cli.gap.settings import NOISE, RARE, GapSettings
 from cpfls_cli.playback.gusts import Gusts
-from cpfls_cli.simulation.room_left import squared_speeds
+from cpfls_cli.simulation.inverse import squared_speeds
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.profile import LimitSettings
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings

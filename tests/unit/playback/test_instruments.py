@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
 from cpfls_cli.playback.instruments import instruments
-from cpfls_cli.playback.motion import MeasuredMotion
 
 PERIOD = 0.01
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects import scales
+from cpfls_cli.playback.flight import MeasuredMotion, State
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.motion import MeasuredMotion, State
 from cpfls_cli.playback.player import one_step
 from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from cpfls_cli.rotations import rotation_matrix

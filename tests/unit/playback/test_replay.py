@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.dynamics import inertia_matrix, inertia_matrix_gradient, turning_law
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback.errors import MODEL, NOTHING_MOVES, RATE_FADES, RATE_STAYS, STATED
+from cpfls_cli.playback.flight import MeasuredMotion
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.playback.motion import MeasuredMotion
 from cpfls_cli.playback.player import free_runs, player_of, rotation_vectors
 from cpfls_cli.playback.replay import SIGNALS, Played, fading, replay, where_better
 from cpfls_cli.regressor.regressor import InertiaValues

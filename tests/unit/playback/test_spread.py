@@ -11,7 +11,7 @@ from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.remainder import Airflow
-from cpfls_cli.playback.spread import POSITIVE, Estimates, drawn, model_at
+from cpfls_cli.playback.spread import POSITIVE, drawn, model_at
 from cpfls_cli.playback.vehicle import FoundNumber
 from tests.builders.playback_flights import STATED, pushed, truth
 from tests.builders.spread_vehicles import found_record, inertia_and_mass
@@ -27,7 +27,7 @@ def flat(model):
 
 
 def spread_of(record, count=COUNT, seed=1):
-    return drawn(record.model, Estimates.of(record), count, np.random.default_rng(seed))
+    return drawn(record.model, record, count, np.random.default_rng(seed))
 
 
 def test_numbers_lie_in_their_intervals_as_often_as_they_should_and_go_together():
@@ -35,7 +35,7 @@ def test_numbers_lie_in_their_intervals_as_often_as_they_should_and_go_together(
     assert not spread.rejected
     assert spread.tried == 2000
     values = dict(zip(spread.names, spread.values.T, strict=True))
-    known = {number.name: number for number in Estimates.of(found_record(flat(truth()))).numbers}
+    known = {number.name: number for number in found_record(flat(truth())).numbers}
     for name, own in values.items():
         inside = np.mean((known[name].low <= own) & (own <= known[name].high))
         assert 0.93 < inside < 0.97
@@ -136,7 +136,7 @@ def test_what_the_loop_leaves_open_is_between_its_bounds():
     numbers = (each._replace(low=each.value * 0.8, high=each.value * 1.25) for each in record.numbers)
     narrow = replace(record, numbers=tuple(numbers))
     spread = spread_of(narrow)
-    begun = {number.name: number.value for number in Estimates.of(narrow).numbers}
+    begun = {number.name: number.value for number in narrow.numbers}
     shares = {name: own / begun[name] for name, own in zip(spread.names, spread.values.T, strict=True)}
     # Yaw torque and inertia are known by their ratio: what the loop did is in the moment of inertia alone.
     assert np.median(shares["drag_factor"]) == pytest.approx(1.0, abs=0.02)

@@ -10,9 +10,8 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback import structure
-from cpfls_cli.playback.fit import WindowSet, fit
+from cpfls_cli.playback.fit import WindowSet, fit, parts_of
 from cpfls_cli.playback.flight import motion_at
-from cpfls_cli.playback.judging import parts_of
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, tried_blocks

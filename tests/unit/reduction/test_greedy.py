@@ -318,11 +318,11 @@ def test_printed_rule_stalls_and_says_so():
 def test_random_selection_has_the_condition_number_of_its_rows():
     Q = deficient(rank=16)
     subsets = random_selections(Q, 25, 4, np.random.default_rng(0))
-    assert len({tuple(subset.indices) for subset in subsets}) == 4
-    for subset in subsets:
-        assert len(set(subset.indices.tolist())) == 25
-        assert subset.condition_number == pytest.approx(kept_condition_number(Q, subset.indices, 16), rel=1e-9)
-    (few,) = random_selections(Q, 3, 1, np.random.default_rng(0))
+    assert len({tuple(indices) for indices, _ in subsets}) == 4
+    for indices, factor in subsets:
+        assert len(set(indices.tolist())) == 25
+        assert factor.condition_number == pytest.approx(kept_condition_number(Q, indices, 16), rel=1e-9)
+    ((_, few),) = random_selections(Q, 3, 1, np.random.default_rng(0))
     assert (few.rank, few.full_rank, few.condition_number) == (9, False, np.inf)
 
 

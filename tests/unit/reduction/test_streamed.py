@@ -14,7 +14,7 @@ from cpfls_cli.reduction.training_set import (
     random_streamed,
     reduce_streamed,
 )
-from tests.builders.reductions import random_selections, reduce
+from tests.builders.reductions import beginning, random_selections, reduce, row_space
 
 
 def regressor(samples=3000, columns=7, seed=0):
@@ -35,7 +35,7 @@ def test_survey_knows_the_row_space_of_all_samples(size):
     Q = regressor()
     values = np.linalg.svd(Q.reshape(-1, 7), compute_uv=False)
     surveyed = survey(chunked(Q, size), 1e-10)
-    assert (surveyed.samples, surveyed.parameters, surveyed.rank) == (3000, 7, 7)
+    assert (surveyed.samples, len(surveyed.basis), surveyed.rank) == (3000, 7, 7)
     assert np.allclose(surveyed.singular_values, values, rtol=1e-12)
     assert np.array_equal(surveyed.singular_values, survey(lambda: [Q], 1e-10).singular_values)
 
@@ -58,19 +58,19 @@ def test_a_smaller_size_is_the_beginning_of_a_larger_one(criterion, pool):
         ReductionSettings(criterion=criterion, size=30, pool=pool),
     )
     larger = reduce_streamed(surveyed, settings, generator())
-    smaller, beginning = reduce_streamed(surveyed, replace(settings, size=12), generator()), larger.beginning(12)
-    assert beginning is not None
+    smaller, begun = reduce_streamed(surveyed, replace(settings, size=12), generator()), beginning(larger, 12)
+    assert begun is not None
     for field in fields(smaller):
-        assert np.array_equal(getattr(beginning, field.name), getattr(smaller, field.name)), field.name
-    assert larger.beginning(31) is None
-    assert larger.beginning(2) is None
+        assert np.array_equal(getattr(begun, field.name), getattr(smaller, field.name)), field.name
+    assert beginning(larger, 31) is None
+    assert beginning(larger, 2) is None
 
 
 @pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "even"])
 def test_what_knows_its_size_from_the_start_has_no_beginning(criterion):
     settings = ReductionSettings(criterion=criterion, size=30)
     selection = reduce_streamed(survey(chunked(regressor(), 700), 1e-10), settings, generator())
-    assert selection.beginning(12) is None
+    assert beginning(selection, 12) is None
 
 
 @pytest.mark.parametrize("size", [100, 999, 3000])
@@ -143,11 +143,12 @@ def test_a_target_that_the_pool_does_not_reach_says_so():
 @pytest.mark.parametrize("size", [40, 2900])
 def test_random_choices_are_those_made_in_memory(size):
     Q = regressor()
-    streamed = random_streamed(survey(chunked(Q, 333), 1e-10), size, 3, generator())
-    for one, other in zip(streamed, random_selections(Q, size, 3, generator()), strict=True):
-        assert one.indices.tolist() == other.indices.tolist()
-        assert one.condition_number == pytest.approx(np.linalg.cond(Q[one.indices].reshape(-1, 7)), rel=1e-9)
-        assert one.condition_number_full == other.condition_number_full
+    surveyed = survey(chunked(Q, 333), 1e-10)
+    assert surveyed.condition_number == row_space(Q, 1e-10).condition_number
+    streamed = random_streamed(surveyed, size, 3, generator())
+    for (one, factor), (other, _) in zip(streamed, random_selections(Q, size, 3, generator()), strict=True):
+        assert one.tolist() == other.tolist()
+        assert factor.condition_number == pytest.approx(np.linalg.cond(Q[one].reshape(-1, 7)), rel=1e-9)
 
 
 def test_broken_chunks_are_located_in_the_whole():

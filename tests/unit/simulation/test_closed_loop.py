@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from cpfls_cli import rotations
-from cpfls_cli.consistency import audit as audit_module
+from cpfls_cli.consistency import check as audit_module
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.hooks import Actuation, FaultFit, ReadingError, SensorLog, SensorTest
 from cpfls_cli.effects.registry import CATALOGUE
@@ -18,9 +18,9 @@ from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.simulation import model
 from cpfls_cli.simulation.closed_loop import Setpoints, fly_setpoints
+from cpfls_cli.simulation.inverse import ROTOR_SHARE, hover_squared, room_left, rotor_load, squared_speeds, tilt_of
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.model import SimulatedEffects
-from cpfls_cli.simulation.room_left import ROTOR_SHARE, hover_squared, room_left, rotor_load, squared_speeds, tilt_of
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import plan

@@ -13,11 +13,10 @@ from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.simulation.actuators import actuators, mixer
 from cpfls_cli.simulation.autopilot import upright
 from cpfls_cli.simulation.closed_loop import Loop, clock_of, flown
 from cpfls_cli.simulation.model import in_the_loop, simulated_effects, with_effects
-from cpfls_cli.simulation.plant import Plant, flown_vehicle
+from cpfls_cli.simulation.plant import Plant, actuators, flown_vehicle, mixer
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.vehicle.rotors import body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
