@@ -307,7 +307,10 @@ def told(*words):
     return opened(*words)
 
 h5py.File = told
+from cpfls_cli.artifacts import patience
 from cpfls_cli.cli.main import run
+
+patience._GRACE_S = 0.5
 
 run()
 """
@@ -331,7 +334,7 @@ def test_a_signal_ends_it_too(looping):
     words = [sys.executable, "-c", TOLD, "check", str(looping)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "reads\n"
-        time.sleep(0.5)
+        time.sleep(0.2)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
     assert process.returncode == -signal.SIGKILL

@@ -11,7 +11,7 @@ simulation:
   mode: closed-loop
   noise: {attitude: 0.003, body_rate: 0.005, velocity: 0.05, acceleration: 0.1, rotor_speed: 1.0}
   closed_loop: {integration_rate_hz: 200.0, effects: {com_offset: [0.002, -0.0015]}}
-gap: {shifts: 39, ignore: [payload]}
+gap: {shifts: 39, horizon_s: 0.1, ignore: [payload]}
 """
 
 

@@ -37,16 +37,6 @@ def fly(form, model, horizon=8, windows=3, **changed):
     return made, verified(form, made, flight, (flight, player_of(model, flight)), horizon, windows)
 
 
-@pytest.fixture
-def brief(monkeypatch):
-    """Fly what is not held for five samples, where a test asks what it is called and how large its torque is."""
-
-    def ends(held, flight):
-        return held.errors(flight, np.array([stretch.start for stretch in flight.stretches]), 5)[:, -1]
-
-    monkeypatch.setattr("cpfls_cli.export.holding._ends", ends)
-
-
 @pytest.mark.parametrize("hold", ["linear", "previous"])
 @pytest.mark.parametrize("form", LIBRARIES)
 def test_a_library_holds_every_part(form, hold):
