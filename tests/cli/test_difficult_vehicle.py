@@ -220,7 +220,7 @@ def test_the_example_in_mujoco_says_what_to_give_it(config, vehicle):
     assert [rotor["spin"] for rotor in found["rotors"]] == [1, -1, 1, -1]
 
 
-SEARCH = {"search_windows": 20, "folds": 2, "horizon_s": 0.2, "leave_out": left_out(TRIED)}
+SEARCH = {"search_windows": 20, "folds": 2, "leave_out": left_out(TRIED)}
 KEYS = {
     "rotors.thrust_factor_n_s2",
     "rotors.drag_factor_n_m_s2",

@@ -22,7 +22,7 @@ DAMPING = 0.012
 @pytest.fixture(scope="module")
 def config(tmp_path_factory):
     path = tmp_path_factory.mktemp("vehicle") / "quad.yaml"
-    search = {"search_windows": 20, "folds": 2, "horizon_s": 0.2, "leave_out": left_out(TRIED)}
+    search = {"search_windows": 20, "folds": 2, "leave_out": left_out(TRIED)}
     path.write_text(f"{CONFIG}playback: {json.dumps(search)}\ngap: {{horizon_s: 0.1}}\n")
     return path
 

@@ -160,7 +160,7 @@ def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
     assert record.rotor_speed is None
     late = {"motor_lag.time_constant_s": 0.02, "command_delay.delay_s": 0.013}
     assert late.items() <= record.effects.items()
-    errors = sums(commanded, flown, "--hold", "linear")
+    errors = sums(commanded, flown, "--hold", "linear", "--horizon", "0.5")
     assert (errors["model"] < 0.005 * np.minimum(errors["nothing-moves"], errors["rate-stays"])).all()
 
 
