@@ -57,6 +57,13 @@ def drawn():
 
 
 @pytest.fixture
+def sketched():
+    """Make the pictures of pages, which nobody looks at."""
+    with command_line.drawn(shown=False):
+        yield
+
+
+@pytest.fixture
 def brief(monkeypatch):
     """Fly what is not held for five samples, where a test asks what it is called and how large its torque is."""
 

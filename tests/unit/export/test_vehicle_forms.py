@@ -169,7 +169,7 @@ def test_acting_rotors_are_those_of_the_library(response, tmp_path):
 def test_steps_along_a_flight_are_those_of_playback(exports, name, form):
     """Each sample of a flight is taken one step further; what the library predicts lies there."""
     model = MODELS[name]
-    run = reference_run(model, np.random.default_rng(8), "linear", 200)
+    run = reference_run(model, np.random.default_rng(8), "linear", 80)
     exported, rotor = exports(name, form), exports(name, form).rotor_terms(run.speed, PERIOD, "linear")
     path = run.states
     _, moved = exported.motion(State(*(part[:-1] for part in path)), rotor[:-1], PERIOD)
