@@ -46,7 +46,7 @@ def diagnosed(cpfls, folder, name, *training):
 
 @pytest.mark.decides
 def test_the_next_flight_settles_what_the_first_left_open(cpfls, folder):
-    planned = run(cpfls, folder, "trajectory", "--for", folder / "open.h5", *searched(6, 10), "-o", folder / "next.h5")
+    planned = run(cpfls, folder, "trajectory", "--for", folder / "open.h5", *searched(3, 5), "-o", folder / "next.h5")
     rows = [row for row in planned["questions"] if {row["true"], row["rival"]} == {"com_offset", "torque_bias"}]
     assert len(rows) == 2
     for row in rows:
