@@ -364,8 +364,7 @@ def _bilinear(shape, factors):
 
 
 _cross = _bilinear(
-    (3, 3, 3),
-    [(0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0)],
+    (3, 3, 3), [(0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0)]
 )
 # Derivatives of quaternions x, y, z, w of bodies that turn.
 _turning = _bilinear(

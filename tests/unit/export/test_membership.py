@@ -173,10 +173,7 @@ def formula(words):
     return lambda u: eval(left if u < 0.5 else right, {"u": u})
 
 
-WORDS = {
-    "json": next(line for line in HOW_TO_EVALUATE_INERTIA if Z_FUNCTION in line),
-    "method.md": METHOD.read_text(),
-}
+WORDS = {"json": next(line for line in HOW_TO_EVALUATE_INERTIA if Z_FUNCTION in line), "method.md": METHOD.read_text()}
 
 
 @pytest.mark.parametrize("page", WORDS)

@@ -30,8 +30,7 @@ OPEN = validate(
     "here",
 ).vehicle
 SETTINGS = PlaybackSettings(
-    search_windows=60,
-    leave_out=tuple(block for block in blocks_of(STATED) if block not in TRUE_BLOCKS),
+    search_windows=60, leave_out=tuple(block for block in blocks_of(STATED) if block not in TRUE_BLOCKS)
 )
 
 
@@ -84,9 +83,7 @@ def noise_alone(force, lift):
 
 
 @pytest.mark.parametrize(
-    "sensed",
-    [noise_alone, lambda force, _: -force, lambda force, _: 0.0 * force],
-    ids=["noise", "upside down", "dead"],
+    "sensed", [noise_alone, lambda force, _: -force, lambda force, _: 0.0 * force], ids=["noise", "upside down", "dead"]
 )
 def test_an_accelerometer_that_feels_no_lift_leaves_the_thrust_factor_open(sensed):
     flights = [
