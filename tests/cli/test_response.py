@@ -33,7 +33,12 @@ import:
 MASS, INERTIA = 6.0, np.array([0.6, 0.6, 1.2])
 ARM, THRUST, DRAG = 0.3, 121.5e-6, 2.7e-6
 ALLOCATION = np.array(
-    [[THRUST] * 4, [0, -ARM * THRUST, 0, ARM * THRUST], [-ARM * THRUST, 0, ARM * THRUST, 0], [-DRAG, DRAG, -DRAG, DRAG]]
+    [
+        [THRUST] * 4,
+        [0, -ARM * THRUST, 0, ARM * THRUST],
+        [-ARM * THRUST, 0, ARM * THRUST, 0],
+        [-DRAG, DRAG, -DRAG, DRAG],
+    ]
 )
 LAG_S = 0.04
 

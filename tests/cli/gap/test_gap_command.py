@@ -180,18 +180,8 @@ def test_playback_of_measured_rotors_gets_better(found):
 
 
 def test_playback_is_that_of_the_command_for_it(cpfls, gap_config, found, shifted, tmp_path):
-    asked = (
-        "replay",
-        gap_config,
-        found.folder / "extended.h5",
-        shifted[2],
-        "--horizon",
-        "0.1",
-        "--every",
-        "5",
-        "--json",
-    )
-    played = json.loads(cpfls(*asked, "-o", tmp_path / "replay.h5").stdout)["models"]
+    asked = ("replay", gap_config, found.folder / "extended.h5", shifted[2], "--horizon", "0.1", "--every", "5")
+    played = cpfls.told(*asked, "-o", tmp_path / "replay.h5")["models"]
     ours = found.summary["playback"]["models"]
     for name, again in {"after": "model", "before": "stated", "rate-fades": "rate-fades"}.items():
         # The extended model is refitted once more.
