@@ -42,9 +42,10 @@ settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session", autouse=True)
-def undrawn():
-    """Leave the pictures of pages away, but where a test looks at them."""
-    with command_line.undrawn():
+def spare():
+    """Leave pictures away, but where a test looks at them, and draw no more trends than a rate of 0.005 asks for."""
+    with command_line.undrawn(), pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr("cpfls_cli.changes.trend._DRAWS", 300)
         yield
 
 
@@ -53,3 +54,20 @@ def drawn():
     """Draw the pictures of pages."""
     with command_line.drawn():
         yield
+
+
+@pytest.fixture
+def sketched():
+    """Make the pictures of pages, which nobody looks at."""
+    with command_line.drawn(shown=False):
+        yield
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Fly what is not held for five samples, where a test asks what it is called and how large its torque is."""
+
+    def ends(held, flight):
+        return held.errors(flight, flight.starts(5, len(flight)), 5)[:, -1]
+
+    monkeypatch.setattr("cpfls_cli.export.holding._ends", ends)

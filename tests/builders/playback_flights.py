@@ -16,9 +16,11 @@ from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.remainder import Remainder
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.windows import Rotors
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.tracing import Graph, array_symbols, traced_in_two
 from tests.builders.recorded_flights import columns_of_log
 
 KINDS = ("multisine", "steps", "figure")
@@ -229,7 +231,12 @@ class _Fleet:
         self.marks = np.unique(np.append(even, np.round(model.response.delay_s / period % 1.0, 9)))
         self.ends = np.cumsum([3, 3, 4, 3, self.rotors])
         self.weight = np.array([0.0, 0.0, model.vehicle.gravity_m_s2])
-        self.ones, self.still = np.ones((self.flights, 1)), np.zeros((self.flights, self.rotors))
+        self.still = np.zeros((self.flights, self.rotors))
+        # As the model gives it to the last bit, its operations recorded once: in a quarter of the time.
+        graph = Graph()
+        air, rate, rotors = (graph.inputs(name, 3, by_rotor=name == "rotors") for name in ("air", "rate", "rotors"))
+        wrench = replace(model.flown, functions=array_symbols(self.rotors)).wrench(air, rate, Rotors(*rotors))
+        self.wrench = traced_in_two(graph, ("none", ()), {"air": air, "rate": rate, "rotors": rotors}, wrench)(())
 
     def flown(self, samples):
         """Give states and logged rotor speeds at all samples, time first."""
@@ -287,20 +294,19 @@ class _Fleet:
             change = (driven - acting) / response.lag_s
         else:
             acting = driven
-        squared = acting**2
-        rotor = np.concatenate([self.ones, acting, squared, change, slow - squared], axis=1)
         rotation = _rotation(quaternion)
         air = (velocity[:, None] @ rotation)[:, 0]
-        wrench = self.model.wrench(air, rate, rotor)
-        angular = (wrench[:, :3] - _cross(rate, rate @ body.inertia)) @ body.inverse
-        acceleration = (rotation @ wrench[:, 3:, None])[:, :, 0] / body.mass - self.weight
+        wrench = self.wrench(tuple(air.T), tuple(rate.T), (acting.T, change.T, slow.T))
+        torque, force = (np.stack(np.broadcast_arrays(*each), axis=1) for each in wrench)
+        angular = (torque - _cross(rate, rate @ body.inertia)) @ body.inverse
+        acceleration = (rotation @ force[:, :, None])[:, :, 0] / body.mass - self.weight
         parts = [
             velocity,
             acceleration,
             _turning(quaternion, rate),
             angular,
             change,
-            (squared - slow) / response.slow_s,
+            (acting**2 - slow) / response.slow_s,
         ]
         return np.concatenate(parts, axis=1)
 
@@ -357,8 +363,7 @@ def _bilinear(shape, factors):
 
 
 _cross = _bilinear(
-    (3, 3, 3),
-    [(0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0)],
+    (3, 3, 3), [(0, 1, 2, 1.0), (0, 2, 1, -1.0), (1, 2, 0, 1.0), (1, 0, 2, -1.0), (2, 0, 1, 1.0), (2, 1, 0, -1.0)]
 )
 # Derivatives of quaternions x, y, z, w of bodies that turn.
 _turning = _bilinear(

@@ -21,7 +21,7 @@ import:
   lowpass_hz: null
   spike_deviations: null
 # No log here holds a velocity, without which a wind could not be ruled out.
-gap: {shifts: 39, ignore: [wind]}
+gap: {shifts: 39, horizon_s: 0.1, ignore: [wind]}
 """
 
 # Squared speeds to thrust, roll, pitch and yaw of the '+' layout, written out.

@@ -126,11 +126,7 @@ def test_selection_given_as_flight_to_identify(refuse, pipeline, study, tmp_path
             f"was written by cpfls {__version__}, whose files this version does not read; make it again with `cpfls "
             "identify`",
         ),
-        (
-            "format",
-            "cpfls/other",
-            "is a cpfls/other; this command needs a cpfls/identified (made by `cpfls identify`)",
-        ),
+        ("format", "cpfls/other", "is a cpfls/other; this command needs a cpfls/identified (made by `cpfls identify`)"),
         ("seed", "x", "damaged: invalid literal for int() with base 10: 'x'"),
     ],
 )
@@ -307,7 +303,10 @@ def told(*words):
     return opened(*words)
 
 h5py.File = told
+from cpfls_cli.artifacts import patience
 from cpfls_cli.cli.main import run
+
+patience._GRACE_S = 0.5
 
 run()
 """
@@ -331,7 +330,7 @@ def test_a_signal_ends_it_too(looping):
     words = [sys.executable, "-c", TOLD, "check", str(looping)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "reads\n"
-        time.sleep(0.5)
+        time.sleep(0.2)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
     assert process.returncode == -signal.SIGKILL
@@ -386,12 +385,7 @@ def test_a_log_where_no_config_was_given(refuse, log, tmp_path):
 
 @pytest.mark.parametrize("command", ["info", "check", "export", "report", "replay", "identify", "reduce"])
 def test_a_log_where_an_artifact_belongs(refuse, log, study, tmp_path, command):
-    given = {
-        "info": (log,),
-        "check": (log,),
-        "export": (log,),
-        "replay": (study, log, log),
-    }
+    given = {"info": (log,), "check": (log,), "export": (log,), "replay": (study, log, log)}
     output = () if command in ("info", "check") else ("-o", tmp_path / "out.json")
     (line,) = refuse(command, *given.get(command, (study, log)), *output)
     assert line == f"{log}: is a log, and this takes what cpfls made: cpfls import CONFIG {log} -o log.h5"

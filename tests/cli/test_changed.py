@@ -277,17 +277,8 @@ def test_logs_of_different_vehicles_are_refused_before_their_columns(cpfls, stat
     (stated / "scaled.ulg").write_bytes(ulog_of_flight(TODAY, MOT_POLE_COUNT=14, PWM_MIN=1100))
     assert "of different vehicles (MOT_POLE_COUNT 14 and 12)" in compared(cpfls, stated, "lacks.ulg").stderr
     since = [stated / f"before{seed}.ulg" for seed in (4, 1, 2, 3)]
-    words = (
-        "changed",
-        stated / "study.yaml",
-        stated / "scaled.ulg",
-        "--since",
-        *since,
-        "-o",
-        stated / "out",
-        "--force",
-    )
-    said = " ".join(cpfls(*words).stdout.split())
+    words = ("changed", stated / "study.yaml", stated / "scaled.ulg", "--since", *since)
+    said = " ".join(cpfls(*words, "-o", stated / "out", "--force").stdout.split())
     assert not said.startswith("NO CHANGE:")
     assert (
         "The logs of before4.ulg and scaled.ulg state PWM_MIN 1000 and 1100: make sure that it is one vehicle." in said

@@ -91,7 +91,7 @@ def config_of(folder):
         "seed": 1,
         "vehicle": vehicle,
         "import": {"time_column": "t", "signals": signals, "torque_source": "rotor-speed"},
-        "gap": {"shifts": 39},
+        "gap": {"horizon_s": 0.1},
         "identification": LEARNED,
         "playback": {**SEARCH, "leave_out": left_out(TRIED)},
     }

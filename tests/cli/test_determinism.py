@@ -169,7 +169,7 @@ def log(ends):
 def test_commands_run_where_names_of_this_system_are_absent(folder):
     (folder / "tiny.yaml").write_text(TINY + VEHICLE, encoding="utf-8")
     words = ("--selection", "selection.h5", "-o", "model.h5", "--workers", "2")
-    elsewhere(
+    said = elsewhere(
         folder,
         ("trajectory", "tiny.yaml", "-o", "path.h5"),
         ("simulate", "tiny.yaml", "path.h5", "-o", "flight ü.h5"),
@@ -177,8 +177,9 @@ def test_commands_run_where_names_of_this_system_are_absent(folder):
         ("identify", "tiny.yaml", "flight ü.h5", *words),
         ("export", "model.h5", "-o", "model.json", "--force"),
         ("check", "model.h5"),
+        ("info", "flight ü.h5"),
     )
-    assert "flight" in elsewhere(folder, ("info", "flight ü.h5"))
+    assert "simulated along path.h5" in said.rpartition("model.h5")[2]
 
 
 @pytest.mark.parametrize("ends", ["\n", "\r\n"])

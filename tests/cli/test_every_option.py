@@ -21,12 +21,8 @@ from tests.builders.vehicle_models import write_vehicle
 from tests.builders.vehicle_search import CONFIG, left_out
 
 SETTINGS = {
-    "playback": {
-        "search_windows": 20,
-        "folds": 2,
-        "leave_out": left_out(("inertia",)),
-    },
-    "gap": {"shifts": 39},
+    "playback": {"search_windows": 20, "folds": 2, "horizon_s": 0.2, "leave_out": left_out(("inertia",))},
+    "gap": {"horizon_s": 0.1},
     "import": {
         "time_column": "t",
         "signals": {

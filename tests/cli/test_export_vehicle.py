@@ -26,6 +26,7 @@ from tests.builders.flown_exports import FLYING
 from tests.builders.playback_flights import truth
 from tests.builders.vehicle_models import HEXA, QUAD, is_held, polynomial_effects, vehicle_of, whole, write_vehicle
 
+pytestmark = pytest.mark.usefixtures("brief")
 ENDINGS = {"json": "json", "c": "c"}
 
 

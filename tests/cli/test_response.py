@@ -160,7 +160,7 @@ def test_the_answer_begins_with_what_the_flights_tell(cpfls, folder, tmp_path):
     assert "Rotor speed: 45° behind what is asked at" in first
 
 
-@pytest.mark.usefixtures("drawn")
+@pytest.mark.usefixtures("sketched")
 def test_a_report_shows_bode_plots(cpfls, told, folder, tmp_path):
     _, output, _ = told(folder / "light.csv")
     page = tmp_path / "page.html"

@@ -74,7 +74,7 @@ def test_init_needs_a_log_or_a_file(refuse, folder, tmp_path):
     assert "states inertia, rotors and their factors, so leave out --inertia, --arm and the factors" in message
 
 
-@pytest.mark.usefixtures("drawn")
+@pytest.mark.usefixtures("sketched")
 def test_gap_writes_the_corrected_file_and_leaves_mine(cpfls, folder, tmp_path):
     mine = folder / "mine.sdf"
     before, output = mine.read_bytes(), tmp_path / "gap"

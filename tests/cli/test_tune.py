@@ -88,7 +88,7 @@ def test_gains_are_those_of_the_least_favourable_vehicle(gains, folder):
     assert "THR_MDL_FAC" in found.parameters
 
 
-@pytest.mark.usefixtures("drawn")
+@pytest.mark.usefixtures("sketched")
 def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
     assert gains["px4"].exit_code == 0
     cpfls.done("report", folder / "study.yaml", folder / "px4.h5", "-o", folder / "px4.html")

@@ -23,7 +23,7 @@ DAMPING = 0.012
 def config(tmp_path_factory):
     path = tmp_path_factory.mktemp("vehicle") / "quad.yaml"
     search = {"search_windows": 20, "folds": 2, "leave_out": left_out(TRIED)}
-    path.write_text(f"{CONFIG}playback: {json.dumps(search)}\n")
+    path.write_text(f"{CONFIG}playback: {json.dumps(search)}\ngap: {{horizon_s: 0.1}}\n")
     return path
 
 
@@ -111,7 +111,7 @@ def test_without_a_held_out_flight_it_is_not_judged(cpfls, config, flights, tmp_
     assert (told["verdict"], told["held_out"]) == ("not-judged", None)
 
 
-@pytest.mark.usefixtures("drawn")
+@pytest.mark.usefixtures("sketched")
 def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     replayed = cpfls.done("replay", config, found.output, flights[1], "-o", tmp_path / "replay.h5", "--json")
     model = json.loads(replayed.stdout)["models"]["model"]
@@ -155,7 +155,7 @@ def test_it_is_a_model_of_its_own(cpfls, refuse, config, flights, found, tmp_pat
         assert (made.spin, made.position_m) == (rotor.spin, pytest.approx(rotor.position_m))
 
 
-@pytest.mark.usefixtures("drawn")
+@pytest.mark.usefixtures("sketched")
 @pytest.mark.parametrize("along", [1, 0], ids=["held out", "another flight"])
 def test_a_replay_is_shown_also_of_the_flight_held_out(cpfls, config, flights, found, tmp_path, along):
     replayed = tmp_path / "replay.h5"

@@ -37,6 +37,7 @@ trajectory:
   duration_s: 8.0
   yaw_turn_rad: 2.0
 simulation: {{closed_loop: {{integration_rate_hz: 200.0}}}}
+gap: {{horizon_s: 0.1}}
 """
 RESPONSE = RotorResponse(delay_s=0.013, lag_s=0.02, slow_roll_pitch=-0.3, slow_yaw=0.4, slow_s=0.3)
 # Reaction and flapping are the smallest parts of a gentle flight.
@@ -48,6 +49,7 @@ WHOLE = replace(
     remainder=remainder(1, rows=(0, 1, 5), size=1e-5),
 )
 NOISE = {"attitude": 0.002, "body_rate": 0.01, "velocity": 0.01, "position": 0.002, "rotor_speed": 1.0}
+BRIEF = ("--horizon", "0.2", "--every", "5")
 SIGNALS = ("body_rate", "attitude", "velocity", "position")
 
 
@@ -109,7 +111,7 @@ def sums(cpfls, config, folder):
     """Play a model back along a flight: sums of the mean errors, by prediction and signal."""
 
     def call(model, flown, *options):
-        words = ("replay", config, model, flown, "-o", folder / "r.h5", "--every", "5", "--force", "--json", *options)
+        words = ("replay", config, model, flown, "-o", folder / "r.h5", *BRIEF, "--force", "--json", *options)
         result = cpfls.done(*words)
         models = json.loads(result.stdout)["models"]
         return {name: np.array([models[name][signal]["sum"] for signal in SIGNALS]) for name in models}
@@ -158,7 +160,7 @@ def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
     assert record.rotor_speed is None
     late = {"motor_lag.time_constant_s": 0.02, "command_delay.delay_s": 0.013}
     assert late.items() <= record.effects.items()
-    errors = sums(commanded, flown, "--hold", "linear")
+    errors = sums(commanded, flown, "--hold", "linear", "--horizon", "0.5")
     assert (errors["model"] < 0.005 * np.minimum(errors["nothing-moves"], errors["rate-stays"])).all()
 
 

@@ -5,6 +5,8 @@ import re
 import tomllib
 from pathlib import Path
 
+from tests.builders.sources import nodes, syntax
+
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "cpfls_cli"
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
@@ -35,8 +37,7 @@ def test_every_module_that_it_names_exists():
 
 def own_imports_in_functions(path):
     """Modules of the package that functions of a module import, wherever in them the import stands."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
+    for function in (node for node in nodes(path) if isinstance(node, ast.FunctionDef)):
         for node in ast.walk(function):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cpfls_cli"):
                 yield f"{path.relative_to(PACKAGE)}: {function.name}: {node.module}"
@@ -56,5 +57,5 @@ def test_layers_hold_as_imported():
 def test_a_front_page_that_nobody_outside_needs_loads_nothing():
     needed = {"__init__.py", "fuzzy/__init__.py", "library/__init__.py"}
     pages = {page.relative_to(PACKAGE).as_posix(): page for page in PACKAGE.rglob("__init__.py")}
-    loading = {name for name, page in pages.items() if len(ast.parse(page.read_text(encoding="utf-8")).body) > 1}
+    loading = {name for name, page in pages.items() if len(syntax(page).body) > 1}
     assert loading == needed

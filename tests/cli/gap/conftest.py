@@ -17,14 +17,6 @@ def gap_config(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def brief_config(gap_config):
-    """The same with short free runs: an inertia over the attitude is evaluated anew in each step of them."""
-    path = gap_config.with_name("brief.yaml")
-    path.write_text(gap_config.read_text().replace("gap: {", "gap: {horizon_s: 0.1, "))
-    return path
-
-
-@pytest.fixture(scope="session")
 def shifted(tmp_path_factory):
     """Three flights with the centre of mass off."""
     folder = tmp_path_factory.mktemp("shifted")

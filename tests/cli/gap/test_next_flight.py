@@ -11,7 +11,7 @@ simulation:
   mode: closed-loop
   noise: {attitude: 0.003, body_rate: 0.005, velocity: 0.05, acceleration: 0.1, rotor_speed: 1.0}
   closed_loop: {integration_rate_hz: 200.0, effects: {com_offset: [0.002, -0.0015]}}
-gap: {shifts: 39, ignore: [payload]}
+gap: {shifts: 39, horizon_s: 0.1, ignore: [payload]}
 """
 
 
@@ -46,7 +46,7 @@ def diagnosed(cpfls, folder, name, *training):
 
 @pytest.mark.decides
 def test_the_next_flight_settles_what_the_first_left_open(cpfls, folder):
-    planned = run(cpfls, folder, "trajectory", "--for", folder / "open.h5", *searched(6, 10), "-o", folder / "next.h5")
+    planned = run(cpfls, folder, "trajectory", "--for", folder / "open.h5", *searched(3, 5), "-o", folder / "next.h5")
     rows = [row for row in planned["questions"] if {row["true"], row["rival"]} == {"com_offset", "torque_bias"}]
     assert len(rows) == 2
     for row in rows:

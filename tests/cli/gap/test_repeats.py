@@ -38,7 +38,7 @@ def config():
         "seed": 1,
         "vehicle": vehicle | {"rotor_speed_max_rad_s": 1e4},
         "import": read | {"spike_deviations": None},
-        "gap": {"shifts": 39, "effects_max": 1},
+        "gap": {"shifts": 39, "horizon_s": 0.1, "effects_max": 1},
     }
 
 

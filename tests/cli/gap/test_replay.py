@@ -221,7 +221,7 @@ def test_people_read_to_which_horizon_it_is_better(cpfls, gap_config, extended, 
     assert "only rotation is played back" in result.stderr
 
 
-@pytest.mark.usefixtures("drawn")
+@pytest.mark.usefixtures("sketched")
 def test_report_shows_it(cpfls, gap_config, of_vehicle, tmp_path):
     told = cpfls.told("report", gap_config, of_vehicle[1], "-o", tmp_path / "page.html")
     assert "replay" in told["sections"]

@@ -6,10 +6,10 @@ from tests.builders.artifacts import read_result
 
 
 @pytest.fixture(scope="module")
-def two_models(cpfls, brief_config, pipeline, with_attitude, tmp_path_factory):
+def two_models(cpfls, gap_config, pipeline, with_attitude, tmp_path_factory):
     """What is put into an identified model from the first two thirds of one flight."""
     folder = tmp_path_factory.mktemp("seen") / "gap"
-    result = cpfls("gap", brief_config, with_attitude[0], "--model", pipeline.model, "-o", folder)
+    result = cpfls("gap", gap_config, with_attitude[0], "--model", pipeline.model, "-o", folder)
     assert result.exit_code == 0, result.stderr
     return folder / "extended.h5"
 

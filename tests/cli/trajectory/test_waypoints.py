@@ -282,7 +282,7 @@ def test_optimised_says_what_the_path_is_worth(cpfls, tmp_path, study):
     assert told["evaluations"] == 5
 
 
-@pytest.mark.usefixtures("drawn")
+@pytest.mark.usefixtures("sketched")
 def test_a_model_learned_on_full_rotations_holds_on_another_one(cpfls, tmp_path, study):
     for seed in (1, 2):
         t, f = tmp_path / f"t{seed}.h5", tmp_path / f"f{seed}.h5"

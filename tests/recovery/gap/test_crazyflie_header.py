@@ -54,7 +54,7 @@ def gap(folder, logs, speed, **wrong):
 def test_a_thrust_17_percent_too_large(tmp_path, flown):
     """The curve over volts is as wrong as the thrust that it states in hover: all of its coefficients change alike."""
     shares, _, speed = flown
-    said, before, after = gap(tmp_path, shares, speed, thrust=1 / 0.83)
+    said, before, after = gap(tmp_path, [*shares[:2], shares[-1]], speed, thrust=1 / 0.83)
     changes = said["corrected"]["changes"]
     assert said["verdict"] == "NAMED"
     assert sorted(change["element"] for change in changes) == CURVE
@@ -83,7 +83,7 @@ def test_a_yaw_torque_twice_as_large(tmp_path, flown):
 
 def test_a_header_that_is_right_stays(tmp_path, flown):
     shares, _, speed = flown
-    said, before, after = gap(tmp_path, shares, speed)
+    said, before, after = gap(tmp_path, [*shares[:2], shares[-1]], speed)
     assert said["corrected"]["changes"] == []
     assert after == before
 

@@ -14,12 +14,6 @@ from cpfls_cli.errors import InputError
 from tests.builders.drawn_numbers import DEVIATION, NAMES, QUAD, flights, having
 
 
-@pytest.fixture(autouse=True)
-def _few_draws(monkeypatch):
-    """As many as the rate of false alarms of each test, 0.005, needs to be told at all."""
-    monkeypatch.setattr(module, "_DRAWS", 300)
-
-
 def row_of(given):
     return module.Row.of(given, Reference.of(given[: len(given) // 2], NAMES, QUAD), QUAD)
 

@@ -13,6 +13,7 @@ import cpfls_cli
 from cpfls_cli.effects import catalogue
 from cpfls_cli.effects.registry import CATALOGUE, effect
 from cpfls_cli.errors import InputError
+from tests.builders.sources import nodes
 
 EFFECTS = pytest.mark.parametrize("name", list(CATALOGUE))
 
@@ -164,13 +165,12 @@ IMPORTED = {"parameter_error"}
 
 @cache
 def read(path):
-    """Literals of a module, and the modules that it imports from; its tree is not kept."""
-    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    """Literals of a module, and the modules that it imports from."""
     # Strings that stand alone: docstrings of modules, classes, functions and constants.
-    alone = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
-    strings = [node for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    alone = {id(node.value) for node in nodes(path) if isinstance(node, ast.Expr)}
+    strings = [node for node in nodes(path) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     texts = [node.value for node in strings if id(node) not in alone]
-    return texts, [node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
+    return texts, [node.module for node in nodes(path) if isinstance(node, ast.ImportFrom) and node.module]
 
 
 def literals(path):

@@ -90,7 +90,8 @@ COMBINATIONS = [
 
 def test_every_combination_of_settings_compiles_and_passes_its_self_test(tmp_path):
     for index, settings in enumerate(COMBINATIONS):
-        exported(tmp_path, model_of(Case(settings, rigid=index % 3 == 0), index))
+        with short_runs():
+            exported(tmp_path, model_of(Case(settings, rigid=index % 3 == 0), index))
         program = build(tmp_path, ["vehicle.c"], "-DCPFLS_SELF_TEST", output=f"program-{index}")
         assert subprocess.run([program], check=False).returncode == 0, settings
 

@@ -88,17 +88,19 @@ def test_the_library(case):
 
 def test_the_compiled_loops(case):
     """Three columns of ones, one for each axis, make the sums of a sample its rows of the regressor."""
-    structure, samples = case.model.structure, len(case.motion)
-    gram = np.zeros((samples, structure.parameters, structure.parameters))
-    rows = np.zeros((samples, structure.parameters, 3))
+    structure, every = case.model.structure, 10
     breakpoints = padded_breakpoints(case.model.partitions)
     table = structure_table(structure, case.model.ranges)
-    inputs = mapped_inputs(table, case.motion.attitude)
-    axes = np.tile(np.eye(3), (samples, 1, 1))
-    chunk = kernels.Chunk(kernels.motion_lines(case.motion.rate, case.motion.acceleration, axes), inputs)
-    runs = kernels.runs_of(table, breakpoints, inputs)
-    none, sums = (kernels.NOTHING,) * 2, (gram, rows, kernels.NOTHING)
-    kernels.add_sums(kernels.GRAM, table, breakpoints, chunk, runs, np.ones(3), np.arange(samples), none, sums)
+    rows = np.zeros((len(case.motion), structure.parameters, 3))
+    # Sums of each sample by itself take a gigabyte where they are taken of all at once.
+    for first in range(0, len(rows), every):
+        motion, moment = case.motion[first : first + every], rows[first : first + every]
+        inputs = mapped_inputs(table, motion.attitude)
+        axes = np.tile(np.eye(3), (len(moment), 1, 1))
+        chunk = kernels.Chunk(kernels.motion_lines(motion.rate, motion.acceleration, axes), inputs)
+        runs, gram = kernels.runs_of(table, breakpoints, inputs), np.zeros((len(moment), *(structure.parameters,) * 2))
+        none, sums = (kernels.NOTHING,) * 2, (gram, moment, kernels.NOTHING)
+        kernels.add_sums(kernels.GRAM, table, breakpoints, chunk, runs, np.ones(3), np.arange(len(moment)), none, sums)
     assert_same(rows.swapaxes(1, 2) @ case.model.coefficients, case)
     dense = Regressor(structure, case.motion, case.model.ranges).matrix(case.model.partitions)
     np.testing.assert_allclose(rows.swapaxes(1, 2), dense, rtol=0, atol=1e-12 * np.max(np.abs(dense)))
@@ -172,10 +174,7 @@ def formula(words):
     return lambda u: eval(left if u < 0.5 else right, {"u": u})
 
 
-WORDS = {
-    "json": next(line for line in HOW_TO_EVALUATE_INERTIA if Z_FUNCTION in line),
-    "method.md": METHOD.read_text(),
-}
+WORDS = {"json": next(line for line in HOW_TO_EVALUATE_INERTIA if Z_FUNCTION in line), "method.md": METHOD.read_text()}
 
 
 @pytest.mark.parametrize("page", WORDS)

@@ -37,14 +37,12 @@ def fly(form, model, horizon=8, windows=3, **changed):
     return made, verified(form, made, flight, (flight, player_of(model, flight)), horizon, windows)
 
 
-@pytest.fixture
-def brief(monkeypatch):
-    """Fly what is not held for five samples, where a test asks what it is called and how large its torque is."""
-
-    def ends(held, flight):
-        return held.errors(flight, np.array([stretch.start for stretch in flight.stretches]), 5)[:, -1]
-
-    monkeypatch.setattr("cpfls_cli.export.holding._ends", ends)
+@pytest.fixture(autouse=True)
+def _coarse(monkeypatch):
+    """Over eight samples steps of no length follow from long ones within 7e-8 in SI, less than a tenth of AGREES."""
+    monkeypatch.setattr("tests.builders.verified_exports._FINE", 4)
+    for form in {*SIMULATORS} - {"rotorpy"}:
+        monkeypatch.setitem(FLYING, form, FLYING[form]._replace(levels=3))
 
 
 @pytest.mark.parametrize("hold", ["linear", "previous"])

@@ -169,19 +169,22 @@ def test_acting_rotors_are_those_of_the_library(response, tmp_path):
 def test_steps_along_a_flight_are_those_of_playback(exports, name, form):
     """Each sample of a flight is taken one step further; what the library predicts lies there."""
     model = MODELS[name]
-    run = reference_run(model, np.random.default_rng(8), "linear", 200)
+    run = reference_run(model, np.random.default_rng(8), "linear", 80)
     exported, rotor = exports(name, form), exports(name, form).rotor_terms(run.speed, PERIOD, "linear")
     path = run.states
     _, moved = exported.motion(State(*(part[:-1] for part in path)), rotor[:-1], PERIOD)
     terms = model.response.terms_by_step(run.speed, PERIOD, "linear")
     size = max(np.abs(part).max() for part in path)
-    for sample in range(len(moved)):
-        position, velocity, rotation, rate = np.split(moved[sample], [3, 6, 15])
-        after = (position, velocity, rotation.reshape(3, 3), rate)
-        pair = [np.stack([part[sample], own]) for part, own in zip(path, after, strict=True)]
-        step = Runs(MeasuredMotion(*pair, PERIOD), np.zeros(1, np.int64), translates=True)
-        errors, _ = errors_of_runs(model.flown, step, Steps(terms[sample][None, None]))
-        assert np.abs(errors).max() < ALLOWED * size
+    position, velocity, rotation, rate = np.split(moved, [3, 6, 15], axis=1)
+    after = (position, velocity, rotation.reshape(-1, 3, 3), rate)
+    # Each sample is followed by what it was taken to: a run of one step.
+    pairs = (
+        np.stack([part[:-1], own], axis=1).reshape(-1, *own.shape[1:]) for part, own in zip(path, after, strict=True)
+    )
+    runs = Runs(MeasuredMotion(*pairs, PERIOD), 2 * np.arange(len(moved)), translates=True)
+    errors, _ = errors_of_runs(model.flown, runs, Steps(terms[None, : len(moved)]))
+    assert errors.shape[0] == len(moved) == len(path.rate) - 1
+    assert np.abs(errors).max() < ALLOWED * size
 
 
 @pytest.mark.parametrize("name", MODELS)

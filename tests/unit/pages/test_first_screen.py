@@ -241,13 +241,7 @@ def test_where_nothing_is_above_the_noise_nothing_is_located():
 
 def test_the_gap_stands_before_and_after_beside_the_noise():
     _, _, rows, caption, _ = screen(diagnosis())
-    assert texts(rows["gap, roll torque"]) == [
-        "N m",
-        "0.494",
-        "0.0136",
-        "0.0123",
-        "40 → 1.1 floors",
-    ]
+    assert texts(rows["gap, roll torque"]) == ["N m", "0.494", "0.0136", "0.0123", "40 → 1.1 floors"]
     assert "gap, yaw torque" not in rows
     assert "Within the noise: torque z." in caption
     grew = {"gap/after_floors": np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2])}

@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.playback import vehicle
-from cpfls_cli.playback.fit import (
-    FitWindows,
-    WindowSet,
-    fit,
-    loss_of,
-    rate_stays,
-    uncertainty,
-    windows_of,
-)
+from cpfls_cli.playback.fit import FitWindows, WindowSet, fit, loss_of, rate_stays, uncertainty, windows_of
 from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import FreeNumbers, blocks_of

@@ -260,7 +260,7 @@ MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n
 
 @pytest.fixture(scope="module")
 def held():
-    (signals,) = logged(flight_of(4.0), TRUE.vehicle).parts
+    (signals,) = logged(flight_of(2.0), TRUE.vehicle).parts
     return [Recording("held.csv", signals)]
 
 

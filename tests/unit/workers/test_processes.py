@@ -17,16 +17,7 @@ from hypothesis import strategies as st
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.workers.workforce import WorkerError, Workforce, attempt, chunks, employ, result_of
-from tests.builders.evaluators import (
-    DEADLY_POISON,
-    POISON,
-    Failing,
-    Loading,
-    Logging,
-    Reporting,
-    Uneven,
-    Unloadable,
-)
+from tests.builders.evaluators import DEADLY_POISON, POISON, Failing, Loading, Logging, Reporting, Uneven, Unloadable
 
 ROOT = Path(__file__).parents[3]
 GENES = np.random.default_rng(5).integers(0, 32768, (40, 6))
