@@ -386,17 +386,18 @@ def _flight_names(logs: Sequence[Path]) -> list[str]:
 
 def _require_possible(stated: Stated) -> None:
     """Refuse numbers that no vehicle has, before a log is read; by its arms it is taken for a quadrotor."""
-    arm, moments = _or_nan(stated.arm_m), stated.inertia_kg_m2 or (nan,)
-    known = {
-        "mass": _or_nan(stated.mass_kg),
+    arm, moments = stated.arm_m, stated.inertia_kg_m2 or (nan,)
+    values = {
+        "mass": stated.mass_kg,
         "arm": arm,
-        "room": room(arm, 4),
+        "room": arm and room(arm, 4),
         "rotors": 4.0,
         "inertia": max(moments),
         "least_inertia": min(moments),
-        "thrust_factor": _or_nan(stated.thrust_factor_n_s2),
-        "drag_factor": _or_nan(stated.drag_factor_n_m_s2),
+        "thrust_factor": stated.thrust_factor_n_s2,
+        "drag_factor": stated.drag_factor_n_m_s2,
     }
+    known = {name: nan if value is None else value for name, value in values.items()}
     lines = [
         f"--{each.name.replace('_', '-')} = {known[each.name]:g}: {each.why}"
         for each in beyond_any_vehicle(figures_of(**known))
@@ -406,10 +407,6 @@ def _require_possible(stated: Stated) -> None:
         lines += [f"--inertia = {','.join(f'{each:g}' for each in moments)}: {why}"] if why else []
     if lines:
         raise ConfigError("\n".join(lines))
-
-
-def _or_nan(value: float | None) -> float:
-    return nan if value is None else value
 
 
 def _parted(findings: Sequence[Finding], guessed: Sequence[str]) -> tuple[list[str], list[str]]:

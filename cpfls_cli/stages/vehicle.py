@@ -21,7 +21,6 @@ from cpfls_cli.arguments import (
     WriteConfigOption,
 )
 from cpfls_cli.arrays import Array
-from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.job import Job, origin_before
 from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.artifacts.output import check_output, refuse_own
@@ -313,7 +312,10 @@ def vehicle(
     found, signal = _found(run, training, settings, checkpoint, kept or {})
     first = [_FIRST_ANSWER] if settings.quick else []
     warnings = [*first, *limit, *twice, *(warning for flight in read for warning in flight.warnings)]
-    made = _judged(run, found, read, list(_learned([run.files[role] for role in learned], training)), warnings)
+    sizes = [sum(map(len, flight.parts)) for flight in training]
+    # All samples that were used were learned from.
+    own = [LearnedFlight.in_file(run.files[role], size, size) for role, size in zip(learned, sizes, strict=True)]
+    made = _judged(run, found, read, own, warnings)
     if made.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
         run.texts |= _config_copy(run, write_config, made)
@@ -459,13 +461,6 @@ def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> Mappin
         return {}
 
 
-def _learned(files: Iterable[InputFile], flights: Iterable[LoggedFlight]) -> Iterator[LearnedFlight]:
-    """Say of flights that all samples that were used were learned from."""
-    for file, flight in zip(files, flights, strict=True):
-        samples = sum(map(len, flight.parts))
-        yield LearnedFlight.in_file(file, samples, samples)
-
-
 def _grouped(
     flights: Sequence[LoggedFlight], paths: Sequence[Path], groups: Sequence[GroupSettings]
 ) -> tuple[LoggedFlight, ...]:
@@ -501,14 +496,11 @@ def _horizon(run: Run, flight: LoggedFlight) -> int:
 def _check_blocks(study: Study) -> None:
     """Refuse names of blocks that no vehicle has."""
     known = (*study.vehicle.unknown, *blocks_of(study.vehicle))
-    for name in study.playback.leave_out:
-        _check_block("playback.leave_out", name, known)
+    asked = [("playback.leave_out", name, known) for name in study.playback.leave_out]
     for group in study.playback.groups:
-        for name in group.differs or ():
-            _check_block(f"playback.groups: {group.name}: differs", name, (MASS, *known))
-
-
-def _check_block(key: str, name: str, known: Sequence[str]) -> None:
-    if name not in known:
-        hint = did_you_mean(name, known, f"the blocks are {', '.join(known)}")
-        raise ConfigError(f"{key} = {name}: no such block ({hint})")
+        key = f"playback.groups: {group.name}: differs"
+        asked += [(key, name, (MASS, *known)) for name in group.differs or ()]
+    for key, name, allowed in asked:
+        if name not in allowed:
+            hint = did_you_mean(name, allowed, f"the blocks are {', '.join(allowed)}")
+            raise ConfigError(f"{key} = {name}: no such block ({hint})")
