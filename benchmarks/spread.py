@@ -40,19 +40,20 @@ from cpfls_cli.export.source import jax_parameters, jax_parts
 from cpfls_cli.playback.constants import find_constants
 from cpfls_cli.playback.disturbance import find_gusts
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.gusts import RANGES, GustRanges, Gusts
+from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.spread import Estimates, drawn
-from cpfls_cli.playback.vehicle import bodily, estimate_correlation, found_numbers
+from cpfls_cli.playback.spread import drawn
+from cpfls_cli.playback.vehicle import FoundVehicle, bodily, estimate_correlation, found_numbers
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.flown_exports import executed
 from tests.builders.gusty_flights import EVERY, GRAVITY, GUSTS, MEMORY_S, STEP_S, Flight, Truth, gusty_flights, path_of
+from tests.builders.spread_vehicles import found_record
 
 RUNS, HELD_OUT, SECONDS, REACH_HZ, SWING = 4, 5, 20.0, 5.0, 0.2
 SHOVE, SHOVE_MEMORY_S = 0.06, 1.0
@@ -73,7 +74,8 @@ class Found(NamedTuple):
     """What flights tell: a model with its gusts, and how sure its numbers are."""
 
     model: VehicleModel
-    known: Estimates
+    known: FoundVehicle
+    lack: Lack | None
 
 
 def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
@@ -89,17 +91,14 @@ def found(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Found:
         print(f"  repeatable share of the residual, by axis: {np.round(gusts.predicted, 2)}", file=sys.stderr)
     held = None if gusts is None or gusts.gusts is None else gusts.gusts
     model = replace(solved.model, gusts=held)
-    return Found(
+    known = found_record(
         model,
-        Estimates(
-            numbers=numbers,
-            correlation=estimate_correlation(solved, spread),
-            blocks=spread.blocks,
-            loop=np.ones((2, 3)),
-            gusts=None if held is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES)),
-            lack=None if gusts is None else gusts.lack,
-        ),
+        numbers=numbers,
+        correlation=estimate_correlation(solved, spread),
+        blocks=spread.blocks,
+        disturbance=gusts,
     )
+    return Found(model, known, None if gusts is None else gusts.lack)
 
 
 class Fleet(NamedTuple):
@@ -245,7 +244,7 @@ def fleets(result: Found, truth: Truth, count: int) -> dict[str, Fleet]:
     by_itself = drawn(result.model, alone, count, np.random.default_rng(1))
     true = VehicleModel(vehicle=truth.vehicle, gusts=true_gusts(truth))
     return kinds_of(result, count) | {
-        "each number by itself": fleet(result.model, by_itself.models, result.known.lack),
+        "each number by itself": fleet(result.model, by_itself.models, result.lack),
         "the true vehicle, true gusts": fleet(true, [true] * count),
     }
 
@@ -354,7 +353,7 @@ def kinds_of(result: Found, count: int) -> dict[str, Fleet]:
     """Draw the spread, and leave out of it what it has more than others."""
     models = drawn(result.model, result.known, count, np.random.default_rng(1)).models
     return {
-        "spread": fleet(result.model, models, result.known.lack),
+        "spread": fleet(result.model, models, result.lack),
         "spread without what the model lacks": fleet(result.model, models),
         "the estimate, in gusts": fleet(result.model, [result.model] * count),
         "spread in still air, nothing lacking": fleet(result.model, models, still=True),

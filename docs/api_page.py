@@ -14,7 +14,7 @@ import griffe
 
 ROOT = Path(__file__).parents[1]
 WIDTH = 120
-OTHERS = ("playback.motion.State", "artifacts.gate.DatasetSpec", "flights.prediction.AlongFlight")
+OTHERS = ("playback.flight.State", "artifacts.gate.DatasetSpec", "flights.prediction.AlongFlight")
 """Classes that no name of the interface stands for: what `Model.state`, `Artifact.about` and `Model.predict` give."""
 
 HEAD = """\

@@ -201,15 +201,15 @@ def judged(
 
 
 def drawn_by_chance(
-    rng: np.random.Generator, kinds: Sequence[str], freedom: Array, counts: Sequence[int] = (1,)
+    rng: np.random.Generator, kinds: Sequence[str], freedom: Array, counts: Sequence[int] = (1,), draws: int = _DRAWS
 ) -> Array:
     """Draw means of so many of the last flights of an unchanged day, whitened, shape (count, number, draw).
 
     Each kind has a scatter of its own to be off by; numbers of two kinds do not go together.
     """
     _, first, kind = np.unique([list(KINDS).index(each) for each in kinds], return_index=True, return_inverse=True)
-    scale = np.sqrt(freedom[first] / rng.chisquare(freedom[first], (_DRAWS, len(first))))[:, kind]
-    day, own = rng.normal(size=(2, _DRAWS, len(kind)))
+    scale = np.sqrt(freedom[first] / rng.chisquare(freedom[first], (draws, len(first))))[:, kind]
+    day, own = rng.normal(size=(2, draws, len(kind)))
     means, total, flights = [], np.zeros_like(own), 0
     for count in sorted(counts):
         # The mean of so many of them, of which some are in the mean before.

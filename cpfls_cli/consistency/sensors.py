@@ -97,7 +97,10 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
 
     None where nothing is wrong, or nobody knows.
     """
-    found = [shift for half in _halves(flights) for shift in _shifts(half, windows)]
+    # Commands, which a lag lies behind, are left out.
+    measured = [each for each in flights if each.rotor_speed is not None and not each.commanded]
+    cut = ((each, slice(*ends)) for each in measured for ends in ((0, len(each) // 2), (len(each) // 2, None)))
+    found = [shift for each, half in cut for shift in _shifts(stretch_of(each, half), windows)]
     if len(found) < _FEWEST_SHIFTS:
         return None
     delay = float(np.median(found))
@@ -111,14 +114,6 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
 
 def _off_clock(what: str, remedy: str, channels: tuple[str, ...], delay: float) -> Finding:
     return Finding(what, remedy, channels, delay, "s", contradiction=False, repairable=True)
-
-
-def _halves(flights: Sequence[Signals]) -> Iterator[Signals]:
-    """Cut the flights with measured rotor speeds into halves; commands, which a lag lies behind, are left out."""
-    for signals in flights:
-        if signals.rotor_speed is not None and not signals.commanded:
-            middle = len(signals) // 2
-            yield from (stretch_of(signals, part) for part in (slice(0, middle), slice(middle, None)))
 
 
 def _shifts(half: Signals, windows: Windows) -> Iterator[float]:
@@ -291,7 +286,8 @@ def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
         gyroscope = _gyroscope(flights, windows)
         late = gyroscope.late(windows)
     # A gyroscope that is late is set right by what names its delay.
-    ahead = [_on_time(signals, late.coefficients[0].value) for signals in flights] if late else flights
+    delay = late.coefficients[0].value if late else 0.0
+    ahead = [replace(each, body_rate=shifted(each.body_rate, each.time, delay)) for each in flights]
     rotors = rotors_on_clock(ahead, windows)
     if rotors is not None:
         apart = set_apart(flights, flights, _repaired((rotors,), flights), windows)
@@ -310,10 +306,6 @@ def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
 
 def _repaired(repairs: Sequence[ChannelRepair], flights: Sequence[Signals]) -> list[Signals]:
     return [reduce(lambda s, each: each.applied(s), repairs, signals) for signals in flights]
-
-
-def _on_time(signals: Signals, delay_s: float) -> Signals:
-    return replace(signals, body_rate=shifted(signals.body_rate, signals.time, delay_s))
 
 
 def _attitude_on_clock(found: FaultNumber, flights: Sequence[Signals], windows: Windows) -> tuple[ChannelRepair, ...]:

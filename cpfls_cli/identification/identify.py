@@ -15,8 +15,8 @@ from cpfls_cli.evolution.engine import History
 from cpfls_cli.identification.closed_loop import freed_torque, loop_along, source_of
 from cpfls_cli.identification.data import TRAINING, TorqueSource, axis_scale
 from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
-from cpfls_cli.identification.findings import FitDiagnostics, RuleExcitation, axis_evidence, findings, rule_excitation
-from cpfls_cli.identification.judge import Baseline, Score, fit_baselines, score_of
+from cpfls_cli.identification.findings import FitDiagnostics, axis_evidence, findings, rule_excitation
+from cpfls_cli.identification.judge import Baseline, fit_baselines, score_of
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import UNWATCHED, Front, SearchRun, StopReason, is_end, search
@@ -117,10 +117,13 @@ def identify(
     scores = {
         part: {name: score_of(data, torque) for name, torque in predictors.items()} for part, data in parts.items()
     }
+    # How much of the fuzzy part alone the samples determine beyond their noise.
+    noise = float(np.sqrt(min(np.mean(scores[TRAINING][name].mse) for name in ("model", baselines[0].name))))
+    inertia = float(np.mean(np.abs(baselines[0].parameters[:3])))
     diagnostics = FitDiagnostics(
         fit=fit,
         system=system,
-        excitation=_excitation(evaluator, model, baselines[0], scores[TRAINING], settings),
+        excitation=rule_excitation(evaluator.solver.learned, model.partitions, noise, inertia, settings.rank_tolerance),
         axes=axis_evidence(training, settings.rank_tolerance),
         rigid_body=baselines[0].parameters,
         stated=stated_inertia,
@@ -191,19 +194,6 @@ def _solve(
 
 def _count(source: TorqueSource, flag: Callable[[Array], BoolArray]) -> int:
     return sum(int(np.sum(flag(data.motion.attitude))) for data in source.chunks())
-
-
-def _excitation(
-    evaluator: Evaluator,
-    model: InertiaFunctions,
-    rigid_body: Baseline,
-    scores: Mapping[str, Score],
-    settings: IdentificationSettings,
-) -> RuleExcitation:
-    """Measure how much of the fuzzy part alone the samples determine beyond their noise."""
-    noise = float(np.sqrt(min(np.mean(scores[name].mse) for name in ("model", rigid_body.name))))
-    inertia = float(np.mean(np.abs(rigid_body.parameters[:3])))
-    return rule_excitation(evaluator.solver.learned, model.partitions, noise, inertia, settings.rank_tolerance)
 
 
 AXES = ("roll", "pitch", "yaw")

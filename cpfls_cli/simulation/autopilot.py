@@ -235,12 +235,9 @@ class LawPilot:
         return (*mixed.speed.tolist(), *demand.tolist())
 
 
-def _error_of(_memory: Memory, given: Vector) -> Vector:
-    rotation = rotation_rows(given[:3], SYMBOLS)
-    return attitude_error(rotation, (given[3:6], given[6:9], given[9:]))
-
-
-_ATTITUDE_ERROR = Machine.of(_error_of, 12)
+_ATTITUDE_ERROR = Machine.of(
+    lambda _, given: attitude_error(rotation_rows(given[:3], SYMBOLS), (given[3:6], given[6:9], given[9:])), 12
+)
 
 
 def along_path(pilot: PlanPilot, motors: Motors, vehicle: VehicleSettings) -> Callable[[int, Flat], Asked]:

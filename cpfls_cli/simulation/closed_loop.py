@@ -328,7 +328,11 @@ def flown(flight: Loop, check: Callable[[int, Flat], None], progress: Callable[[
         # What is lost may be beyond all numbers before the next sample.
         check(len(states), (np.nan,) * size)
     progress(clock.steps, clock.steps)
-    return _sampled(np.array(states), np.array(steps), clock.parts, len(flight.vehicle.settings.rotors))
+    # Values are of the middle of steps.
+    places = np.cumsum([size, *[len(flight.vehicle.settings.rotors)] * 3, 1])
+    of_samples = np.split(between(np.array(steps))[:: clock.parts], places, axis=1)
+    change, command, lagged, speed, voltage, demand = of_samples
+    return SimulatedMotion(np.array(states), change, command, lagged, speed, voltage[:, 0], demand)
 
 
 def _loop(
@@ -374,11 +378,3 @@ def _refuse_far(state: Flat, planned: Array, time: float, limit: float) -> None:
             f"the vehicle is {away:.3g} m away from the path at t = {time:g} s (limit "
             f"simulation.closed_loop.deviation_max_m = {limit:g}): {_REMEDY}"
         )
-
-
-def _sampled(states: Array, steps: Array, parts: int, rotors: int) -> SimulatedMotion:
-    """Interpolate values in the middle of steps to the samples."""
-    size = states.shape[1]
-    places = np.cumsum([size, rotors, rotors, rotors, 1])
-    change, command, lagged, speed, voltage, demand = np.split(between(steps)[::parts], places, axis=1)
-    return SimulatedMotion(states, change, command, lagged, speed, voltage[:, 0], demand)

@@ -16,7 +16,7 @@ from cpfls_cli.export.source import jax_parameters, jax_parts, python_source
 from cpfls_cli.export.text import checked_identifier, comment_lines, comment_text, identifier, literal_text
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.spread import Estimates, drawn
+from cpfls_cli.playback.spread import drawn
 from cpfls_cli.vehicle.values import NoPolynomialError, Polynomial
 from tests.builders.exported_models import CASES, model_of, sheet_of, states, verdict_of
 from tests.builders.exported_vehicles import on_numpy, sheet_of_vehicle
@@ -246,7 +246,7 @@ DELAYED = replace(truth(), response=RotorResponse(lag_s=0.035, delay_s=0.013), t
 
 def vehicles(model, count):
     record = found_record(model)
-    return record.model, drawn(record.model, Estimates.of(record), count, np.random.default_rng(1))
+    return record.model, drawn(record.model, record, count, np.random.default_rng(1))
 
 
 def test_the_parameters_of_each_vehicle_are_those_of_its_own_export():
