@@ -31,6 +31,9 @@ _FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
 # vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
 _SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
 _UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
+# Range of squared commands, over their mean, whose thrust is felt in the air, unless it climbs by so many m; and the
+# share of it that is felt where something else holds the vehicle.
+_WORKS, _CLIMBS_M, _UNFELT = 1.0, 3.0, 0.12
 # Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in weights
 # below which it falls, on the mean over s.
 _TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
@@ -272,6 +275,8 @@ def _held(signs: Signs, active: BoolArray) -> str:
         idle = np.flatnonzero(works < _OF_MEAN * works.mean())
         if len(idle) and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
             return f"rotor {idle[0] + 1} hardly works, and it does not spin"
+    if _unfelt(signs, active):
+        return "what it feels does not grow with its thrust"
     if signs.body_rate is None or signs.felt is None:
         return ""
     # At rest the weight turns through the body as the body turns; in the air it stays along the rotors' axis. Where an
@@ -287,6 +292,19 @@ def _held(signs: Signs, active: BoolArray) -> str:
         if (swings and min(both / power, alike) < _AS_HELD) or not (swings or over_s == SLOW_S):
             return ""
     return "the weight turns through it as it turns"
+
+
+def _unfelt(signs: Signs, active: BoolArray) -> bool:
+    """Tell whether a vehicle feels no more where its rotors work much more."""
+    inner = _inner(signs, active)
+    climbs = signs.height is not None and float(np.ptp(signs.height[active])) > _CLIMBS_M
+    if signs.level is None or signs.felt is None or climbs or not inner.any():
+        return False
+    squares, felt = (averaged(each, signs.period, SLOW_S)[inner] for each in (signs.level**2, signs.felt))
+    thrust = np.median(felt, axis=0)
+    ranges = (np.ptp(np.quantile(each, [0.05, 0.95])) for each in (squares / squares.mean(), felt @ thrust))
+    works, feels = map(float, ranges)
+    return works > _WORKS and feels < _UNFELT * works * float(thrust @ thrust)
 
 
 def _leans(signs: Signs, active: BoolArray) -> float | None:

@@ -34,6 +34,13 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read columns of a log; without a wish, those whose first value is a number, a time or absent."""
     with _opened(path) as table:
         names, first = table.names, dict(zip(table.names, table.first, strict=False))
+        # What is absent at first may be a word later on.
+        absent = {name for name, own in first.items() if not own.strip()}
+        for row in table.rows if absent else ():
+            later = {name: own for name, own in zip(names, row, strict=False) if name in absent and own.strip()}
+            first, absent = first | later, absent - later.keys()
+            if not absent:
+                break
     numeric = [name for name in names if name in first and _kind(first[name])]
     units = {name: "s" for name in numeric if _kind(first[name]) == "time"}
     if wanted is not None:
@@ -111,9 +118,9 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     numbers = [name for name in names if name and _kind(name) == "number"]
     # Columns may be numbered, and a row of data may hold words.
     numbered = len(set(numbers)) == len(numbers) < len(names) and all(map(str.isdecimal, numbers))
-    if len(names) > 1 and 2 * len(numbers) > len(names) and not numbered:
+    if 2 * len(numbers) > len(names) and not numbered:
         raise InputError(
-            f"{path}: has no line of column names, line {line} holds {len(numbers)} numbers: put a line above it that"
+            f"{path}: has no line of column names, line {line} holds {len(numbers)}{' number' if len(numbers) == 1 else ' numbers'}: put a line above it that"
             " names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
         )
     begun = []
@@ -174,7 +181,8 @@ def _seconds(text: str) -> float:
     """Read a date with a time, or a time of day, as ISO 8601 writes it; where no zone is named, as one of UTC."""
     if ":" not in text:
         raise ValueError(text)
-    stamp = datetime.fromisoformat(text if text[4:5] == "-" else f"1970-01-01T{text}")
+    # An hour may have one digit.
+    stamp = datetime.fromisoformat(text if text[4:5] == "-" else f"1970-01-01T{'0' * (text[1:2] == ':')}{text}")
     return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
 
 

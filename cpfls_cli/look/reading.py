@@ -33,6 +33,7 @@ from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
 from cpfls_cli.look.driving import Rotors, as_shares, find_driving
 from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.units import SPEED_UNITS, STANDARD_GRAVITY, known_unit
+from cpfls_cli.words import joined
 
 _DEGREES: Final = 180 / np.pi
 _MOST_HZ: Final = 1000.0
@@ -59,6 +60,7 @@ _LEAST_V, _LARGEST_V, _LEAST_A = 2.0, 100.0, 1.0
 """Of any battery of a multirotor; and the current below which none flies: one of 27 g takes 2 A of one cell, and more
 cells are for larger ones."""
 _BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration", "body_torque")
+_SURFACES: Final = ("aileron", "elevator", "rudder", "elevon")  # Which move an airplane.
 _OLD_GAINS: Final = ("RATE_RLL_", "RATE_PIT_", "RATE_YAW_")
 """Of ArduCopter before 3.4."""
 
@@ -194,6 +196,8 @@ class _Reader:
         if found is None:
             faster = log_faster("body rates", FAST_HZ, self.system, parameters=self.parameters)
             held = ", ".join(guess.signal.replace("_", " ") for guess in self.recognition.signals)
+            surfaces = [own for own in self.log.table.names if own.lower() in _SURFACES]
+            held += f"; {joined(surfaces)} are no rotors" if surfaces else ""
             raise InputError(f"a log without a gyroscope (it holds {held}): {faster}")
         return found
 

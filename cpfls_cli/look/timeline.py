@@ -29,9 +29,10 @@ _UNITS: Final = {"gyroscope": "rad/s", "accelerometer": "m/s²"}
 _OF_SCALE, _CLIPPED_ROWS = 0.02, 3
 """Share by which a largest reading may differ from a full scale, and rows in which it stays there, to be clipped."""
 
-_ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S, _LONG_S = 1e-4, 0.985, 3, 0.05, 2.0
-"""Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus of some rotors at a
-smaller one that make it one; and how long a rotor is there, and at one plateau that alone makes it one, s."""
+_ROUNDED, _STEP, _FULL, _FEWEST_PLATEAUS, _LIMIT_S, _LONG_S = 1e-4, 2e-3, 0.985, 3, 0.05, 2.0
+"""Shares of full command: that of rounding, that of a step of pulses, and from which on the largest one is a limit;
+plateaus of some rotors at a smaller one that make it one; and how long a rotor is there, and at one plateau that alone
+makes it one, s."""
 
 _LIES, _LIES_S, _HARD_S = -0.7, 1.0, 1.5
 """Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity and
@@ -387,7 +388,8 @@ def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     """Find rotors that get all there is: full command, or a largest one that comes again and again as a plateau."""
     time, values = flight.rotors.time, flight.rotors.values
     most = min(float(np.nanmax(values)), 1.0)
-    full = (values >= most - _ROUNDED) & _flown_or_after(flight, time, after_s)[:, None]
+    flown = _flown_or_after(flight, time, after_s)[:, None]
+    full = (values >= most - _ROUNDED) & flown
     # Where all are there together, it is the crest of a climb.
     plateaus = list(_held(time, np.asarray(full.any(axis=1) & ~full.all(axis=1)), 0.0))
     long = (values[(time >= a) & (time <= b)] for a, b in plateaus if b - a >= _LONG_S)
@@ -395,7 +397,7 @@ def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     limits = len(plateaus) >= _FEWEST_PLATEAUS or any(np.ptp(each, axis=0).max() > _ROUNDED for each in long)
     if most < _FULL and not (limits and flight.rotors_source == "logged"):
         return
-    for rotor, column in enumerate(full.T):
+    for rotor, column in enumerate(((values >= most - _STEP) & flown).T):
         held = list(_held(time, column, _LIMIT_S))
         if held:
             total, longest = sum(b - a for a, b in held), max(b - a for a, b in held)
