@@ -173,12 +173,12 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
         if height is None or not turning.any() or turning.all():
             return turning, how
         return _off_the_ground(turning, height, period), how + ", or it is on the ground"
-    if height is not None and float(np.ptp(height)) > 2 * _LEAST_HEIGHT:
-        ground = float(np.quantile(height, 0.02))
-        above = height - ground > max(_LEAST_HEIGHT, _OF_HEIGHT * float(np.ptp(height)))
+    if height is not None and (rate is None or float(np.ptp(height)) > 2 * _LEAST_HEIGHT):
+        ground, ranges = float(np.quantile(height, 0.02)), float(np.ptp(height))
+        above = height - ground > max(_LEAST_HEIGHT, _OF_HEIGHT * ranges)
         starts_there = abs(float(np.median(height[: max(1, round(_SHORT_S / period))])) - ground) < _LEAST_HEIGHT
-        flies = smoothed(above, period, _SHORT_S) if starts_there else np.ones(len(height), dtype=bool)
-        return flies, "it is on the ground"
+        stood = starts_there and ranges > 2 * _LEAST_HEIGHT
+        return smoothed(above, period, _SHORT_S) if stood else np.ones(len(height), dtype=bool), "it is on the ground"
     if rate is None:
         why = "no rotors, no height and no rates are recognised, so flight cannot be distinguished from standing"
         return None, f"{why}: {BY_HAND}"
@@ -260,9 +260,10 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     level = leans is not None and leans < _LEANS_RAD
     # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
     drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
+    # Of a simulated vehicle that hovers, whose gyroscope reads next to nothing, height and force show that it lifts off.
     if turning < _STILL_RAD_S:
-        return True
-    soft = turning < _SOFT_RAD_S and height is not None
+        return pushed is None or pushed < _UNPUSHED or rises <= _STILL_M
+    soft = turning < _SOFT_RAD_S
     return (rises <= _STILL_M and ((shakes and (level or leans is None)) or soft)) or (soft and drifts)
 
 
@@ -271,7 +272,11 @@ def _held(signs: Signs, active: BoolArray) -> str:
     if signs.rotors is None:
         return ""
     if signs.rotors.shape[1] == 4 and signs.slow is not None:
-        works = np.median(np.nan_to_num(signs.rotors)[active], axis=0)
+        shares = np.nan_to_num(signs.rotors)[active]
+        third = np.sort(shares[shares.mean(axis=1) > ALIVE], axis=1)[:, 1]
+        if len(third) and float(np.median(third)) < ALIVE:
+            return "no more than two of its four rotors work at a time"
+        works = np.median(shares, axis=0)
         idle = np.flatnonzero(works < _OF_MEAN * works.mean())
         if len(idle) and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
             return f"rotor {idle[0] + 1} hardly works, and it does not spin"

@@ -65,7 +65,10 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
             if not row:
                 continue
             if len(row) != len(names):
-                raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names")
+                if count and not any(table.rows):
+                    break  # A last line that was cut.
+                way = "" if count else f": line {number - 1} has to name each column, such as time,roll,pitch,yaw"
+                raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names{way}")
             try:
                 numbers.extend(_plain_numbers([row[index] for index in kept]))
             except ValueError:
@@ -120,8 +123,8 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     numbered = len(set(numbers)) == len(numbers) < len(names) and all(map(str.isdecimal, numbers))
     if 2 * len(numbers) > len(names) and not numbered:
         raise InputError(
-            f"{path}: has no line of column names, line {line} holds {len(numbers)}{' number' if len(numbers) == 1 else ' numbers'}: put a line above it that"
-            " names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
+            f"{path}: has no line of column names, line {line} holds {len(numbers)} number{'s' * (len(numbers) > 1)}: put a line above it"
+            " that names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
         )
     begun = []
     for text in lines:
@@ -181,8 +184,9 @@ def _seconds(text: str) -> float:
     """Read a date with a time, or a time of day, as ISO 8601 writes it; where no zone is named, as one of UTC."""
     if ":" not in text:
         raise ValueError(text)
-    # An hour may have one digit.
-    stamp = datetime.fromisoformat(text if text[4:5] == "-" else f"1970-01-01T{'0' * (text[1:2] == ':')}{text}")
+    # An hour may have one digit, and slashes may part a date.
+    dated, of_day = text.replace("/", "-"), f"1970-01-01T{'0' * (text[1:2] == ':')}{text}"
+    stamp = datetime.fromisoformat(dated if dated[4:5] == "-" else of_day)
     return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
 
 

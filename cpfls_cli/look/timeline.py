@@ -192,10 +192,11 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
         begin, end = float(flight.time[first]), float(flight.time[after - 1])
         yield Event(time_s=begin, until_s=end, kind="flown", text="flies")
         lifted, landed = _nearest(lifts, begin), _nearest(lands, end)
-        if lifted is None:
-            # What climbs far is surely off the ground long after it has left it.
-            earlier = [at for at in lifts if begin - _CLIMBS_S < at < begin and at > flight.time[max(before - 1, 0)]]
-            lifted = max(earlier, default=None)
+        # What climbs far is surely off the ground long after it has left it, and is near it again long before.
+        earlier = [at for at in lifts if begin - _CLIMBS_S < at < begin and at > flight.time[max(before - 1, 0)]]
+        later = [at for at in lands if end < at < min(end + _CLIMBS_S, flight.time[-1 if follows is None else follows])]
+        lifted = max(earlier, default=None) if lifted is None else lifted
+        landed = min(later, default=None) if landed is None else landed
         if lifted is not None or (begin - float(flight.time[0]) > _AROUND_S and _rests(flight, slice(before, first))):
             yield Event(time_s=begin if lifted is None else lifted, kind="take-off", text="takes off")
         if any(end - _NEAR_S <= at < end + _NEAR_S for _, at in ends):
