@@ -260,7 +260,7 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     level = leans is not None and leans < _LEANS_RAD
     # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
     drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
-    # Of a simulated vehicle that hovers, whose gyroscope reads next to nothing, height and force show that it lifts off.
+    # Where the gyroscope of a simulated vehicle reads next to nothing, height and force show that it lifts off.
     if turning < _STILL_RAD_S:
         return pushed is None or pushed < _UNPUSHED or rises <= _STILL_M
     soft = turning < _SOFT_RAD_S

@@ -122,9 +122,10 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     # Columns may be numbered, and a row of data may hold words.
     numbered = len(set(numbers)) == len(numbers) < len(names) and all(map(str.isdecimal, numbers))
     if 2 * len(numbers) > len(names) and not numbered:
+        many = f"{len(numbers)} number{'s' * (len(numbers) > 1)}"
         raise InputError(
-            f"{path}: has no line of column names, line {line} holds {len(numbers)} number{'s' * (len(numbers) > 1)}: put a line above it"
-            " that names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
+            f"{path}: has no line of column names, line {line} holds {many}: put a line above it that names each"
+            " column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
         )
     begun = []
     for text in lines:
