@@ -24,9 +24,9 @@ _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
 # Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
 # range of leans above which a vehicle moves.
 _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
-# Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
-# of the height that is estimated for it.
-_FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
+# Ranges of leans and of slow forces, in weights, of what surely moves; of slow forces of what does not, and of the
+# height that is estimated for it.
+_FAR_RAD, _PUSHED, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 0.03, 1.0
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
 # vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
 _SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
@@ -136,7 +136,6 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
 def find_flown(signs: Signs) -> FlownPart:
     """Find the stretches of a log that are flown, and the longest of them."""
     signs = signs.slower(_MOST_CLOCK_HZ)
-    signs = replace(signs, body_rate=None) if _dead_rates(signs) else signs
     active, how = _active(signs)
     if active is None:
         return FlownPart(None, (how,), flies=False)
@@ -260,9 +259,10 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     level = leans is not None and leans < _LEANS_RAD
     # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
     drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
-    # Where the gyroscope of a simulated vehicle reads next to nothing, height and force show that it lifts off.
+    # Where a gyroscope reads next to nothing, of a dead one as of a simulated hover, leans, force and height say more.
     if turning < _STILL_RAD_S:
-        return pushed is None or pushed < _UNPUSHED or rises <= _STILL_M
+        lifts = (pushed is None or pushed >= _UNPUSHED) and rises > _STILL_M
+        return not (lifts or (leans or 0.0) > _FAR_RAD or (pushed or 0.0) > _PUSHED)
     soft = turning < _SOFT_RAD_S
     return (rises <= _STILL_M and ((shakes and (level or leans is None)) or soft)) or (soft and drifts)
 
@@ -335,16 +335,6 @@ def _inner(signs: Signs, active: BoolArray) -> BoolArray:
     inner = active.copy()
     inner[:edge] = inner[len(inner) - edge :] = False
     return inner
-
-
-def _dead_rates(signs: Signs) -> bool:
-    """Tell whether body rates deny what leans, forces or height show."""
-    if signs.turning is None or float(np.sqrt(np.mean(signs.turning**2))) > _STILL_RAD_S:
-        return False
-    everywhere = np.ones(len(signs.time), dtype=bool)
-    rises = 0.0 if signs.height is None else float(np.ptp(signs.height))
-    leans, pushed = _leans(signs, everywhere) or 0.0, _pushed(signs, everywhere) or 0.0
-    return leans > _FAR_RAD or pushed > _PUSHED or rises > _FAR_M
 
 
 def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> FlownPart:

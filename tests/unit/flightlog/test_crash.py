@@ -88,6 +88,23 @@ def test_rotors_that_stop_in_the_air_are_no_landing(own, known):
     assert flown(landed, known).ended == ""
 
 
+def test_a_fall_that_no_flight_has_is_a_loss_of_control(own):
+    """Rotors at full all the while, and a landing at any speed is none."""
+    plunges = ended.then(own, 8.0, rate=2.0, rotors=1.6, felt=(0.0, 0.0, 4.0), falls=10.0)
+    found = flown(plunges, ("height",))
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS + 2.5, abs=0.3))
+    assert found.ended.startswith("loss of control at 42.")
+    brief = ended.then(own, 4.0, rate=2.0, rotors=1.6, felt=(0.0, 0.0, 4.0), falls=10.0)
+    assert "loss of control" not in flown(brief, ("height",)).ended
+
+
+def test_a_jolt_at_the_moment_of_coming_to_rest_is_an_impact(own):
+    for seconds in (0.02, 0.04, 0.06, 0.08, 0.1):
+        struck = ended.then(own, seconds, felt=(0.0, 60.0, 80.0), rotors=1.0)
+        rests = ended.then(struck, 6.0, felt=ended.UPSIDE_DOWN, rotors=1.0)
+        assert "impact at 40." in flown(rests, ("force",)).ended, seconds
+
+
 def test_of_a_crash_amid_a_log_the_longest_stretch_is_used(own):
     found = flown(ended.joined(ended.hits(flight(20.0)), own))
     assert found.span_s == (pytest.approx(29.0, abs=0.7), pytest.approx(68.35, abs=0.1))
