@@ -159,8 +159,6 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     if signs.slow is None or signs.rate is None or not active.any():
         return Resting(nowhere, nowhere)
     held = active & _held_four(signs)
-    if (active & ~held).sum() * signs.period <= _FEWEST_S:
-        held = nowhere
     free = active & ~held
     lively = free & (signs.slow > LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else free
@@ -333,8 +331,6 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
     wild, strained = beyond(signs.turning, _WILD_RAD_S), beyond(signs.turning, _STRAINED_RAD_S)
     if signs.upright is not None:
         up = _turned_up(signs.upright, np.arange(len(signs.time)) < before.stop)
-        # What never was upside down, and is.
-        wild |= late & (up[first:stop] < 0) & bool((up[before] > 0).all())
         strained |= beyond(np.arccos(np.clip(up, -1.0, 1.0)), _STRAINED_RAD)
     if signs.rotors is not None:
         strained &= (signs.rotors[first:stop] >= _AT_LIMIT * float(np.nanmax(signs.rotors))).any(axis=1)

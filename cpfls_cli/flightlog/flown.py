@@ -203,12 +203,10 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
         if felt is not None:
             lively |= felt < _FALLS
-        stands = level <= ALIVE
-        for first, after in runs(stands):
-            # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
-            stands[first:after] = (after - first) * signs.period > _LONGEST_CUT_S
+        # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
+        turns_on = smoothed(level > ALIVE, signs.period, _LONGEST_CUT_S)
         first, last = np.flatnonzero(carrying)[[0, -1]]
-        carrying[first:last] |= (~stands & lively)[first:last]
+        carrying[first:last] |= (lively & turns_on)[first:last]
     return smoothed(carrying, signs.period, _SHORT_S)
 
 
@@ -247,16 +245,14 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle whose rotors turn stands on the ground or is bound to a bench."""
     height = signs.height
     rises = 0.0 if height is None else float(np.ptp(height[active]))
+    leans, pushed = _leans(signs, active), _pushed(signs, active)
+    level = leans is not None and leans < _LEANS_RAD
     if signs.turning is None or signs.slow is None:
-        leans = _leans(signs, active)
-        level = leans is not None and leans < _LEANS_RAD
         return height is not None and (rises < _UNMOVED_M or (level and rises <= _STILL_M))
     turning = float(np.sqrt(np.mean(signs.turning[active] ** 2)))
     # Vibration of the rotors is no turning: its mean is that of noise.
     slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))
     shakes = turning < _SHAKES_RAD_S and slow < _OF_NOISE * turning / np.sqrt(SLOW_S / signs.period)
-    leans, pushed = _leans(signs, active), _pushed(signs, active)
-    level = leans is not None and leans < _LEANS_RAD
     # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
     drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
     # Where a gyroscope reads next to nothing, of a dead one as of a simulated hover, leans, force and height say more.
@@ -375,9 +371,7 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> Flown
 
 
 def _how(signs: Signs, part: slice, how: str) -> str:
-    if signs.level is None:
-        return how
-    if float(np.quantile(signs.level[part], 0.9)) >= ALIVE:
+    if signs.level is None or float(np.quantile(signs.level[part], 0.9)) >= ALIVE:
         return how
     by_hand = signs.slow is not None and float(np.quantile(signs.slow[part], 0.9)) > _TURNS_RAD_S
     return "the rotors stand still" + (" while it is moved by hand" if by_hand else "")

@@ -92,12 +92,10 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         own = rotors.command or rotors.driving
         logged = as_mapped(log.on_grid(own.columns.columns, spikes=False), own.columns)
         shares = rotor_shares(logged, shares=own is rotors.command)
-    signs = _signs(log, candidates, shares)
-    flown = find_flown(signs).within(ended, (0.0, float(log.grid[-1] - log.grid[0])))
+    flown = find_flown(signs := _signs(log, candidates, shares)).within(ended, (0.0, float(log.grid[-1] - log.grid[0])))
     if not flown.flies:
-        shown = signs.rotors is not None or signs.height is not None or signs.rate is not None
-        held = "" if shown else f"holds {joined([name.replace('_', ' ') for name in candidates])} alone: "
-        raise InputError(held + flown.reasons[0])
+        held = f"holds {joined([name.replace('_', ' ') for name in candidates])} alone: "
+        raise InputError(held * (signs.rotors is signs.height is signs.rate is None) + flown.reasons[0])
     carried = flown if kind is None else _hover_of(log, kind, flown)
     winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))

@@ -35,12 +35,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     with _opened(path) as table:
         names, first = table.names, dict(zip(table.names, table.first, strict=False))
         # What is absent at first may be a word later on.
-        absent = {name for name, own in first.items() if not own.strip()}
-        for row in table.rows if absent else ():
-            later = {name: own for name, own in zip(names, row, strict=False) if name in absent and own.strip()}
-            first, absent = first | later, absent - later.keys()
-            if not absent:
+        for row in (own for own in table.rows if len(own) == len(first)):
+            if all(map(str.strip, first.values())):
                 break
+            first = {name: own.strip() or later for (name, own), later in zip(first.items(), row, strict=True)}
     numeric = [name for name in names if name in first and _kind(first[name])]
     units = {name: "s" for name in numeric if _kind(first[name]) == "time"}
     if wanted is not None:
@@ -65,9 +63,10 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
             if not row:
                 continue
             if len(row) != len(names):
-                if count and not any(table.rows):
-                    break  # A last line that was cut.
-                way = "" if count else f": line {number - 1} has to name each column, such as time,roll,pitch,yaw"
+                # A last line may have been cut, where more than one before it show how long they are.
+                if len(row) < len(names) and count > 1 and not any(table.rows):
+                    break
+                way = f": line {number - 1} has to name each column" if len(names) == 1 else ""
                 raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names{way}")
             try:
                 numbers.extend(_plain_numbers([row[index] for index in kept]))

@@ -300,7 +300,7 @@ def test_what_is_no_flight_is_refused(own, changed, message):
 
 def test_what_shows_no_flight_is_said_with_what_it_holds(own):
     bare = flat_log(own, **dict.fromkeys(("speed", "rate", "position", "velocity")))
-    with pytest.raises(InputError, match="^holds attitude and acceleration alone: no rotors, no height and no rates"):
+    with pytest.raises(InputError, match=r"^holds attitude and acceleration alone: no rotors, no height and no rates"):
         seen(bare)
 
 

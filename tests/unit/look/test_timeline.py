@@ -259,11 +259,11 @@ def test_a_hard_landing():
 
 def test_the_autopilots_word_for_landing_may_come_long_after():
     """A flight is near the ground at a tenth of its height, and may go down from there slowly."""
-    sinks = ended.then(flight(seconds=20.0), 8.0, rotors=0.9, roll=0.0)
+    sinks = ended.then(with_ground(flight(seconds=20.0), after_s=0.0), 8.0, rotors=0.9, roll=0.0)
     low = ended.then(ended.then(sinks, 0.04, rotors=0.5, felt=(0.0, 0.0, 60.0)), 6.0)
-    low.position[:, 2] = np.where(low.time < 20.0, 20.0 * np.minimum(low.time, 1.0), 0.2 * np.clip(28.0 - low.time, 0, 8))
-    stated = logs.ardupilot(low, more={"EV": state([28.5], Id=[18])})
-    assert of(events(stated), "landing") == [(28.0, "lands hard, with 6.1 g")]
+    low.position[:, 2] = np.interp(low.time, [5.0, 6.0, 25.0, 26.0, 33.0], [0.0, 20.0, 20.0, 1.5, 0.0])
+    stated = logs.ardupilot(low, more={"EV": state([33.5], Id=[18])})
+    assert of(events(stated), "landing") == [(33.0, "lands hard, with 6.1 g")]
 
 
 def test_a_force_that_its_rotors_made_before_is_no_hard_landing():
