@@ -70,16 +70,20 @@ def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> Im
         raise InputError(f"import.{error.key}: {error}; the log has no columns of {', '.join(absent)}") from None
 
 
-def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tuple[Array, dict[str, Array]]:
+def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tuple[Array, dict[str, Array], float]:
     """Take the stamps of a log, s from 0, and its mapped columns by signal, shape (sample, column), SI, with signs.
 
-    Frames and order are those of the log. Columns that are missing, empty or of unequal length are refused; the message
-    names all of them, the config key of each and the nearest columns of the log.
+    Last comes the stamp, s, that times are counted from. Frames and order are those of the log. Columns that are
+    missing, empty or of unequal length are refused; the message names all of them, the config key of each and the
+    nearest columns of the log.
     """
     _require_present(columns, settings)
     stamps = np.asarray(columns[str(settings.time_column)], dtype=float)
+    finite = stamps[np.isfinite(stamps)]
+    if len(finite) < 2:
+        raise InputError(f"import.time_column: {settings.time_column!r} holds fewer than two time stamps")
     # In their own unit first: a date in s has few digits left for its fractions.
-    time: Array = to_si(stamps - _first(stamps, settings), settings.time_unit)
+    time: Array = to_si(stamps - finite[0], settings.time_unit)
     for name, signal in settings.signals.items():
         unlike = next((size for column in signal.columns if (size := len(columns[column])) != len(time)), None)
         if unlike is not None:
@@ -89,20 +93,7 @@ def select_columns(columns: Mapping[str, Array], settings: ImportSettings) -> tu
         values = np.column_stack([np.asarray(columns[column], dtype=float) for column in signal.columns])
         values[~np.isfinite(values)] = np.nan
         signals[name] = to_si(as_mapped(values, signal), signal.unit)
-    return time, signals
-
-
-def first_stamp(columns: Mapping[str, Array], settings: ImportSettings) -> float:
-    """Give the stamp, s, that the times of `select_columns` are counted from."""
-    stamps = np.asarray(columns[str(settings.time_column)], dtype=float)
-    return float(to_si(np.array(_first(stamps, settings)), settings.time_unit))
-
-
-def _first(stamps: Array, settings: ImportSettings) -> float:
-    finite = stamps[np.isfinite(stamps)]
-    if len(finite) < 2:
-        raise InputError(f"import.time_column: {settings.time_column!r} holds fewer than two time stamps")
-    return float(finite[0])
+    return time, signals, float(to_si(finite[0], settings.time_unit))
 
 
 def as_mapped(values: Array, columns: ColumnMap) -> Array:

@@ -44,6 +44,8 @@ _STRAINED_RAD_S, _STRAINED_RAD, _AT_LIMIT = 1.0, 0.5, 0.95
 _TURN_S, _NOT_FOLLOWED = 0.1, 0.7
 # Force in gravity that a vehicle feels in free fall at most, for how long, and the height that it loses in a second, m.
 _FALLS, _FALL_S, _DROP_M = 0.3, 0.2, 1.0
+# Descent that is no flight, and for how long: 75 m.
+_PLUNGES_M_S, _PLUNGE_S = 25.0, 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +145,7 @@ class Resting(NamedTuple):
 
     carried: BoolArray
     lies: BoolArray
+    plunges: int = -1  # First sample of a fall that it does not fly out of; -1 where there is none.
 
 
 def resting(signs: Signs, active: BoolArray) -> Resting:
@@ -150,14 +153,12 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
 
     Rotors push along one axis of the body: where the accelerometer feels the weight along another one while the vehicle
     hardly turns, it lies on its side or back. Without an accelerometer it lies where it is more than 90 degrees over.
-    It also rests where its rotors ask it to turn and it does not.
+    It also rests where its rotors ask it to turn and it does not. What falls as no flight does flies no more.
     """
     nowhere = np.zeros(len(active), dtype=bool)
     if signs.slow is None or signs.rate is None or not active.any():
         return Resting(nowhere, nowhere)
     held = active & _held_four(signs)
-    if (active & ~held).sum() * signs.period <= _FEWEST_S:
-        held = nowhere
     free = active & ~held
     lively = free & (signs.slow > LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else free
@@ -169,7 +170,18 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
     # A mean over a time says as much of all of it.
     carried = held | binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
-    return Resting(np.asarray(carried, dtype=bool), np.asarray(lies, dtype=bool))
+    plunges = _plunges(signs, active)
+    carried |= (plunges >= 0) & (np.arange(len(active)) >= plunges)
+    return Resting(np.asarray(carried, dtype=bool), np.asarray(lies, dtype=bool), plunges)
+
+
+def _plunges(signs: Signs, active: BoolArray) -> int:
+    step = round(SLOW_S / signs.period)
+    if signs.height is None or len(active) <= step:
+        return -1
+    falls = active[step:] & (signs.height[:-step] - signs.height[step:] > _PLUNGES_M_S * SLOW_S)
+    long = (first for first, after in runs(falls) if (after - first) * signs.period > _PLUNGE_S - SLOW_S)
+    return next(long, -1)
 
 
 def turns_over(signs: Signs, active: BoolArray) -> bool:
@@ -248,12 +260,15 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     vehicle rests, its rotors stop, or the log ends.
     """
     first, after = part
+    if after == rests.plunges:
+        return {"loss of control": after}
     rests_then = bool(rests.carried[after : after + 1].any())
     lies_then = rests_then or bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
     marked = _beyond_flight(signs, part, lies_then=lies_then)
     if rests_then and marked[0][: after - first].any():
-        # What shakes it when it has come to rest ends no flight.
-        marked = marked[0][: after - first], marked[1][: after - first], marked[2][: after - first]
+        # What shakes it when it has come to rest ends no flight; what brings it there does.
+        until = after - first + round(_TURN_S / signs.period)
+        marked = marked[0][:until], marked[1][:until], marked[2][:until]
     troubled, hits, strained = (first + np.flatnonzero(own) for own in marked)
     stops = _stops_in_the_air(signs, after)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
@@ -316,8 +331,6 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
     wild, strained = beyond(signs.turning, _WILD_RAD_S), beyond(signs.turning, _STRAINED_RAD_S)
     if signs.upright is not None:
         up = _turned_up(signs.upright, np.arange(len(signs.time)) < before.stop)
-        # What never was upside down, and is.
-        wild |= late & (up[first:stop] < 0) & bool((up[before] > 0).all())
         strained |= beyond(np.arccos(np.clip(up, -1.0, 1.0)), _STRAINED_RAD)
     if signs.rotors is not None:
         strained &= (signs.rotors[first:stop] >= _AT_LIMIT * float(np.nanmax(signs.rotors))).any(axis=1)

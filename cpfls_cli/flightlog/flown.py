@@ -24,13 +24,16 @@ _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
 # Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
 # range of leans above which a vehicle moves.
 _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
-# Ranges of leans, of slow forces, in weights, and of height of what surely moves; of slow forces of what does not, and
-# of the height that is estimated for it.
-_FAR_RAD, _PUSHED, _FAR_M, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 30.0, 0.03, 1.0
+# Ranges of leans and of slow forces, in weights, of what surely moves; of slow forces of what does not, and of the
+# height that is estimated for it.
+_FAR_RAD, _PUSHED, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 0.03, 1.0
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
 # vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
 _SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
 _UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
+# Range of squared commands, over their mean, whose thrust is felt in the air, unless it climbs by so many m; and the
+# share of it that is felt where something else holds the vehicle.
+_WORKS, _CLIMBS_M, _UNFELT = 1.0, 3.0, 0.12
 # Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in weights
 # below which it falls, on the mean over s.
 _TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
@@ -133,7 +136,6 @@ def _flown_of(table: SignalTable, settings: ImportSettings) -> FlownPart:
 def find_flown(signs: Signs) -> FlownPart:
     """Find the stretches of a log that are flown, and the longest of them."""
     signs = signs.slower(_MOST_CLOCK_HZ)
-    signs = replace(signs, body_rate=None) if _dead_rates(signs) else signs
     active, how = _active(signs)
     if active is None:
         return FlownPart(None, (how,), flies=False)
@@ -170,12 +172,12 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
         if height is None or not turning.any() or turning.all():
             return turning, how
         return _off_the_ground(turning, height, period), how + ", or it is on the ground"
-    if height is not None and float(np.ptp(height)) > 2 * _LEAST_HEIGHT:
-        ground = float(np.quantile(height, 0.02))
-        above = height - ground > max(_LEAST_HEIGHT, _OF_HEIGHT * float(np.ptp(height)))
+    if height is not None and (rate is None or float(np.ptp(height)) > 2 * _LEAST_HEIGHT):
+        ground, ranges = float(np.quantile(height, 0.02)), float(np.ptp(height))
+        above = height - ground > max(_LEAST_HEIGHT, _OF_HEIGHT * ranges)
         starts_there = abs(float(np.median(height[: max(1, round(_SHORT_S / period))])) - ground) < _LEAST_HEIGHT
-        flies = smoothed(above, period, _SHORT_S) if starts_there else np.ones(len(height), dtype=bool)
-        return flies, "it is on the ground"
+        stood = starts_there and ranges > 2 * _LEAST_HEIGHT
+        return smoothed(above, period, _SHORT_S) if stood else np.ones(len(height), dtype=bool), "it is on the ground"
     if rate is None:
         why = "no rotors, no height and no rates are recognised, so flight cannot be distinguished from standing"
         return None, f"{why}: {BY_HAND}"
@@ -201,12 +203,10 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
         if felt is not None:
             lively |= felt < _FALLS
-        stands = level <= ALIVE
-        for first, after in runs(stands):
-            # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
-            stands[first:after] = (after - first) * signs.period > _LONGEST_CUT_S
+        # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
+        turns_on = smoothed(level > ALIVE, signs.period, _LONGEST_CUT_S)
         first, last = np.flatnonzero(carrying)[[0, -1]]
-        carrying[first:last] |= (~stands & lively)[first:last]
+        carrying[first:last] |= (lively & turns_on)[first:last]
     return smoothed(carrying, signs.period, _SHORT_S)
 
 
@@ -245,21 +245,21 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle whose rotors turn stands on the ground or is bound to a bench."""
     height = signs.height
     rises = 0.0 if height is None else float(np.ptp(height[active]))
+    leans, pushed = _leans(signs, active), _pushed(signs, active)
+    level = leans is not None and leans < _LEANS_RAD
     if signs.turning is None or signs.slow is None:
-        leans = _leans(signs, active)
-        level = leans is not None and leans < _LEANS_RAD
         return height is not None and (rises < _UNMOVED_M or (level and rises <= _STILL_M))
     turning = float(np.sqrt(np.mean(signs.turning[active] ** 2)))
     # Vibration of the rotors is no turning: its mean is that of noise.
     slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))
     shakes = turning < _SHAKES_RAD_S and slow < _OF_NOISE * turning / np.sqrt(SLOW_S / signs.period)
-    leans, pushed = _leans(signs, active), _pushed(signs, active)
-    level = leans is not None and leans < _LEANS_RAD
     # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
     drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
+    # Where a gyroscope reads next to nothing, of a dead one as of a simulated hover, leans, force and height say more.
     if turning < _STILL_RAD_S:
-        return True
-    soft = turning < _SOFT_RAD_S and height is not None
+        lifts = (pushed is None or pushed >= _UNPUSHED) and rises > _STILL_M
+        return not (lifts or (leans or 0.0) > _FAR_RAD or (pushed or 0.0) > _PUSHED)
+    soft = turning < _SOFT_RAD_S
     return (rises <= _STILL_M and ((shakes and (level or leans is None)) or soft)) or (soft and drifts)
 
 
@@ -268,10 +268,16 @@ def _held(signs: Signs, active: BoolArray) -> str:
     if signs.rotors is None:
         return ""
     if signs.rotors.shape[1] == 4 and signs.slow is not None:
-        works = np.median(np.nan_to_num(signs.rotors)[active], axis=0)
+        shares = np.nan_to_num(signs.rotors)[active]
+        third = np.sort(shares[shares.mean(axis=1) > ALIVE], axis=1)[:, 1]
+        if len(third) and float(np.median(third)) < ALIVE:
+            return "no more than two of its four rotors work at a time"
+        works = np.median(shares, axis=0)
         idle = np.flatnonzero(works < _OF_MEAN * works.mean())
         if len(idle) and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
             return f"rotor {idle[0] + 1} hardly works, and it does not spin"
+    if _unfelt(signs, active):
+        return "what it feels does not grow with its thrust"
     if signs.body_rate is None or signs.felt is None:
         return ""
     # At rest the weight turns through the body as the body turns; in the air it stays along the rotors' axis. Where an
@@ -287,6 +293,19 @@ def _held(signs: Signs, active: BoolArray) -> str:
         if (swings and min(both / power, alike) < _AS_HELD) or not (swings or over_s == SLOW_S):
             return ""
     return "the weight turns through it as it turns"
+
+
+def _unfelt(signs: Signs, active: BoolArray) -> bool:
+    """Tell whether a vehicle feels no more where its rotors work much more."""
+    inner = _inner(signs, active)
+    climbs = signs.height is not None and float(np.ptp(signs.height[active])) > _CLIMBS_M
+    if signs.level is None or signs.felt is None or climbs or not inner.any():
+        return False
+    squares, felt = (averaged(each, signs.period, SLOW_S)[inner] for each in (signs.level**2, signs.felt))
+    thrust = np.median(felt, axis=0)
+    ranges = (np.ptp(np.quantile(each, [0.05, 0.95])) for each in (squares / squares.mean(), felt @ thrust))
+    works, feels = map(float, ranges)
+    return works > _WORKS and feels < _UNFELT * works * float(thrust @ thrust)
 
 
 def _leans(signs: Signs, active: BoolArray) -> float | None:
@@ -312,16 +331,6 @@ def _inner(signs: Signs, active: BoolArray) -> BoolArray:
     inner = active.copy()
     inner[:edge] = inner[len(inner) - edge :] = False
     return inner
-
-
-def _dead_rates(signs: Signs) -> bool:
-    """Tell whether body rates deny what leans, forces or height show."""
-    if signs.turning is None or float(np.sqrt(np.mean(signs.turning**2))) > _STILL_RAD_S:
-        return False
-    everywhere = np.ones(len(signs.time), dtype=bool)
-    rises = 0.0 if signs.height is None else float(np.ptp(signs.height))
-    leans, pushed = _leans(signs, everywhere) or 0.0, _pushed(signs, everywhere) or 0.0
-    return leans > _FAR_RAD or pushed > _PUSHED or rises > _FAR_M
 
 
 def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> FlownPart:
@@ -362,9 +371,7 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> Flown
 
 
 def _how(signs: Signs, part: slice, how: str) -> str:
-    if signs.level is None:
-        return how
-    if float(np.quantile(signs.level[part], 0.9)) >= ALIVE:
+    if signs.level is None or float(np.quantile(signs.level[part], 0.9)) >= ALIVE:
         return how
     by_hand = signs.slow is not None and float(np.quantile(signs.slow[part], 0.9)) > _TURNS_RAD_S
     return "the rotors stand still" + (" while it is moved by hand" if by_hand else "")

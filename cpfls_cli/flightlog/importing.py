@@ -67,10 +67,10 @@ def read_signals(
     mapped = conversion.drop_absent_signals(columns, settings)
     # What was asked for may be absent at any time: it decides on no row.
     settings = replace(mapped, signals={name: own for name, own in mapped.signals.items() if name not in SETPOINTS})
-    read, broken = repair.mask_impossible(SignalTable(*conversion.select_columns(columns, mapped)), mapped)
+    stamps, selected, first_stamp_s = conversion.select_columns(columns, mapped)
+    read, broken = repair.mask_impossible(SignalTable(stamps, selected), mapped)
     crop, cut = flown_crop(read, settings) if settings.crop_s == "flown" else (settings.crop_s, ())
-    settings = replace(settings, crop_s=crop)
-    table, dropped = repair.crop_and_order(read, settings)
+    table, dropped = repair.crop_and_order(read, settings := replace(settings, crop_s=crop))
     cut = warn_of_end(table, settings) if mapped.crop_s != "flown" else cut
     asked, table = (
         SignalTable(table.time, {name: own for name, own in table.signals.items() if (name in SETPOINTS) == setpoint})
@@ -109,7 +109,7 @@ def read_signals(
         gaps=int((np.diff(table.time) > 1.5 * np.median(np.diff(table.time))).sum()),
         longest_gap_s=float(np.diff(table.time).max()),
         span_s=(float(clock[0]), float(clock[-1])),
-        first_stamp_s=conversion.first_stamp(columns, mapped),
+        first_stamp_s=first_stamp_s,
         crop_s=crop if isinstance(crop, tuple) else None,
         log_rate_hz=rate_hz,
         rate_hz=rate_hz,

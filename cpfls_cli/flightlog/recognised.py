@@ -122,8 +122,9 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
         known = known[np.isfinite(known)]
         usual = _TIME_NAMES.fullmatch(lower)
         rises = len(known) > max(2, 0.5 * len(values)) and (np.diff(known) >= 0).all() and np.ptp(known) > 0
-        if rises and (usual or "time" in lower or "stamp" in lower):
-            ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2
+        named = usual or "time" in lower or "stamp" in lower
+        if rises and (named or units.get(name) == "s"):
+            ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2 if named else 3
     for name in sorted(ranks, key=ranks.__getitem__):
         step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
         if name in units:

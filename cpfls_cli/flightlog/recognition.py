@@ -28,7 +28,7 @@ from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY
-from cpfls_cli.words import some
+from cpfls_cli.words import joined, some
 
 _DEGREES = 180 / np.pi
 # Below which a torque is compared with the angular acceleration, and the correlation from which on that follows it.
@@ -92,9 +92,10 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         own = rotors.command or rotors.driving
         logged = as_mapped(log.on_grid(own.columns.columns, spikes=False), own.columns)
         shares = rotor_shares(logged, shares=own is rotors.command)
-    flown = find_flown(_signs(log, candidates, shares)).within(ended, (0.0, float(log.grid[-1] - log.grid[0])))
+    flown = find_flown(signs := _signs(log, candidates, shares)).within(ended, (0.0, float(log.grid[-1] - log.grid[0])))
     if not flown.flies:
-        raise InputError(flown.reasons[0])
+        held = f"holds {joined([name.replace('_', ' ') for name in candidates])} alone: "
+        raise InputError(held * (signs.rotors is signs.height is signs.rate is None) + flown.reasons[0])
     carried = flown if kind is None else _hover_of(log, kind, flown)
     winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
@@ -167,7 +168,7 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
     if rate is not None:
         unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(rate), 0.99)) > _FASTEST_RAD_S
         rate = rate / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)
-    if angles is not None and float(np.abs(angles[:, :2]).max()) > np.pi:
+    if angles is not None and (first["attitude"].unit == "deg" or float(np.abs(angles).max()) > 2 * np.pi):
         angles = angles / _DEGREES
     ordered = "quaternion" in first and (first["quaternion"].group.kind == "wxyz" or first["quaternion"].known)
     return Signs(

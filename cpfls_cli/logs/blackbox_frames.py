@@ -232,7 +232,8 @@ def decode(
             continue
         place = end
         resumed = resumed or event == _RESUMED
-        if kind == slow:
+        # What looks like one behind a fault is most often none.
+        if kind == slow and (in_step or not broken):
             changes.append((len(parts) * _TOGETHER + len(rows), *row))
         if kind != main and (kind != between or not in_step):
             continue

@@ -34,6 +34,11 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read columns of a log; without a wish, those whose first value is a number, a time or absent."""
     with _opened(path) as table:
         names, first = table.names, dict(zip(table.names, table.first, strict=False))
+        # What is absent at first may be a word later on.
+        for row in (own for own in table.rows if len(own) == len(first)):
+            if all(map(str.strip, first.values())):
+                break
+            first = {name: own.strip() or later for (name, own), later in zip(first.items(), row, strict=True)}
     numeric = [name for name in names if name in first and _kind(first[name])]
     units = {name: "s" for name in numeric if _kind(first[name]) == "time"}
     if wanted is not None:
@@ -58,7 +63,11 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
             if not row:
                 continue
             if len(row) != len(names):
-                raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names")
+                # A last line may have been cut, where more than one before it show how long they are.
+                if len(row) < len(names) and count > 1 and not any(table.rows):
+                    break
+                way = f": line {number - 1} has to name each column" if len(names) == 1 else ""
+                raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names{way}")
             try:
                 numbers.extend(_plain_numbers([row[index] for index in kept]))
             except ValueError:
@@ -111,10 +120,11 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     numbers = [name for name in names if name and _kind(name) == "number"]
     # Columns may be numbered, and a row of data may hold words.
     numbered = len(set(numbers)) == len(numbers) < len(names) and all(map(str.isdecimal, numbers))
-    if len(names) > 1 and 2 * len(numbers) > len(names) and not numbered:
+    if 2 * len(numbers) > len(names) and not numbered:
+        many = f"{len(numbers)} number{'s' * (len(numbers) > 1)}"
         raise InputError(
-            f"{path}: has no line of column names, line {line} holds {len(numbers)} numbers: put a line above it that"
-            " names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
+            f"{path}: has no line of column names, line {line} holds {many}: put a line above it that names each"
+            " column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
         )
     begun = []
     for text in lines:
@@ -174,7 +184,9 @@ def _seconds(text: str) -> float:
     """Read a date with a time, or a time of day, as ISO 8601 writes it; where no zone is named, as one of UTC."""
     if ":" not in text:
         raise ValueError(text)
-    stamp = datetime.fromisoformat(text if text[4:5] == "-" else f"1970-01-01T{text}")
+    # An hour may have one digit, and slashes may part a date.
+    dated, of_day = text.replace("/", "-"), f"1970-01-01T{'0' * (text[1:2] == ':')}{text}"
+    stamp = datetime.fromisoformat(dated if dated[4:5] == "-" else of_day)
     return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
 
 

@@ -96,17 +96,11 @@ def what_is_logged(
         spans_s=np.array(spans).reshape(-1, 2),
         voltage_begin=float(np.median(volts[:near])) if len(volts) else np.nan,
         voltage_end=float(np.median(volts[-near:])) if len(volts) else np.nan,
-        gyroscope=_gyroscope(flight),
+        gyroscope="behind" * bool(flight.autopilot) if flight.gyroscope_unfiltered is None else "both",
         signals=rows,
         faster=log_faster(joined(slow), FAST_HZ, flight.system, parameters=flight.parameters) if slow else "",
         warnings="\n".join(warnings),
     )
-
-
-def _gyroscope(flight: LogFlight) -> str:
-    if flight.gyroscope_unfiltered is not None:
-        return "both"
-    return "behind" if flight.autopilot else ""
 
 
 def _rows(flight: LogFlight, log: LookedLog, recognition: Recognition) -> list[SignalRow]:

@@ -33,6 +33,7 @@ from cpfls_cli.look.columns import FRD, LookedLog, along_each, on_clock
 from cpfls_cli.look.driving import Rotors, as_shares, find_driving
 from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.units import SPEED_UNITS, STANDARD_GRAVITY, known_unit
+from cpfls_cli.words import joined
 
 _DEGREES: Final = 180 / np.pi
 _MOST_HZ: Final = 1000.0
@@ -59,6 +60,7 @@ _LEAST_V, _LARGEST_V, _LEAST_A = 2.0, 100.0, 1.0
 """Of any battery of a multirotor; and the current below which none flies: one of 27 g takes 2 A of one cell, and more
 cells are for larger ones."""
 _BODY: Final[tuple[SignalName, ...]] = ("body_rate", "setpoint_body_rate", "sticks", "acceleration", "body_torque")
+_SURFACES: Final = ("aileron", "elevator", "rudder", "elevon")  # Which move an airplane.
 _OLD_GAINS: Final = ("RATE_RLL_", "RATE_PIT_", "RATE_YAW_")
 """Of ArduCopter before 3.4."""
 
@@ -105,23 +107,23 @@ class _Reader:
         """Gather all signals on one clock."""
         gyroscope = self._gyroscope()
         rate = self._rate(gyroscope)
-        speeds = self.signal("rotor_speed")
+        speeds, commands = self.signal("rotor_speed"), self.signal("rotor_command")
         guess = self.recognition.signal("rotor_command")
-        commands = self.signal("rotor_command")
         asks_speeds = guess is not None and guess.columns.unit in SPEED_UNITS
         commands = as_shares(commands) if commands is not None and asks_speeds else commands
         rotors = Rotors(commands, guess, self._airframe(), speeds)
         driving = find_driving(self.log, rotors, self.autopilot, self.parameters, self.signal("body_torque"))
-        attitude, asked = self._attitudes()
+        attitude = self._as_angles(self.recognition.signal("quaternion") or self.recognition.signal("attitude"))
+        asked = self._as_angles(self.recognition.signal("setpoint_attitude"))
         setpoint, sticks = self._rate_setpoint(gyroscope), self._sticks()
         thrust = rotors.samples or next(self.log.found("collective"), None) or rotors.thrusts(ThrustCurve())
         if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
-            raise InputError(self._nothing_asked())
+            faster = log_faster("rotors or setpoints", FAST_HZ, self.system, parameters=self.parameters)
+            raise InputError(f"holds motion, but neither rotors nor anything that was asked of them: {faster}")
         if thrust is not None and float(thrust.values.max()) < ALIVE:
             raise InputError(f"no flight in it: the thrust that is asked for ({thrust.source}) stays at 0")
         clock = _clock(rate, driving.command)
-        height, climb = self._heights()
-        force, gaps = self._force(), _gaps(rate, driving.command)
+        (height, climb), force, gaps = self._heights(), self._force(), _gaps(rate, driving.command)
         on, command = (on_clock(each, clock, 3, cubic=True) for each in (rate, driving.command))
         forward = forward_flight(self.log.table.topics, clock) if self.recognition.winged else None
         whole = np.isfinite(on).all(axis=1) & ~_within(clock, gaps, _AROUND_S) & (forward is None or ~forward)
@@ -142,7 +144,7 @@ class _Reader:
             stick=on_clock(sticks, clock, 3),
             attitude_setpoint=on_clock(asked, clock, 3),
             attitude=on_clock(attitude, clock, 3),
-            collective=on_clock(thrust and _mean(thrust), clock, 1)[:, 0],
+            collective=on_clock(thrust, clock, 1).mean(axis=1),
             voltage=voltage,
             current=current,
             height=on_clock(height, clock, 1)[:, 0],
@@ -169,10 +171,6 @@ class _Reader:
         known = KnownLog(self.name, self.recognition, self.parameters, self.system, columns)
         return airframe_of([known])[0] if self.recognition.rotors else None
 
-    def _nothing_asked(self) -> str:
-        faster = log_faster("rotors or setpoints", FAST_HZ, self.system, parameters=self.parameters)
-        return f"holds motion, but neither rotors nor anything that was asked of them: {faster}"
-
     def signal(self, name: SignalName) -> Samples | None:
         """Give what is recognised, in SI, that of the body in axes forward, right, down; None where it is not."""
         guess = next((own for own in self.recognition.signals if own.signal == name), None)
@@ -194,6 +192,8 @@ class _Reader:
         if found is None:
             faster = log_faster("body rates", FAST_HZ, self.system, parameters=self.parameters)
             held = ", ".join(guess.signal.replace("_", " ") for guess in self.recognition.signals)
+            surfaces = [own for own in self.log.table.names if own.lower() in _SURFACES]
+            held += f"; {joined(surfaces)} are no rotors" if surfaces else ""
             raise InputError(f"a log without a gyroscope (it holds {held}): {faster}")
         return found
 
@@ -272,10 +272,6 @@ class _Reader:
         return voltage, np.full_like(current, np.nan) if none else current
 
     # Where it is.
-
-    def _attitudes(self) -> tuple[Samples | None, Samples | None]:
-        attitude = self._as_angles(self.recognition.signal("quaternion") or self.recognition.signal("attitude"))
-        return attitude, self._as_angles(self.recognition.signal("setpoint_attitude"))
 
     def _as_angles(self, guess: Guess | None) -> Samples | None:
         """Give roll, pitch and yaw of a body forward, right, down in a world north, east, down."""
@@ -385,10 +381,6 @@ def _same_motion(samples: Samples, gyroscope: Samples) -> bool:
     along, factor = along_each(samples, gyroscope)
     close = along > _CLOSE
     return bool(close.any() and (np.abs(factor[close] - 1) < _SAME_SIZE).all())
-
-
-def _mean(rotors: Samples) -> Samples:
-    return rotors._replace(values=rotors.values.mean(axis=1, keepdims=True))
 
 
 def _fifo(log: LookedLog) -> Samples | None:

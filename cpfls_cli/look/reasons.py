@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from cpfls_cli.arrays import BoolArray
+from cpfls_cli.arrays import BoolArray, runs
 
 NO_COMMAND = "what acts about the axis is not logged"
 NO_SETPOINT = "no rate setpoint is logged"
@@ -25,7 +23,6 @@ def needed_s(window_s: float) -> float:
 
 def too_short(usable: BoolArray, rate_hz: float, window_s: float) -> str:
     """Say how much of a log is usable in pieces that hold a window, and how much is needed."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], usable.astype(np.int8), [0]]))).reshape(-1, 2)
-    pieces = np.diff(edges, axis=1)[:, 0] / rate_hz
-    whole = float(pieces[pieces >= window_s].sum())
+    pieces = [(after - first) / rate_hz for first, after in runs(usable)]
+    whole = sum(piece for piece in pieces if piece >= window_s)
     return f"{whole:.0f} s are usable in pieces of at least {window_s:.0f} s; {needed_s(window_s):.0f} s are needed"

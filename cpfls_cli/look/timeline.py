@@ -29,9 +29,10 @@ _UNITS: Final = {"gyroscope": "rad/s", "accelerometer": "m/s²"}
 _OF_SCALE, _CLIPPED_ROWS = 0.02, 3
 """Share by which a largest reading may differ from a full scale, and rows in which it stays there, to be clipped."""
 
-_ROUNDED, _FULL, _FEWEST_PLATEAUS, _LIMIT_S, _LONG_S = 1e-4, 0.985, 3, 0.05, 2.0
-"""Shares of full command: that of rounding, and from which on the largest one is a limit; plateaus of some rotors at a
-smaller one that make it one; and how long a rotor is there, and at one plateau that alone makes it one, s."""
+_ROUNDED, _STEP, _FULL, _FEWEST_PLATEAUS, _LIMIT_S, _LONG_S = 1e-4, 2e-3, 0.985, 3, 0.05, 2.0
+"""Shares of full command: that of rounding, that of a step of pulses, and from which on the largest one is a limit;
+plateaus of some rotors at a smaller one that make it one; and how long a rotor is there, and at one plateau that alone
+makes it one, s."""
 
 _LIES, _LIES_S, _HARD_S = -0.7, 1.0, 1.5
 """Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity and
@@ -45,7 +46,7 @@ _UPSIDE_DOWN_S, _SAGS, _SAG_S, _SUDDEN, _SUDDEN_S = 0.2, 0.17, 0.25, 0.15, 1.0
 end of a log that stops in the air."""
 
 _CLIMBS_S: Final = 10.0
-"""Between the autopilot's word for take-off and a height that is surely none of the ground, s."""
+"""Between the autopilot's word for take-off or landing and a height that is surely none of the ground, s."""
 
 _NEAR_S, _RESTARTS_S, _LONG_GAP_S, _PAUSE_S = 3.0, 1.0, 0.1, 2.0
 """By which the autopilot's word for take-off and landing is near that of the signals; by which a clock falls back that
@@ -185,16 +186,17 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
     lifts, lands = _land_detector(topics)
     ends = [(what, at + recognition.counted_from_s) for what, at in recognition.flown.moments]
     last, spans = float(flight.time[-1]), runs(flight.flown)
+    lately = flight.collective[-max(2, round(_AT_END_S * flight.rate_hz)) :]
     for number, (first, after) in enumerate(spans):
         before = spans[number - 1][1] if number else 0
         follows = spans[number + 1][0] if number + 1 < len(spans) else None
         begin, end = float(flight.time[first]), float(flight.time[after - 1])
         yield Event(time_s=begin, until_s=end, kind="flown", text="flies")
-        lifted, landed = _nearest(lifts, begin), _nearest(lands, end)
-        if lifted is None:
-            # What climbs far is surely off the ground long after it has left it.
-            earlier = [at for at in lifts if begin - _CLIMBS_S < at < begin and at > flight.time[max(before - 1, 0)]]
-            lifted = max(earlier, default=None)
+        # What climbs far is surely off the ground long after it has left it, and is near it again long before.
+        earliest = max(begin - _CLIMBS_S, flight.time[before - 1] if number else 0.0)
+        latest = min(end + _CLIMBS_S, last if follows is None else flight.time[follows])
+        lifted = max((at for at in lifts if earliest < at < begin + _NEAR_S), default=None)
+        landed = min((at for at in lands if end - _NEAR_S < at <= max(latest, end + _NEAR_S)), default=None)
         if lifted is not None or (begin - float(flight.time[0]) > _AROUND_S and _rests(flight, slice(before, first))):
             yield Event(time_s=begin if lifted is None else lifted, kind="take-off", text="takes off")
         if any(end - _NEAR_S <= at < end + _NEAR_S for _, at in ends):
@@ -203,7 +205,7 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
         stopped = touch.severity == "warning"
         if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows), stopped)):
             yield touch
-        elif last - end < _AT_END_S and _carries(flight):
+        elif last - end < _AT_END_S and np.fmin.reduce(lately) > _LESS * _carried_by(flight):
             text = f"the log ends in the air{_voltage_lost(flight)}"
             yield Event(time_s=end, kind="end", text=text, severity="warning" if flight.system else "note")
     for what, at in ends:
@@ -241,18 +243,6 @@ def _rests(flight: LogFlight, part: slice, stopped: bool = False) -> bool:
     climbs = np.abs(flight.climb_rate[part][less])
     climbs = climbs[np.isfinite(climbs)]
     return bool(less.any()) and (stopped or not (len(climbs) > 0 and float(np.median(climbs)) > _MOVES_M_S))
-
-
-def _carries(flight: LogFlight) -> bool:
-    """Tell whether rotors carry the vehicle in the last samples."""
-    after = flight.collective[-max(2, round(_AT_END_S * flight.rate_hz)) :]
-    return bool(np.isfinite(after).any()) and float(np.nanmin(after)) > _LESS * _carried_by(flight)
-
-
-def _nearest(stated: Sequence[float], at: float) -> float | None:
-    """Give the moment that the autopilot states near that of the signals; None where it states none."""
-    near = min(stated, key=lambda own: abs(own - at), default=np.inf)
-    return near if abs(near - at) < _NEAR_S else None
 
 
 def _land_detector(topics: Topics) -> tuple[list[float], list[float]]:
@@ -321,12 +311,10 @@ def _modes(changes: Iterator[tuple[float, float]], names: str) -> Iterator[Event
 
 
 def _arming(changes: Iterator[tuple[float, float]]) -> Iterator[Event]:
-    last: float | None = None
-    for at, value in changes:
+    for number, (at, value) in enumerate(changes):
         text = "armed" if value else "disarmed"
-        if value or last:
-            yield Event(time_s=at, kind="armed", text=text if last is not None else "armed when the log begins")
-        last = value
+        if value or number:
+            yield Event(time_s=at, kind="armed", text=text if number else "armed when the log begins")
 
 
 def _of_ardupilot(topics: Topics) -> Iterator[Event]:
@@ -387,7 +375,8 @@ def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     """Find rotors that get all there is: full command, or a largest one that comes again and again as a plateau."""
     time, values = flight.rotors.time, flight.rotors.values
     most = min(float(np.nanmax(values)), 1.0)
-    full = (values >= most - _ROUNDED) & _flown_or_after(flight, time, after_s)[:, None]
+    flown = _flown_or_after(flight, time, after_s)[:, None]
+    full = (values >= most - _ROUNDED) & flown
     # Where all are there together, it is the crest of a climb.
     plateaus = list(_held(time, np.asarray(full.any(axis=1) & ~full.all(axis=1)), 0.0))
     long = (values[(time >= a) & (time <= b)] for a, b in plateaus if b - a >= _LONG_S)
@@ -395,7 +384,7 @@ def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     limits = len(plateaus) >= _FEWEST_PLATEAUS or any(np.ptp(each, axis=0).max() > _ROUNDED for each in long)
     if most < _FULL and not (limits and flight.rotors_source == "logged"):
         return
-    for rotor, column in enumerate(full.T):
+    for rotor, column in enumerate(((values >= most - _STEP) & flown).T):
         held = list(_held(time, column, _LIMIT_S))
         if held:
             total, longest = sum(b - a for a, b in held), max(b - a for a, b in held)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cpfls_cli.flightlog.crash import Signs, upright_of
+from cpfls_cli.flightlog.crash import Resting, Signs, ended_early, upright_of
 from cpfls_cli.flightlog.flown import find_flown, rotor_shares
 from tests.builders import ended_flights as ended
 from tests.builders.topic_logs import ardupilot, proposed
@@ -86,6 +86,27 @@ def test_rotors_that_stop_in_the_air_are_no_landing(own, known):
     assert found.ended == f"the rotors stop in the air at 40.0 s{hit}"
     landed = ended.then(ended.then(own, 0.04, rate=1.0, felt=(0.0, 0.0, 40.0)), 5.0)
     assert flown(landed, known).ended == ""
+
+
+def test_a_fall_that_no_flight_has_is_a_loss_of_control(own):
+    """Rotors at full all the while, and a landing at any speed is none."""
+    plunges = ended.then(own, 8.0, rate=2.0, rotors=1.6, felt=(0.0, 0.0, 4.0), falls=10.0)
+    found = flown(plunges, ("height",))
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS + 2.5, abs=0.3))
+    assert found.ended.startswith("loss of control at 42.")
+    brief = ended.then(own, 4.0, rate=2.0, rotors=1.6, felt=(0.0, 0.0, 4.0), falls=10.0)
+    assert "loss of control" not in flown(brief, ("height",)).ended
+
+
+def test_a_jolt_at_the_moment_of_coming_to_rest_is_an_impact():
+    """It lies from the sample on that jolts, right after it turned as it never did."""
+    time = np.arange(0.0, 50.0, 0.02)
+    turns = np.where((time > 39.9) & (time < 40.0), 8.0, 0.3 * np.sin(time) * (time < 39.9))
+    size = np.where((time >= 40.0) & (time < 40.07), 6.0, 1.0)
+    signs = Signs(time=time, body_rate=turns[:, None] * [1.0, 0, 0], force=size[:, None] * [0, 0, 1.0])
+    rests = np.asarray(time >= 40.0)
+    ended_by = ended_early(signs, Resting(rests, rests), (0, int(rests.argmax())))
+    assert {what: time[at] for what, at in ended_by.items()} == {"impact": pytest.approx(39.9, abs=0.05)}
 
 
 def test_of_a_crash_amid_a_log_the_longest_stretch_is_used(own):

@@ -152,6 +152,50 @@ def test_a_quadrotor_without_one_rotor_spins_or_is_held():
     assert find_flown(Signs(time=TIME, rotors=rotors, body_rate=spinning)).flies
 
 
+def test_what_feels_no_thrust_is_held():
+    """Rotors that work up to six times as much as they did are felt in the air, and not by what is tied down."""
+    squares = 0.2 + 0.14 * np.sin(0.5 * TIME)
+    rate = np.random.default_rng(4).standard_normal((len(TIME), 3))
+
+    def flown(felt):
+        force = felt[:, None] * [0.0, 0.0, 1.0] + 0.02 * rate
+        rotors = np.repeat(np.sqrt(squares)[:, None], 4, axis=1)
+        return find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=force))
+
+    held = flown(1.0 + 0 * TIME)
+    assert held.reasons == ("no flight in it: what it feels does not grow with its thrust, as on a test stand",)
+    assert flown(squares / squares.mean()).flies
+
+
+def test_what_turns_itself_over_on_the_ground_does_not_fly():
+    """Two rotors at a time, in either direction."""
+    works = np.where((TIME % 4 < 2)[:, None], [0.6, 0.6, 0.0, 0.0], [0.0, 0.0, 0.6, 0.6])
+    rate = 3.0 * np.sin(2 * TIME)[:, None] * [1.0, 0.3, 0.1]
+    found = find_flown(Signs(time=TIME, rotors=works, body_rate=rate))
+    why = "no flight in it: no more than two of its four rotors work at a time, as on a test stand"
+    assert (found.flies, found.reasons) == (False, (why,))
+    assert find_flown(Signs(time=TIME, rotors=np.maximum(works, 0.1), body_rate=rate)).flies
+
+
+@pytest.mark.parametrize("lifts", [True, False])
+def test_a_simulated_hover_whose_gyroscope_reads_next_to_nothing_flies(lifts):
+    height = 5 * np.clip((TIME - 5) / 5, 0, 1) * lifts
+    force = np.column_stack([0 * TIME, 0 * TIME, 1 + 0.1 * lifts * np.sin(TIME)])
+    rate = 1e-4 * np.sin(TIME)[:, None] * [1.0, 1.0, 1.0]
+    rotors = np.repeat(between(3, 40, 0.5)[:, None], 4, axis=1)
+    assert find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, height=height, force=force)).flies == lifts
+
+
+def test_idling_rotors_that_hardly_shake_the_vehicle_do_not_fly():
+    flown = flown_by(between(5, 35, 0.1), None, turning(5, 35, 0.015))
+    assert (flown.flies, flown.reasons) == (False, ("no flight in it: the vehicle neither turns nor moves",))
+
+
+def test_a_height_that_hardly_changes_is_one_without_other_signs_too():
+    assert flown_by(None, 2.0 + 0.03 * np.sin(TIME), None).flies
+    assert flown_by(None, 0 * TIME, None).reasons == ("no flight in it: the vehicle neither turns nor moves",)
+
+
 def test_a_cut_throttle_in_free_fall_is_part_of_the_flight():
     level = between(5, 35, 0.5) - between(15, 17, 0.5)
     falls = between(15.1, 17, -0.95)

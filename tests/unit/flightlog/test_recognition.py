@@ -298,6 +298,30 @@ def test_what_is_no_flight_is_refused(own, changed, message):
         seen(flat_log(own, **changed))
 
 
+def test_what_shows_no_flight_is_said_with_what_it_holds(own):
+    bare = flat_log(own, **dict.fromkeys(("speed", "rate", "position", "velocity")))
+    with pytest.raises(InputError, match=r"^holds attitude and acceleration alone: no rotors, no height and no rates"):
+        seen(bare)
+
+
+def test_a_date_is_a_clock_whatever_its_name(own):
+    log = flat_log(own, t=None)
+    log.topics[""]["Date"], log.units["Date"] = own.time + 1.7e9, "s"
+    assert seen(log).time_column == "Date"
+
+
+def test_small_leans_in_degrees_are_no_crash(own):
+    """A hover that leans by 0.03 rad, which are 1.7 degrees, and no 1.7 rad."""
+    calm = type(own)(**vars(own))
+    calm.angles = 0.03 * own.angles / np.abs(own.angles).max()
+    calm.angles[1200:, 0] = 0.03
+    calm.rate = np.where(own.time[:, None] < 12.0, own.rate, 0.02 * own.rate)
+    log = flat_log(calm, attitude=named(np.degrees(calm.angles), "roll", "pitch", "yaw"), force=None)
+    log.units.update(roll="deg", pitch="deg", yaw="deg")
+    found = seen(log).flown
+    assert (found.ended, found.span_s) == ("", None)
+
+
 def test_a_stand_with_idling_rotors_is_no_flight(own):
     still = with_ground(own, idle=0.3)
     count = 480

@@ -95,6 +95,12 @@ def test_the_log_s_own_mask_keeps_its_bits():
     assert "for ArduCopter 3.1.3 logs outputs (RCOU) 10 times a second at most" in words
 
 
+def test_a_crazyflie_that_logs_fast_enough_gets_no_setting_that_slows_it():
+    words = log_faster("the gyroscope", 200.0, "Crazyflie")
+    assert words.startswith("log the gyroscope at 200 Hz or more")
+    assert "period_in_ms = " not in words
+
+
 def test_of_unknown_writers_nothing_is_named_and_of_known_ones_each_once():
     assert log_faster("rotors", 50.0, "ROS 2") == log_faster("rotors", 50.0) == "log rotors at 50 Hz or more"
     words = log_faster("rotors", 50.0, "PX4 1.14.3", "PX4 1.15.0", "ArduCopter 4.5.7")

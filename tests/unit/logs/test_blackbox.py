@@ -8,7 +8,21 @@ import pytest
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import log_contents, log_flights
-from tests.builders.blackbox_logs import BATTERY, BEEP, END, FACTS, FIELDS, NAMES, RESUMED, SLOW, flight, frames, header
+from tests.builders.blackbox_logs import (
+    BATTERY,
+    BEEP,
+    END,
+    FACTS,
+    FIELDS,
+    NAMES,
+    RESUMED,
+    SLOW,
+    flight,
+    frames,
+    header,
+    three,
+    unsigned,
+)
 
 
 @pytest.fixture
@@ -124,6 +138,15 @@ def test_what_is_broken_costs_the_frames_up_to_the_next_whole_one(read):
     contents = read(header() + b"".join(parts))
     held(contents, np.delete(rows, range(11, 16), axis=0))
     assert contents.warnings == ("1 frames are broken; everything up to the next whole frame is missing",)
+
+
+def test_slow_fields_behind_a_fault_are_not_believed(read):
+    parts = frames(flight())
+    whole = read(header() + b"".join([*parts[:3], SLOW, *parts[3:]])).topics[""]
+    parts[11] = parts[11][:1] + b"\xff" * 9 + b"S" + unsigned(1) + three([0, 2, 0])
+    broken = read(header() + b"".join([*parts[:3], SLOW, *parts[3:]])).topics[""]
+    for name in ("flags", "phase"):
+        assert set(broken[name]) == set(whole[name])
 
 
 def test_a_stray_letter_of_frames_that_the_log_has_none_of_is_no_frame(read):

@@ -237,7 +237,10 @@ def test_names_with_spaces_are_of_commas(tmp_path: Path) -> None:
     assert list(own.topics[""]) == ["time (us)", "gyroADC[0]", "vbat latest (V)"]
 
 
-@pytest.mark.parametrize("first", ["2024-05-01T12:00:59.5Z", "2024-05-01 12:00:59.5", "12:00:59.5"])
+@pytest.mark.parametrize(
+    "first",
+    ["2024-05-01T12:00:59.5Z", "2024-05-01 12:00:59.5", "2024/05/01 12:00:59.5", "12:00:59.5", "7:00:59.5"],
+)
 def test_dates_and_times_of_day_are_stamps_in_seconds(tmp_path: Path, first: str) -> None:
     second = first.replace("00:59.5", "01:00.75")
     own = contents(_written(tmp_path / "log.csv", f"time,p\n{first},1\n{second},2\n"))
@@ -250,9 +253,26 @@ def test_a_log_without_names_says_where_they_go(tmp_path: Path) -> None:
         contents(_written(tmp_path / "log.csv", _rows(",")))
     with pytest.raises(InputError, match="line 1 holds 3 numbers"):
         contents(_written(tmp_path / "log.csv", "1008.24,10901,acc.z,0.01\n1008.25,10902,acc.z,0.02\n"))
+    with pytest.raises(InputError, match="line 1 holds 1 number: put"):
+        contents(_written(tmp_path / "log.csv", "0.5\n0.6\n"))
+    with pytest.raises(InputError, match=r"log\.csv:2: 3 fields, but 1 column names: line 1 has to name each column"):
+        contents(_written(tmp_path / "log.csv", "flight\n0.5,1,2\n0.6,2,3\n"))
     # Columns may be numbered.
     numbered = contents(_written(tmp_path / "log.csv", "time,0,1,2,3\n0.5,4,3,2,1\n0.6,5,4,3,2\n"))
     assert [*numbered.topics[""]] == ["time", "0", "1", "2", "3"]
+
+
+def test_a_column_that_is_empty_at_first_may_hold_words(tmp_path: Path) -> None:
+    own = contents(_written(tmp_path / "log.csv", "time,mode,p\n0,,\n1,HOLD,\n2,HOLD,3\n"))
+    assert list(own.topics[""]) == ["time", "p"]
+    np.testing.assert_array_equal(own.topics[""]["p"], [np.nan, np.nan, 3.0])
+
+
+def test_a_last_line_that_was_cut_is_left_out_and_no_other_one(tmp_path: Path) -> None:
+    own = contents(_written(tmp_path / "log.csv", "time,p,q\n0,1,2\n1,2,3\n2,3"))
+    np.testing.assert_array_equal(own.topics[""]["time"], [0.0, 1.0])
+    with pytest.raises(InputError, match=r"log\.csv:3: 2 fields, but 3 column names$"):
+        contents(_written(tmp_path / "log.csv", "time,p,q\n0,1,2\n1,2\n2,3,4\n"))
 
 
 def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
@@ -503,6 +523,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ),
         ("a.log", b"#DroneDeploy\t2.7\n", "a log of an app", "the log that the autopilot writes"),
         ("a.txt", b'[{"t": 1}]', "JSON", "write its numbers as CSV"),
+        ("a.data", b"0.5 12 IMU_GYRO 0.1 0.2 0.3\n", "a log of Paparazzi", "write its numbers as CSV"),
         ("a.bin", b"", "an empty file", "the copy failed"),
         ("a.log", b"", "an empty file", "the copy failed"),
         ("a.pdf", b"%PDF-1.4", "a PDF", "the log that it shows"),

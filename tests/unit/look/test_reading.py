@@ -8,7 +8,7 @@ from cpfls_cli.look.hover import hover_of
 from cpfls_cli.look.reading import read_flight
 from tests.builders import looked_logs as logs
 from tests.builders.topic_logs import topic
-from tests.builders.unknown_logs import FLIP, GRAVITY, flight, named
+from tests.builders.unknown_logs import FLIP, GRAVITY, flat_log, flight, named
 
 OWN = flight(seconds=20.0)
 
@@ -210,6 +210,12 @@ def test_a_log_without_a_gyroscope():
         del contents.topics[name]
     with pytest.raises(InputError, match=r"^a log without a gyroscope.*SDLOG_PROFILE"):
         read(contents)
+
+
+def test_surfaces_of_an_airplane_are_no_rotors():
+    asked = {"throttle": 0.5 + 0 * OWN.time, "aileron": OWN.angles[:, 0], "elevator": OWN.angles[:, 1]}
+    with pytest.raises(InputError, match=r"acceleration.*; aileron and elevator are no rotors\): log body rates"):
+        read(flat_log(OWN, rate=None, attitude=None, speed=asked))
 
 
 def test_thrust_that_stays_at_nothing_is_no_flight():

@@ -164,6 +164,11 @@ def test_a_rotor_at_its_limit():
     motors["control[2]"] = np.where((OWN.time > 6.0) & (OWN.time < 6.4), 1.0, motors["control[2]"])
     (limit,) = of(events(contents), "limit")
     assert limit[1].startswith("M3 at its upper limit once, 0.38 s")
+    # Pulses of 1949 and 1950 us are one limit.
+    steps = contents.topics["actuator_motors"]["control[2]"].copy()
+    motors["control[2]"] = np.where((steps == 1.0) & (np.arange(len(steps)) % 2 == 0), 0.999, steps)
+    assert of(events(contents), "limit") == [limit]
+    motors["control[2]"] = steps
     # The largest of commands that have no limit is none, nor is the crest of a climb, where all are alike.
     assert not of(events(logs.px4(OWN)), "limit")
     crest = (OWN.time > 6.0) & (OWN.time < 6.4)
@@ -250,6 +255,15 @@ def test_a_hard_landing():
     drifting = logs.ardupilot(own)
     drifting.topics["XKF1"]["VD"] += 5.0
     assert of(events(drifting), "landing") == [(25.1, "lands hard, with 6.1 g")]
+
+
+def test_the_autopilots_word_for_landing_may_come_long_after():
+    """A flight is near the ground at a tenth of its height, and may go down from there slowly."""
+    sinks = ended.then(with_ground(flight(seconds=20.0), after_s=0.0), 8.0, rotors=0.9, roll=0.0)
+    low = ended.then(ended.then(sinks, 0.04, rotors=0.5, felt=(0.0, 0.0, 60.0)), 6.0)
+    low.position[:, 2] = np.interp(low.time, [5.0, 6.0, 25.0, 26.0, 33.0], [0.0, 20.0, 20.0, 1.5, 0.0])
+    stated = logs.ardupilot(low, more={"EV": state([33.5], Id=[18])})
+    assert of(events(stated), "landing") == [(33.0, "lands hard, with 6.1 g")]
 
 
 def test_a_force_that_its_rotors_made_before_is_no_hard_landing():
