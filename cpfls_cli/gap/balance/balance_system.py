@@ -121,6 +121,11 @@ class System:
         )
 
     @property
+    def closely(self) -> System:
+        """Average over windows so close that what they see can be followed in time."""
+        return system([flight.closely for flight in self.flights], self.chosen)
+
+    @property
     def fixed(self) -> tuple[Candidate, ...]:
         """Chosen candidates that are a part of the residual."""
         return tuple(each for each in self.chosen if each.effect.kind == "wrench" and each.effect.unit_coefficient)

@@ -75,6 +75,8 @@ class WeakFlight:
     whitening: Array | None = None
     # Rows of candidates on the signals as they are, by effect and shape, so that no search computes them twice.
     seen: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
+    # The same on windows that follow each other closely.
+    seen_closely: dict[CandidateKey, Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return self.windows.count(len(self.signals))
@@ -132,7 +134,13 @@ class WeakFlight:
         """
         lasting = np.array([toeplitz(each) for each in self.lasting])
         white = replace(self, whitening=np.linalg.inv(np.linalg.cholesky(lasting)))
-        return replace(white, seen={key: white.of_channels(rows) for key, rows in self.seen.items()})
+        seen = {key: white.of_channels(rows) for key, rows in self.seen.items()}
+        return replace(white, seen=seen, seen_closely={})
+
+    @property
+    def closely(self) -> WeakFlight:
+        """Average over windows so close that what they see can be followed in time."""
+        return replace(self, windows=dense(self.windows), seen=self.seen_closely, seen_closely={})
 
     def of_channels(self, rows: Array) -> Array:
         """Give rows, shape (window, 6, ...), of the channels that the flight has, whitened where that is asked for."""

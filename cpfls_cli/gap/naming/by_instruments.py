@@ -13,9 +13,8 @@ from cpfls_cli.effects.catalogue.parameter_error import NUMBERS, shown
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step
-from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
-from cpfls_cli.gap.balance.weak_flight import Candidate, dense
+from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, nothing_by_size, places_of
 from cpfls_cli.gap.naming.ranking import known_before
 from cpfls_cli.gap.naming.results import Estimate
@@ -277,8 +276,8 @@ class _Windows(NamedTuple):
 def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows], list[_Windows]]:
     """Average regressors and residual of runs over windows, with their prediction by instruments; and by the past."""
     hypothesis, linear = found.hypothesis, found.estimates.linear
-    windows = dense(hypothesis.flights[0].windows)
-    there = system([replace(flight, windows=windows, seen={}) for flight in hypothesis.flights], hypothesis.chosen)
+    there = hypothesis.closely
+    windows = there.flights[0].windows
     columns = [there.base, shape_columns(there, linear), there.residual_at(linear)[..., None]]
     rows = np.concatenate(columns, axis=2) / found.floor[:, None]
     own, middles, of_path, of_run = [], [], [], []

@@ -12,7 +12,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, residual_along, system, window_noise
 from cpfls_cli.gap.balance.refine import least_squares
-from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight, dense
+from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted, size_in_floors
 from cpfls_cli.gap.naming.odds import names_of
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
@@ -57,13 +57,11 @@ def unexplained_channels(found: NamedFit, rng: np.random.Generator) -> tuple[Une
 def _band(found: NamedFit, rng: np.random.Generator) -> NarrowBand | None:
     """Search for a narrow band that counts, with windows dense enough to exclude aliases."""
     hypothesis, settings = found.hypothesis, found.settings
-    windows, rows, rates = dense(hypothesis.flights[0].windows), [], []
-    for number, flight in enumerate(hypothesis.flights):
-        rows.append(
-            replace(flight, windows=windows).averaged(residual_along(hypothesis, number, found.estimates.linear))
-        )
-        rates.append(windows.average(flight.signals.body_rate))
-    hop_s = windows.hop * windows.period
+    flights = [flight.closely for flight in hypothesis.flights]
+    along = (residual_along(hypothesis, number, found.estimates.linear) for number in range(len(flights)))
+    rows = [flight.averaged(residual) for flight, residual in zip(flights, along, strict=True)]
+    rates = [flight.windows.average(flight.signals.body_rate) for flight in flights]
+    hop_s = flights[0].windows.hop * flights[0].windows.period
     band = narrow_band(rows, rates, hop_s, settings.shifts, rng, settings.significance, least=COUNTS)
     return band if band and band.p_value <= settings.significance else None
 

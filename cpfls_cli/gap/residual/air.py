@@ -9,8 +9,8 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
-from cpfls_cli.gap.balance.balance_system import System, floors, residual_along, system
-from cpfls_cli.gap.balance.weak_flight import WeakFlight, dense
+from cpfls_cli.gap.balance.balance_system import System, floors, residual_along
+from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.residual.dependence import state_signals, without_actuation
 from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import ERRORS, RARE, GapSettings
@@ -218,9 +218,8 @@ class _Residual:
 
     def _innovations(self, noise: Array) -> ResidualInnovations:
         """Take innovations of the residual, and what motion and rotors predict of them."""
-        windows = dense(self.hypothesis.flights[0].windows)
-        flights = [replace(flight, windows=windows, seen={}) for flight in self.hypothesis.flights]
-        there = system(flights, self.hypothesis.chosen)
+        there = self.hypothesis.closely
+        windows = there.flights[0].windows
         states = [state_signals(*pair) for pair in zip(there.flights, there.signals, strict=True)]
         names, before = _common(states)
         residual = there.residual_at(self.linear)
