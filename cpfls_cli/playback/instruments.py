@@ -51,7 +51,7 @@ class Run(NamedTuple):
     part: slice
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Instruments:
     """What shows how each run was moved, apart from its gusts.
 

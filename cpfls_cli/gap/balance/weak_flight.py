@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -195,6 +195,7 @@ def weak_flight(
     return signals.once((weak_flight, name, windows, force, tuple(axes)), make) if shared else make()
 
 
+@lru_cache(maxsize=64)
 def dense(windows: Windows) -> Windows:
     """Let windows follow each other so closely that what they see can be followed in time."""
     return replace(windows, hop=max(1, len(windows.weight) // PER_WINDOW))

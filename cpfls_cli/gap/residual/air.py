@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -266,14 +266,20 @@ def predicted_rows(given: Instruments, windows: Windows, rows: Sequence[Array]) 
 
     `rows`, each shape (window, ...): of each run.
     """
+    asked = {number: values for number, values in _asked(given, windows).items() if len(rows[number])}
+    found = first_stage_fit_by_run(asked, rows)
+    return [found.get(number, np.full_like(own, np.nan)) for number, own in enumerate(rows)]
+
+
+@lru_cache(maxsize=1)
+def _asked(given: Instruments, windows: Windows) -> dict[int, Array]:
+    """Average what was asked of runs before over windows, shape (window, column); the same for each step of a fit."""
     apart = max(1, windows.hop // 2)
-    asked = {
-        # What drifts, such as the charge of a battery, goes with the time, which knows nothing of gusts either.
+    # What drifts, such as the charge of a battery, goes with the time, which knows nothing of gusts either.
+    return {
         number: windows.average(
             np.hstack([past_setpoints(setpoint, windows.period, apart), np.c_[np.arange(len(setpoint))]])
         )
         for number, setpoint in enumerate(given.setpoints)
-        if setpoint is not None and len(rows[number])
+        if setpoint is not None
     }
-    found = first_stage_fit_by_run(asked, rows)
-    return [found.get(number, np.full_like(own, np.nan)) for number, own in enumerate(rows)]

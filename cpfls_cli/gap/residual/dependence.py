@@ -1,12 +1,13 @@
 """Which signal of the flight a residual follows, judged on unseen blocks and against shifted residuals."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import FEWEST_BLOCKS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
@@ -68,16 +69,17 @@ def rank_dependence(
     shifted = mirror_shifted(residual, flight_index, shifts, rng)
     draws = np.concatenate([about_flight_mean(residual, flight_index)[..., None], shifted], axis=2)
     shares: list[tuple[int, str, Array]] = []
-    for name, signal in state.items():
-        for channels, rows in _where_known(residual, flight_index, np.isfinite(signal)):
-            curve = _curve(name, signal[rows])
-            if curve.size and len(np.unique(block[rows])) >= FEWEST_BLOCKS:
-                curve = about_flight_mean(curve, flight_index[rows])
-                drawn = draws[np.ix_(rows, channels)]
-                normal = folds(curve[:, None], drawn.reshape(len(rows), 1, -1), block[rows])
-                left, total = normal.solve(np.arange(curve.shape[1]))[1].sum(axis=0), normal.square.sum(axis=0)
-                share = (1 - left / np.maximum(total, np.finfo(float).tiny)).reshape(drawn.shape[1:])
-                shares += [(int(channel), name, by_draw) for channel, by_draw in zip(channels, share, strict=True)]
+    for channels, rows, names in _where_known(residual, flight_index, state):
+        if len(np.unique(block[rows])) < FEWEST_BLOCKS:
+            continue
+        curves = [about_flight_mean(_curve(name, state[name][rows]), flight_index[rows]) for name in names]
+        drawn = draws[np.ix_(rows, channels)]
+        normal = folds(np.concatenate(curves, axis=1)[:, None], drawn.reshape(len(rows), 1, -1), block[rows])
+        total, end = np.maximum(normal.square.sum(axis=0), np.finfo(float).tiny), 0
+        for name, curve in zip(names, curves, strict=True):
+            places = np.arange(end, end := end + curve.shape[1])
+            share = (1 - normal.solve(places)[1].sum(axis=0) / total).reshape(drawn.shape[1:])
+            shares += [(int(at), name, by_draw) for at, by_draw in zip(channels, share, strict=True) if len(places)]
     if not shares:
         return ()
     chance = np.max([share[1:] for _, _, share in shares], axis=0)
@@ -88,15 +90,23 @@ def rank_dependence(
     return tuple(ascending(ranked, lambda one: -one.r2))
 
 
-def _where_known(residual: Array, flight_index: IntArray, finite: BoolArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Group channels by the flights that have them: channels, and windows with both channel and signal."""
+def _where_known(
+    residual: Array, flight_index: IntArray, state: Mapping[str, Array]
+) -> Iterator[tuple[IntArray, IntArray, list[str]]]:
+    """Group channels by the flights that have them, and signals by the windows: channels, windows with both, signals.
+
+    All signals that the same windows have are fitted to products of all of them.
+    """
     flights, number = np.unique(flight_index, return_inverse=True)
     present = np.array([(residual[number == f] != 0).any(axis=0) for f in range(len(flights))])
-    for pattern in np.unique(present, axis=1).T:
+    alike: dict[bytes, list[str]] = {}
+    for name, signal in state.items():
+        alike.setdefault(np.isfinite(signal).tobytes(), []).append(name)
+    for names, pattern in product(alike.values(), np.unique(present, axis=1).T):
         channels = np.flatnonzero((present == pattern[:, None]).all(axis=0))
-        rows = np.flatnonzero(pattern[number] & finite)
+        rows = np.flatnonzero(pattern[number] & np.isfinite(state[names[0]]))
         if len(rows):
-            yield channels, rows
+            yield channels, rows, names
 
 
 def _curve(name: str, signal: Array) -> Array:
