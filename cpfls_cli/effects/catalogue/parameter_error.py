@@ -94,20 +94,21 @@ def too_light(values: Array) -> BoolArray:
 
 def _columns(signals: Signals, _shape: Mapping[str, float]) -> Columns:
     moments = np.array(signals.vehicle.inertia_kg_m2[:3])
-    turning = moments * signals.body_rate
+    rate, turning = signals.body_rate, moments * signals.body_rate
     # omega x each axis, in columns.
-    before = rotations.cross(signals.body_rate[:, None], np.eye(3)).swapaxes(1, 2)
+    before = rotations.cross(rate[:, None], np.eye(3)).swapaxes(1, 2)
     momentum = np.zeros((len(signals), 6, 10))
     direct = np.zeros_like(momentum)
     momentum[:, [0, 1, 2], [0, 1, 2]] = -turning
     direct[:, :3, :3] = -before * turning[:, None]
     after, later = [1, 2, 0], [2, 0, 1]
-    coupling = 0.5 * (moments[after] + moments[later]) * signals.body_rate[:, after] * signals.body_rate[:, later]
+    coupling = 0.5 * (moments[after] + moments[later]) * rate[:, after] * rate[:, later]
     direct[:, [0, 1, 2], [3, 4, 5]] = -coupling
     direct[:, 5, _THRUST_SCALE] = signals.wrench[:, 5]
     # A point at r moves with omega' x r + omega x (omega x r) beyond the centre of mass.
     momentum[:, 3:, 7:] = signals.vehicle.mass_kg * before
-    direct[:, 3:, 7:] = signals.vehicle.mass_kg * before @ before
+    twice = rate[:, :, None] * rate[:, None] - (rate**2).sum(axis=1)[:, None, None] * np.eye(3)
+    direct[:, 3:, 7:] = signals.vehicle.mass_kg * twice
     return Columns(direct, momentum)
 
 

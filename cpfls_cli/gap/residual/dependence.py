@@ -70,16 +70,17 @@ def rank_dependence(
     draws = np.concatenate([about_flight_mean(residual, flight_index)[..., None], shifted], axis=2)
     shares: list[tuple[int, str, Array]] = []
     for channels, rows, names in _where_known(residual, flight_index, state):
-        if len(np.unique(block[rows])) < FEWEST_BLOCKS:
+        curves = {name: curve for name in names if (curve := _curve(name, state[name][rows])).size}
+        if not curves or len(np.unique(block[rows])) < FEWEST_BLOCKS:
             continue
-        curves = [about_flight_mean(_curve(name, state[name][rows]), flight_index[rows]) for name in names]
-        drawn = draws[np.ix_(rows, channels)]
-        normal = folds(np.concatenate(curves, axis=1)[:, None], drawn.reshape(len(rows), 1, -1), block[rows])
+        columns, drawn = np.concatenate(list(curves.values()), axis=1), draws[np.ix_(rows, channels)]
+        columns = about_flight_mean(columns, flight_index[rows])
+        normal = folds(columns[:, None], drawn.reshape(len(rows), 1, -1), block[rows])
         total, end = np.maximum(normal.square.sum(axis=0), np.finfo(float).tiny), 0
-        for name, curve in zip(names, curves, strict=True):
-            places = np.arange(end, end := end + curve.shape[1])
-            share = (1 - normal.solve(places)[1].sum(axis=0) / total).reshape(drawn.shape[1:])
-            shares += [(int(at), name, by_draw) for at, by_draw in zip(channels, share, strict=True) if len(places)]
+        for name, curve in curves.items():
+            left = normal.solve(np.arange(end, end := end + curve.shape[1]))[1].sum(axis=0)
+            share = (1 - left / total).reshape(drawn.shape[1:])
+            shares += [(int(channel), name, by_draw) for channel, by_draw in zip(channels, share, strict=True)]
     if not shares:
         return ()
     chance = np.max([share[1:] for _, _, share in shares], axis=0)
