@@ -233,8 +233,12 @@ def _solve(gram: Array, moment: Array, length: Array | None = None) -> Array:
         length = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1))
     scale = 1.0 / np.where(length > 0, length, 1.0)
     scaled = gram * scale[..., :, None] * scale[..., None, :] + _RIDGE * np.eye(gram.shape[-1])
-    empty = (length <= 0)[..., None] * np.eye(gram.shape[-1])
-    return np.asarray(np.linalg.solve(scaled + empty, moment * scale[..., None]) * scale[..., None])
+    scaled += (length <= 0)[..., None] * np.eye(gram.shape[-1])
+    # Of few columns and hundreds of right sides, which products take in a tenth of the time; one more step for those
+    # that hardly differ.
+    inverse, right = np.linalg.inv(scaled), moment * scale[..., None]
+    found = inverse @ right
+    return np.asarray((found + inverse @ (right - scaled @ found)) * scale[..., None])
 
 
 def about_flight_mean(values: Array, flight_index: IntArray) -> Array:
