@@ -90,7 +90,7 @@ def test_without_effects_it_is_the_vehicle_of_the_config():
 def test_wrong_numbers_of_the_vehicle_are_in_inertia_and_thrust():
     signals = signals_of(flown())
     flight, player = made_ready(whole(inertia_x=0.2, coupling_y=0.3, thrust_scale=0.1), logged(signals))
-    np.testing.assert_allclose(player.body.inertia, np.diag([0.72, 0.6, 1.2]))
+    np.testing.assert_allclose(player.flown.body.inertia, np.diag([0.72, 0.6, 1.2]))
     turning = replace(flight, motion=flight.motion._replace(rate=np.tile([0.5, 0.0, 2.0], (len(flight), 1))))
     still = replace(flight, motion=flight.motion._replace(rate=np.zeros((len(flight), 3))))
     stated = player_of(VehicleModel(vehicle=VEHICLE), flight).wrench(still)
