@@ -162,17 +162,17 @@ def test_each_case_is_flown_in_each_air_and_the_usual_study_stays_as_it_is():
 
 
 def said(verdict, *effects, rivals=()):
-    told = [
+    result = [
         {"name": name, "share": share, "coefficients": {"c": {"value": value, "possible": possible}}}
         for name, share, value, possible in effects
     ]
-    return {"verdict": verdict, "effects": told, "alternatives": list(rivals), "floor": [0.1] * 6}
+    return {"verdict": verdict, "effects": result, "alternatives": list(rivals), "floor": [0.1] * 6}
 
 
-def answered(told, **key):
+def answered(result, **key):
     usual = {"truth": [], "nearest": [], "outside": [], "hidden": {}, "only": "", "group": "single", "dominant": ""}
     key = usual | key | {"residual_rms_n_m": {"held_out_1": [1.0] * 3, "train_1": [1.0] * 3}}
-    return Scored(key, told, outcome(key, told))
+    return Scored(key, result, outcome(key, result))
 
 
 DRAG, DAMPING = ("rotor_drag", 1.0, 1e-3, [0.0, 1.0]), ("linear_damping", 1.0, 0.1, [0.0, 1.0])
@@ -183,7 +183,7 @@ RIVAL_BY = {"name": "rotor_drag", "instead_of": "linear_damping"}
 
 
 @pytest.mark.parametrize(
-    ("told", "key", "good"),
+    ("result", "key", "good"),
     [
         (said("NAMED", DRAG), {"truth": ["rotor_drag"], "group": "lacking"}, True),
         (said("NAMED", DAMPING), {"truth": ["rotor_drag"], "group": "lacking"}, False),
@@ -211,8 +211,8 @@ RIVAL_BY = {"name": "rotor_drag", "instead_of": "linear_damping"}
         (said("NAMED", DAMPING), {"group": "pybullet", "nearest": ["rotor_drag"]}, False),
     ],
 )
-def test_what_is_asked_for_depends_on_the_group(told, key, good):
-    assert answered(told, **key).good == good
+def test_what_is_asked_for_depends_on_the_group(result, key, good):
+    assert answered(result, **key).good == good
 
 
 @pytest.mark.parametrize(

@@ -23,9 +23,9 @@ def answer(tmp_path_factory):
     flights = [*sorted(logs.glob("train_*.csv")), *sorted(logs.glob("held_out_*.csv"))]
     folder = place / "gap"
     held = [word for path in flights[3:] for word in ("--held-out", path)]
-    told = run("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.horizon_s=0.1")
-    assert told.exit_code == 0, told.stderr
-    return SimpleNamespace(folder=folder, summary=json.loads(told.stdout), hidden=case.hidden, logs=logs, held=held)
+    result = run("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.horizon_s=0.1")
+    assert result.exit_code == 0, result.stderr
+    return SimpleNamespace(folder=folder, summary=json.loads(result.stdout), hidden=case.hidden, logs=logs, held=held)
 
 
 def test_both_effects_are_named_and_nothing_else(answer):
@@ -59,8 +59,8 @@ def test_extended_model_leaves_the_gap_that_was_promised(answer):
     again = answer.folder.parent / "again.h5"
     flights = answer.held[1::2]
     model = answer.folder / "extended.h5"
-    told = run("compare", answer.logs / "study.yaml", *flights, "--model", model, "-o", again, "--json")
-    assert told.exit_code == 0, told.stderr
-    gap = json.loads(told.stdout)["gap"]
+    result = run("compare", answer.logs / "study.yaml", *flights, "--model", model, "-o", again, "--json")
+    assert result.exit_code == 0, result.stderr
+    gap = json.loads(result.stdout)["gap"]
     assert gap["torque_n_m"] == pytest.approx(answer.summary["gap_after"]["torque_n_m"], rel=1e-6)
     assert max(gap["floors"]) < 1.5

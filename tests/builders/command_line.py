@@ -39,12 +39,12 @@ def done(*words):
     return result
 
 
-def told(*words):
+def summary(*words):
     """Give what a command that ends well tells machines."""
     return json.loads(done(*words, "--json").stdout)
 
 
-run.done, run.told = done, told
+run.done, run.summary = done, summary
 
 
 _FIGURES = {name: vars(canvas._Drawing)[name] for name in ("svg", "rows")} | {"_inline_svg": canvas._inline_svg}

@@ -179,8 +179,8 @@ def _flown(flights, path, pushes, shoves, noise):
         hover, outer = truth.mass * GRAVITY / 4 / truth.thrust_factor, min(2.0, bandwidth / 6)
         body = np.array([truth.mass, truth.lag_s, truth.damping, truth.drag, *truth.inertia, truth.rotor_drag])
         pilot = np.array([outer**2, 1.6 * outer, 0.05 * hover, 4 * hover, *(bandwidth * np.array([1.0, 1.0, 0.4]))])
-        told = (np.ascontiguousarray(each[:, number]) for each in (path, pushes, shoves, noise))
-        _integrated(body, pilot, truth.mixer, np.linalg.inv(truth.mixer), hover**0.5, *told, logs[number])
+        result = (np.ascontiguousarray(each[:, number]) for each in (path, pushes, shoves, noise))
+        _integrated(body, pilot, truth.mixer, np.linalg.inv(truth.mixer), hover**0.5, *result, logs[number])
     parts = np.split(logs.swapaxes(0, 1), [3, 6, 15, 18, 22, 26], axis=2)
     return [part.reshape(*part.shape[:2], 3, 3) if part.shape[2] == 9 else part for part in parts]
 

@@ -244,14 +244,14 @@ def test_shipped_configs_load_and_print_the_same_study(cpfls, configs, tmp_path)
 
 def test_any_yaml_reader_reads_it_as_the_json_says(cpfls, configs):
     for config in configs:
-        as_json = cpfls.told("config", config)
+        as_json = cpfls.summary("config", config)
         assert yaml.safe_load(cpfls("config", config).stdout) == as_json
 
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_section(cpfls, study, section):
     printed = yaml.safe_load(cpfls("config", study, "--section", section).stdout)
-    whole = cpfls.told("config", study)
+    whole = cpfls.summary("config", study)
     assert printed == {"seed": 1, section: whole[section]}
 
 
@@ -274,7 +274,7 @@ def test_overrides_need_a_config(refuse):
 
 def test_overrides_show(cpfls, study):
     words = ("config", study, "--set", "vehicle.rotors.0.spin=-1", "--set", "reduction.criterion=A", "--seed", 9)
-    shown = cpfls.told(*words)
+    shown = cpfls.summary(*words)
     assert (shown["seed"], shown["reduction"]["criterion"]) == (9, "A")
     assert [rotor["spin"] for rotor in shown["vehicle"]["rotors"]] == [-1, -1, 1, -1]
 

@@ -60,7 +60,7 @@ def wrong(refuse, log_study, write, tmp_path):
 )
 def test_every_dialect_gives_the_same_flight(cpfls, log_study, write, tmp_path, content, name):
     flight = tmp_path / "flight.h5"
-    summary = cpfls.told("import", log_study, write(content, name), "-o", flight)
+    summary = cpfls.summary("import", log_study, write(content, name), "-o", flight)
     assert summary["samples"] == 200
     assert not any(summary["dropped"].values())
     assert summary["rate_hz"] == pytest.approx(50.0)

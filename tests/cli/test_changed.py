@@ -41,8 +41,8 @@ def test_of_few_reference_flights_it_is_said_that_what_they_differ_by_is_assumed
     assert result.exit_code == 0
     assert result.stdout.startswith("NO CHANGE SEEN: nothing beyond what is usual of vehicles")
     assert "2 reference flights are too few; give 1 more" in " ".join(result.stdout.split())
-    told = json.loads((folder / "out" / "changed.json").read_text())
-    assert (told["verdict"], told["reference_flights_lacking"]) == ("NO CHANGE SEEN", 1)
+    summary = json.loads((folder / "out" / "changed.json").read_text())
+    assert (summary["verdict"], summary["reference_flights_lacking"]) == ("NO CHANGE SEEN", 1)
     assert "NO CHANGE SEEN" in (folder / "out" / "report.html").read_text()
 
 
@@ -60,15 +60,15 @@ def test_where_no_load_would_have_shown_it_cannot_be_told(changed):
 def test_a_weak_rotor_is_named_with_its_loss(changed, folder):
     result = changed("weak1.csv", "weak2.csv", options=["--json", "--fail-on-change"])
     assert result.exit_code == 1
-    told = json.loads(result.stdout)
-    assert told == json.loads((folder / "out" / "changed.json").read_text())
-    (cause,) = told["causes"]
-    assert (told["changed"], cause["name"], cause["named"]) == (True, "rotor M3", True)
+    summary = json.loads(result.stdout)
+    assert summary == json.loads((folder / "out" / "changed.json").read_text())
+    (cause,) = summary["causes"]
+    assert (summary["changed"], cause["name"], cause["named"]) == (True, "rotor M3", True)
     (size,) = cause["sizes"]
     assert size["low"] < 0.2 < size["high"]
-    assert told["since"] == "weak1.csv"
+    assert summary["since"] == "weak1.csv"
     # Of a cross each rotor carries a quarter alone.
-    load = next(each for each in told["numbers"] if each["name"] == "thrust M3")
+    load = next(each for each in summary["numbers"] if each["name"] == "thrust M3")
     assert np.mean(load["today"]) - load["reference"] == pytest.approx(-np.log(0.8), abs=0.03)
 
 
@@ -204,9 +204,9 @@ def test_a_wrong_log_of_today_is_never_green(cpfls, logs, what):
     assert not result.stdout.startswith("NO CHANGE")
     assert words.lower() in " ".join(result.output.split()).lower()
     if result.exit_code != 2:
-        told = json.loads((logs / "out" / "changed.json").read_text())
-        assert told["verdict"] == ("CHANGED" if result.exit_code == 1 else "CANNOT TELL")
-        assert told["contradictions"]
+        summary = json.loads((logs / "out" / "changed.json").read_text())
+        assert summary["verdict"] == ("CHANGED" if result.exit_code == 1 else "CANNOT TELL")
+        assert summary["contradictions"]
 
 
 def test_it_is_said_of_reference_flights_too(cpfls, logs):
@@ -234,8 +234,8 @@ def by_torque(tmp_path_factory):
 def test_a_ratio_that_is_reversed_today_is_a_change(cpfls, by_torque, today, number):
     result = compared(cpfls, by_torque, today)
     assert result.exit_code == 1, result.output
-    told = json.loads((by_torque / "out" / "changed.json").read_text())
-    assert told["reversed"] == [number]
+    summary = json.loads((by_torque / "out" / "changed.json").read_text())
+    assert summary["reversed"] == [number]
     assert "reversed, or nothing, and in no reference flight" in " ".join(result.stdout.split())
 
 

@@ -139,7 +139,7 @@ def asked(wrong):
     return [word for setting in wrong.settings for word in ("--set", setting)]
 
 
-def told(command, config, *words):
+def output(command, config, *words):
     result = run(command, config, *words, "--json")
     assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)
@@ -149,7 +149,7 @@ def told(command, config, *words):
 def test_gap_names_no_gap_and_no_effect(logs, name, tmp_path):
     wrong = WRONG[name]
     config, (first, second) = logs(wrong.sign)
-    answer = told("gap", config, first, "--held-out", second, "-o", tmp_path / "gap", *asked(wrong))
+    answer = output("gap", config, first, "--held-out", second, "-o", tmp_path / "gap", *asked(wrong))
     assert answer["verdict"] == "CONTRADICTED"
     assert wrong.words in answer["contradictions"][0]
     assert answer["effects"] == []
@@ -216,7 +216,7 @@ def test_a_model_identified_in_it_is_not_to_be_used_and_predict_says_it_first(lo
         config, (first, _) = logs(sign)
         flight, model = tmp_path / f"{name}.h5", tmp_path / f"{name}-model.h5"
         assert run("import", config, first, "-o", flight).exit_code == 0
-        verdict = told("identify", config, flight, "-o", model)["verdict"]
+        verdict = output("identify", config, flight, "-o", model)["verdict"]
         with warnings.catch_warnings(record=True) as noted:
             warnings.simplefilter("always")
             load_model(model, config).predict(flight)
@@ -232,11 +232,11 @@ def test_a_model_identified_in_it_is_not_to_be_used_and_predict_says_it_first(lo
 
 def test_the_right_log_keeps_its_verdicts(logs, tmp_path):
     config, (first, second) = logs((1.0, 1.0, 1.0))
-    gap = told("gap", config, first, "--held-out", second, "-o", tmp_path / "gap")
+    gap = output("gap", config, first, "--held-out", second, "-o", tmp_path / "gap")
     assert (gap["verdict"], gap["contradictions"]) == ("NO_GAP", [])
-    found = told("vehicle", config, first, "--held-out", second, "-o", tmp_path / "vehicle.h5")
+    found = output("vehicle", config, first, "--held-out", second, "-o", tmp_path / "vehicle.h5")
     assert (found["verdict"], found["contradictions"]) == ("good-for-simulation", [])
-    replayed = told("replay", config, "vehicle", first, "-o", tmp_path / "replay.h5", "--every", "50")
+    replayed = output("replay", config, "vehicle", first, "-o", tmp_path / "replay.h5", "--every", "50")
     assert replayed["contradictions"] == []
 
 

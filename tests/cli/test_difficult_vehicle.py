@@ -126,7 +126,7 @@ def test_a_refusal_names_both_ways_and_each_of_them_works(cpfls, refuse, command
     assert "vehicle.inertia_kg_m2" in line
     assert "--model VEHICLE.h5 takes the numbers that `cpfls vehicle` found" in line
     assert "--accept-guesses" in line
-    (said,) = cpfls.told(*command(name), "--accept-guesses")["cautions"]
+    (said,) = cpfls.summary(*command(name), "--accept-guesses")["cautions"]
     assert said.startswith(GUESSED)
     assert "inertia 0.8 to 4" in said
     # A gap is told from a body alone.
@@ -183,8 +183,8 @@ def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_p
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in made.stderr.splitlines()
     header = read(compared, Disagreement)[1]
     assert header.cautions[0] == f"vehicle.h5: {HEADLINE}"
-    told = cpfls.told("info", compared)
-    assert told["cautions"] == list(header.cautions)
+    answer = cpfls.summary("info", compared)
+    assert answer["cautions"] == list(header.cautions)
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in cpfls("info", compared).stderr.splitlines()
     cpfls.done("report", config, compared, "-o", tmp_path / "page.md")
     summary = (tmp_path / "page.md").read_text().split("## ")[1]
@@ -335,8 +335,8 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, open_fold
     assert f"{copy}: written, the config with these constants" in result.stdout
     parameters = plain(found_vehicle(open_folder / "v.h5"))["parameters"]
     assert set(parameters) == KEYS
-    told = {"value", "unit", "low", "high", "stated", "determined", "reason", "possible"}
-    assert set(parameters["motor_lag_s"]) == told
+    answer = {"value", "unit", "low", "high", "stated", "determined", "reason", "possible"}
+    assert set(parameters["motor_lag_s"]) == answer
     thrust = parameters["rotors.thrust_factor_n_s2"]
     stated = yaml.safe_load(CONFIG)["vehicle"]["rotors"][0]["thrust_factor_n_s2"]
     assert thrust["low"] < thrust["value"] < thrust["high"]
@@ -351,10 +351,10 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, open_fold
 
 def test_an_added_mass_is_found_beside_what_is_shared(cpfls, flights, open_folder):
     config = heavier(flights, open_folder, same_vehicle, "groups.yaml")
-    told = cpfls.told(
+    answer = cpfls.summary(
         "vehicle", config, open_folder / "flight.csv", open_folder / "loaded.csv", "-o", open_folder / "g.h5"
     )
-    (added,) = (found for found in told["differences"] if found["name"] == "payload: added mass")
+    (added,) = (found for found in answer["differences"] if found["name"] == "payload: added mass")
     assert added["low"] < 0.04 < added["high"]
     assert added["value"] == pytest.approx(0.04, rel=0.15)
     cpfls.done("report", config, open_folder / "g.h5", "-o", open_folder / "g.md")

@@ -32,10 +32,10 @@ def test_what_takes_an_effects_place_once_it_is_named_is_listed(cpfls):
 
 
 def test_machines_get_the_same(cpfls):
-    summary = cpfls.told("effects", "motor_lag")
+    summary = cpfls.summary("effects", "motor_lag")
     assert (summary["kind"], summary["shapes"][0]["name"]) == ("actuator", "time_constant_s")
     assert set(summary["rivals"]) == set(CATALOGUE["motor_lag"].rivals)
-    assert len(cpfls.told("effects")["effects"]) == len(CATALOGUE)
+    assert len(cpfls.summary("effects")["effects"]) == len(CATALOGUE)
 
 
 def test_an_unknown_name_is_refused(refuse):

@@ -211,10 +211,10 @@ def test_the_suffix_tells_the_form(cpfls, pipeline, tmp_path, form):
     output = tmp_path / f"m.{ENDINGS[form]}"
     result = cpfls("export", pipeline.model, "-o", output, "--json")
     assert json.loads(result.stdout)["format"] == form
-    told = tmp_path / "told" / output.name
-    told.parent.mkdir()
-    assert cpfls("export", pipeline.model, "--format", form, "-o", told).exit_code == 0
-    assert told.read_bytes() == output.read_bytes()
+    answer = tmp_path / "told" / output.name
+    answer.parent.mkdir()
+    assert cpfls("export", pipeline.model, "--format", form, "-o", answer).exit_code == 0
+    assert answer.read_bytes() == output.read_bytes()
 
 
 def test_a_suffix_that_tells_no_form(refuse, pipeline, tmp_path):

@@ -424,5 +424,5 @@ def test_who_asks_for_it_reads_it_first(cpfls, folder, tmp_path, output):
     written = (tmp_path / output).read_text()
     assert written.index("IMPOSSIBLE NUMBERS") < written.index("Vehicle: 1.2 kg")
     if output == "v.c":
-        told = cpfls.told("export", folder / "vehicle.h5", "-o", tmp_path / output, "--anyway", "--force")
-        assert told["impossible"] == HEAVY
+        answer = cpfls.summary("export", folder / "vehicle.h5", "-o", tmp_path / output, "--anyway", "--force")
+        assert answer["impossible"] == HEAVY

@@ -32,7 +32,7 @@ def test_every_dataset_is_described(stage):
 
 
 def described(cpfls, *arguments):
-    return cpfls.told("info", *arguments)["formats"]
+    return cpfls.summary("info", *arguments)["formats"]
 
 
 def test_one_format_is_described_without_a_file(cpfls):

@@ -48,14 +48,14 @@ def described_as(name, paths):
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_check_finds_nothing_in_what_the_program_writes(cpfls, pipeline, stage):
-    summary = cpfls.told("check", pipeline.paths[stage])
+    summary = cpfls.summary("check", pipeline.paths[stage])
     assert (summary["format"], summary["good"], summary["findings"]) == (format_of(stage), True, [])
 
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_info_tells_origin_and_content(cpfls, pipeline, stage):
     path = pipeline.paths[stage]
-    summary = cpfls.told("info", path)
+    summary = cpfls.summary("info", path)
     assert (summary["format"], summary["seed"]) == (format_of(stage), 1)
     assert summary["cpfls_version"] == cpfls_cli.__version__
     lines = cpfls("info", path, "-v").stdout
@@ -74,8 +74,8 @@ def test_info_says_what_the_command_answered(cpfls, study, tmp_path, stage):
     answered = cpfls.done(*commands[stage], "-o", tmp_path / f"{stage}.h5", "-v")
     lines = answered.stdout.partition("next:")[0].splitlines()
     assert len(lines) > 1
-    told = cpfls("info", tmp_path / f"{stage}.h5", "-v").stdout.splitlines()
-    assert [line for line in lines if line not in told] == []
+    answer = cpfls("info", tmp_path / f"{stage}.h5", "-v").stdout.splitlines()
+    assert [line for line in lines if line not in answer] == []
     # Without -v the first part of it, and what is folded away by name.
     first = cpfls("info", tmp_path / f"{stage}.h5").stdout.splitlines()
     assert set(first) & set(lines)
@@ -92,7 +92,7 @@ def test_info_says_what_the_command_answered(cpfls, study, tmp_path, stage):
     ],
 )
 def test_inputs_are_named_by_role_and_hash(cpfls, pipeline, stage, roles):
-    inputs = cpfls.told("info", pipeline.paths[stage])["inputs"]
+    inputs = cpfls.summary("info", pipeline.paths[stage])["inputs"]
     assert inputs == {
         role: {
             "name": f"{source}.h5",

@@ -104,8 +104,8 @@ def test_a_flight_from_hdf5_with_stamps_in_milliseconds(cpfls, tmp_path):
         '    attitude: {columns: ["pose[0]", "pose[1]", "pose[2]"], unit: rad}\n'
         '    body_torque: {columns: ["moment[0]", "moment[1]", "moment[2]"], unit: N m}\n' + VEHICLE
     )
-    told = cpfls.told("import", tmp_path / "study.yaml", tmp_path / "log.h5", "-o", tmp_path / "flight.h5")
-    assert told["log_rate_hz"] == pytest.approx(50)
+    summary = cpfls.summary("import", tmp_path / "study.yaml", tmp_path / "log.h5", "-o", tmp_path / "flight.h5")
+    assert summary["log_rate_hz"] == pytest.approx(50)
 
 
 @pytest.mark.parametrize("kind", [".db3", ".mcap"])
@@ -128,8 +128,8 @@ def test_a_bag_is_imported_on_the_clock_of_its_fastest_topic(kind, cpfls, tmp_pa
         '    quaternion: {columns: ["/imu.orientation.w", "/imu.orientation.x", "/imu.orientation.y",'
         ' "/imu.orientation.z"], unit: "1"}\n' + VEHICLE
     )
-    told = cpfls.told("import", tmp_path / "study.yaml", bag, "-o", tmp_path / "flight.h5")
-    assert told["log_rate_hz"] == pytest.approx(100)
+    summary = cpfls.summary("import", tmp_path / "study.yaml", bag, "-o", tmp_path / "flight.h5")
+    assert summary["log_rate_hz"] == pytest.approx(100)
 
 
 def test_of_the_folder_of_a_bag_the_file_is_asked_for(refuse, log_study, tmp_path):

@@ -129,9 +129,9 @@ def test_where_all_are_refused_nothing_is_written(refuse, logs, tmp_path):
 
 def test_page_and_json_have_the_answer(cpfls, logs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    told = cpfls.told("look", logs / "px4 log.ulg", "-o", "out")
-    assert [own["question"] for own in told["answers"]][-1] == "inertia, drag, what a model misses"
-    assert told["next_steps"][-1]["command"].startswith("cpfls init 'px4 log.ulg' ")
+    summary = cpfls.summary("look", logs / "px4 log.ulg", "-o", "out")
+    assert [own["question"] for own in summary["answers"]][-1] == "inertia, drag, what a model misses"
+    assert summary["next_steps"][-1]["command"].startswith("cpfls init 'px4 log.ulg' ")
     shown = (tmp_path / "out" / "px4 log.html").read_text()
     for title in ("Healthy?", "Change", "Fly next", "What this log can answer", "Answers"):
         assert f">{title}</h" in shown

@@ -242,5 +242,5 @@ def test_a_structure_is_chosen_on_one_flight_and_judged_on_another(cpfls, flight
     less = {"population": 4, "generations": 1, "local_search.enabled": "false", "validation.enabled": "false"}
     given = [word for key, value in (keys | less).items() for word in ("--set", f"identification.{key}={value}")]
     words = ("identify", CONFIG, first, "--choose-on", kept, "--validate", other, "-o", tmp_path / "m.h5", *given)
-    error = cpfls.told(*words)["held_out"][other.name]["relative_error"]
+    error = cpfls.summary(*words)["held_out"][other.name]["relative_error"]
     assert least <= error < most, error

@@ -161,5 +161,5 @@ def test_names_that_are_not_text(cpfls, pipeline, study, tmp_path):
     flight.write_bytes(pipeline.flight.read_bytes())
     output = tmp_path / os.fsdecode(b"selec\xfetion.h5")
     cpfls.done("reduce", study, flight, "-o", output)
-    assert cpfls.told("info", output)["inputs"]["flight"]["name"] == "fl\ufffdight.h5"
+    assert cpfls.summary("info", output)["inputs"]["flight"]["name"] == "fl\ufffdight.h5"
     cpfls.done("report", study, output, "-o", tmp_path / os.fsdecode(b"\xfd.html"))

@@ -95,7 +95,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def told(cpfls, folder):
+def summary(cpfls, folder):
     """What is printed for machines of two flights, with the files that are written."""
 
     def call(*words):
@@ -108,8 +108,8 @@ def told(cpfls, folder):
     return call
 
 
-def test_json_tells_curves_and_costs(cpfls, told, folder):
-    answer, output, _ = told(folder / "light.csv")
+def test_json_tells_curves_and_costs(cpfls, summary, folder):
+    answer, output, _ = summary(folder / "light.csv")
     assert answer["model"] == "vehicle"
     assert answer["flights"] == ["light.csv"]
     names = ["roll", "pitch", "yaw", "thrust", "rotor speed", "roll rate", "pitch rate", "yaw rate"]
@@ -133,8 +133,8 @@ def test_json_tells_curves_and_costs(cpfls, told, folder):
     assert list(store.read(output, Responses)[0].responses) == names
 
 
-def test_a_body_that_is_heavier_than_stated(told, folder):
-    answer, _, _ = told(folder / "heavy.csv")
+def test_a_body_that_is_heavier_than_stated(summary, folder):
+    answer, _, _ = summary(folder / "heavy.csv")
     (only,) = answer["responses"]["roll"]["deviations"]
     assert not only["right"]
     assert only["gain"] == pytest.approx(2.0, rel=0.02)
@@ -142,8 +142,8 @@ def test_a_body_that_is_heavier_than_stated(told, folder):
     assert answer["responses"]["thrust"]["cost"] < 5.0
 
 
-def test_the_table_holds_what_json_tells(told, folder):
-    answer, _, table = told(folder / "light.csv")
+def test_the_table_holds_what_json_tells(summary, folder):
+    answer, _, table = summary(folder / "light.csv")
     with table.open() as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0])[:4] == ["response", "frequency_hz", "magnitude_db", "phase_deg"]
@@ -161,8 +161,8 @@ def test_the_answer_begins_with_what_the_flights_tell(cpfls, folder, tmp_path):
 
 
 @pytest.mark.usefixtures("sketched")
-def test_a_report_shows_bode_plots(cpfls, told, folder, tmp_path):
-    _, output, _ = told(folder / "light.csv")
+def test_a_report_shows_bode_plots(cpfls, summary, folder, tmp_path):
+    _, output, _ = summary(folder / "light.csv")
     page = tmp_path / "page.html"
     cpfls.done("report", folder / "study.yaml", output, "-o", page)
     html = page.read_text()
@@ -202,10 +202,10 @@ def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
 def test_an_identified_model_is_judged_with_its_inertia(cpfls, pipeline, study, tmp_path):
     words = ("response", study, pipeline.flight, "--model", pipeline.model, "-o", tmp_path / "r.h5", "--json")
     result = cpfls.done(*words)
-    told = json.loads(result.stdout)
-    assert told["model"] == "model.h5"
-    assert list(told["responses"])[:3] == ["roll", "pitch", "yaw"]
-    assert any("model.h5" in warning and "learned" in warning for warning in told["warnings"])
+    summary = json.loads(result.stdout)
+    assert summary["model"] == "model.h5"
+    assert list(summary["responses"])[:3] == ["roll", "pitch", "yaw"]
+    assert any("model.h5" in warning and "learned" in warning for warning in summary["warnings"])
 
 
 def test_air_that_a_flight_does_not_know_is_still(cpfls, folder, tmp_path):
@@ -216,9 +216,9 @@ def test_air_that_a_flight_does_not_know_is_still(cpfls, folder, tmp_path):
     drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
     whole = VehicleModel(vehicle=load_study(config).vehicle, effects=(drag,))
     vehicle_models.write_vehicle(model, vehicle_models.vehicle_of(whole), resolved_yaml(load_study(config)))
-    told = cpfls.told("response", config, folder / "light.csv", "--model", model, "-o", tmp_path / "r.h5")
-    assert "vehicle.h5 depends on the velocity through the air, which is taken as 0 in light.csv" in told["warnings"]
-    assert told["responses"]["roll"]["cost"] < 5.0
+    summary = cpfls.summary("response", config, folder / "light.csv", "--model", model, "-o", tmp_path / "r.h5")
+    assert "vehicle.h5 depends on the velocity through the air, which is taken as 0 in light.csv" in summary["warnings"]
+    assert summary["responses"]["roll"]["cost"] < 5.0
 
 
 def test_repeats_of_a_path_show_the_vehicle(cpfls, folder, tmp_path):
@@ -228,10 +228,10 @@ def test_repeats_of_a_path_show_the_vehicle(cpfls, folder, tmp_path):
     alone = json.loads(cpfls(*words, logs[0]).stdout)
     assert alone["instruments"] == "none"
     together = cpfls.done(*words, *logs, folder / "heavy.csv")
-    told = json.loads(together.stdout)
-    assert told["instruments"] == "repeats"
-    assert any(warning.startswith("heavy.csv: no other of these flights") for warning in told["warnings"])
+    summary = json.loads(together.stdout)
+    assert summary["instruments"] == "repeats"
+    assert any(warning.startswith("heavy.csv: no other of these flights") for warning in summary["warnings"])
     for name in ("roll", "pitch"):
-        own = told["responses"][name]
+        own = summary["responses"][name]
         assert own["word"] == "good"
         assert own["cost"] < 0.2 * alone["responses"][name]["cost"]

@@ -49,12 +49,12 @@ def said(cpfls, *words):
 
 @pytest.mark.parametrize("options", REDUCTIONS, ids=lambda options: " ".join(options[1::2]))
 def test_a_reduction_chooses_and_says_the_same(cpfls, pipeline, shaken, study, tmp_path, options):
-    told, chosen = [], []
+    summary, chosen = [], []
     for flight in (pipeline.flight, shaken):
-        told.append(said(cpfls, "reduce", study, flight, "-o", tmp_path / "s.h5", *FASTER, *options))
+        summary.append(said(cpfls, "reduce", study, flight, "-o", tmp_path / "s.h5", *FASTER, *options))
         with h5py.File(tmp_path / "s.h5") as file:
             chosen.append(file["indices"][()])
-    assert told[0] == told[1]
+    assert summary[0] == summary[1]
     np.testing.assert_array_equal(*chosen)
 
 

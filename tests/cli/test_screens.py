@@ -46,10 +46,10 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
 
     def show(name, command, *words, output=None):
         options = () if output is None else ("-o", output)
-        told = []
+        summary = []
 
         def tell(outcome, common):
-            told.append(outcome)
+            summary.append(outcome)
             terminal.tell(outcome, common)
 
         with (
@@ -60,8 +60,8 @@ def screens(cpfls, pipeline, study, tmp_path_factory):
             environment.setenv("NO_COLOR", "1")
             environment.chdir(folder)
             result = cpfls(command, *words, *options)
-        assert told, result.output
-        shown[name] = SimpleNamespace(command=command, result=result, outcome=told[0], folder=folder)
+        assert summary, result.output
+        shown[name] = SimpleNamespace(command=command, result=result, outcome=summary[0], folder=folder)
 
     for source in (study, *pipeline.paths.values()):
         # Names as short as people's: a command is as long as the names in it.

@@ -223,7 +223,7 @@ def test_setpoints_go_into_the_flight_and_are_said(cpfls, flown, tmp_path):
         assert "setpoint_position" not in file
         assert np.isnan(file["setpoint_thrust"][:140]).all()
         assert len(file["time"]) == SAMPLES
-    summary = cpfls.told("import", config, log, "-o", flight, "--force")
+    summary = cpfls.summary("import", config, log, "-o", flight, "--force")
     assert summary["setpoints"] == {"attitude": 300, "thrust": 160}
 
 
@@ -279,7 +279,7 @@ def test_init_proposes_the_setpoints_of_px4_and_import_takes_them(cpfls, tmp_pat
         "sign": [-1],
         "required": False,
     }
-    summary = cpfls.told("import", config, log, "-o", made)
+    summary = cpfls.summary("import", config, log, "-o", made)
     samples = summary["samples"]
     assert summary["setpoints"] == {"position": samples, "attitude": samples, "thrust": samples}
     with h5py.File(made) as file:

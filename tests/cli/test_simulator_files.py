@@ -112,7 +112,7 @@ def test_a_second_fit_that_is_refused_leaves_the_first(cpfls, folder, tmp_path, 
     result = cpfls(*words)
     assert result.exit_code == 0, result.stderr
     assert len(asked) == 2
-    model = cpfls.told("info", tmp_path / "gap" / "extended.h5")
+    model = cpfls.summary("info", tmp_path / "gap" / "extended.h5")
     assert "parameter_error" in json.dumps(model)
 
 

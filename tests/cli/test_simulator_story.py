@@ -33,6 +33,6 @@ def test_a_flight_in_mujoco_comes_back(cpfls, tmp_path):
     cpfls.done("import", CONFIG, log, "-o", flight)
     sums = {
         name: each["body_rate"]["sum"]
-        for name, each in cpfls.told("replay", CONFIG, model, flight, "-o", tmp_path / "replay.h5")["models"].items()
+        for name, each in cpfls.summary("replay", CONFIG, model, flight, "-o", tmp_path / "replay.h5")["models"].items()
     }
     assert sums["model"] < 0.1 * sums["stated"]

@@ -48,11 +48,11 @@ def test_vehicle_says_it_first_and_fits_only_what_can_be_told(cpfls, slow):
     assert (result.stdout.count("SDLOG_PROFILE"), result.stderr.count("SDLOG_PROFILE")) == (1, 0)
     assert "Fly in still air" not in result.stdout
     assert "cpfls trajectory" not in result.stdout
-    told = plain(found_vehicle(output))
-    assert told["verdict"] == "shows-the-loop"
-    assert told["evaluated"] <= 2
-    assert set(told["not_determined"]) == {"drag_factor", "inertia.Ixx", "inertia.Iyy", "inertia.Izz"}
-    assert abs(told["parameters"]["rotors.thrust_factor_n_s2"]["value"] / 6e-6 - 1) < 0.02
+    summary = plain(found_vehicle(output))
+    assert summary["verdict"] == "shows-the-loop"
+    assert summary["evaluated"] <= 2
+    assert set(summary["not_determined"]) == {"drag_factor", "inertia.Ixx", "inertia.Iyy", "inertia.Izz"}
+    assert abs(summary["parameters"]["rotors.thrust_factor_n_s2"]["value"] / 6e-6 - 1) < 0.02
 
 
 def test_tune_asks_for_faster_logs_before_a_flight(cpfls, slow):

@@ -119,8 +119,8 @@ def test_it_computes_writes_and_answers(house, capsys, tmp_path):
     assert err == "cpfls: note: a rough scale\n"
     first = (tmp_path / "w.h5").read_bytes()
     code, out, _ = called(house, capsys, "craft.txt", "-o", "w.h5", "--factor", "2", "--force", "--json")
-    told = json.loads(out)
-    assert (told["mass"], told["cautions"]) == (2.5, ["a rough scale"])
+    answer = json.loads(out)
+    assert (answer["mass"], answer["cautions"]) == (2.5, ["a rough scale"])
     assert (tmp_path / "w.h5").read_bytes() == first
 
 
@@ -258,8 +258,8 @@ def looked(cpfls, tmp_path, monkeypatch):
 
 
 def test_info_check_and_report_know_results(cpfls, looked):
-    told = cpfls.told("info", looked)
-    assert (told["format"], told["result"]["name"]) == ("cpfls/look", "log.csv")
+    answer = cpfls.summary("info", looked)
+    assert (answer["format"], answer["result"]["name"]) == ("cpfls/look", "log.csv")
     said = cpfls("info", looked, "-v").stdout
     assert "log.csv (sha256 " in said
     assert cpfls("check", looked).stdout.startswith(f"{looked}: good (cpfls/look)\n")
@@ -357,8 +357,8 @@ def test_each_part_has_a_file_that_names_the_one_before(filled, tmp_path):
     assert list(read(out / "first.h5", Thing)[1].inputs) == ["log"]
     assert (out / "report.html").read_text() == "first.h5 second.h5"
     assert (out / "names.txt").read_text() == "a"
-    told = json.loads((out / "look.json").read_text())
-    assert outcome.summary == {**told, "new": 1}
+    answer = json.loads((out / "look.json").read_text())
+    assert outcome.summary == {**answer, "new": 1}
     assert outcome.blocks == (
         Box("ALL GOOD", "of a", ("And more.", "- one"), "good"),
         Text(f"{out / 'report.html'}: all of it, with figures; one is new"),

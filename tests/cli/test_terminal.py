@@ -110,7 +110,7 @@ def test_time_left_of_a_resumed_search_is_that_of_its_own_pace(monkeypatch):
 
 
 @pytest.fixture
-def told(capsys):
+def answer(capsys):
     """Tell an outcome; give the lines of both streams."""
 
     def call(outcome, **options):
@@ -120,39 +120,39 @@ def told(capsys):
     return call
 
 
-def test_an_answer_ends_with_the_next_command_and_what_more_there_is(told):
+def test_an_answer_ends_with_the_next_command_and_what_more_there_is(answer):
     blocks = (Text("the answer"), Folded("why", [Text("because")]), Folded("how", [Text("so")]))
     outcome = Outcome({}, blocks, next=(("cpfls", "check", Path("a name.h5")),))
     following = ["next:", "  cpfls check 'a name.h5'"]
-    assert told(outcome) == [["the answer", *following, "more with -v: why; how"], []]
-    assert told(outcome, verbose=True) == [["the answer", "why:", "because", "how:", "so", *following], []]
-    assert told(outcome, quiet=True) == [[], []]
+    assert answer(outcome) == [["the answer", *following, "more with -v: why; how"], []]
+    assert answer(outcome, verbose=True) == [["the answer", "why:", "because", "how:", "so", *following], []]
+    assert answer(outcome, quiet=True) == [[], []]
 
 
-def test_an_answer_says_what_shows_more_of_it_without_computing_it_again(told, pipeline, tmp_path):
+def test_an_answer_says_what_shows_more_of_it_without_computing_it_again(answer, pipeline, tmp_path):
     blocks = (Text("the answer"), Folded("why", [Text("because")]))
-    *_, more, last = told(Outcome({}, blocks, written=pipeline.model))[0]
+    *_, more, last = answer(Outcome({}, blocks, written=pipeline.model))[0]
     assert (more, last) == ("more with -v: why", f"or with cpfls info {pipeline.model} -v")
     # What is no file of results does not hold what was answered.
     page = tmp_path / "page.html"
     page.write_text("<!DOCTYPE html>")
-    assert told(Outcome({}, blocks, written=page))[0][-1] == "more with -v: why"
-    assert told(Outcome({}, (Text("all"),), written=pipeline.model))[0] == ["all"]
+    assert answer(Outcome({}, blocks, written=page))[0][-1] == "more with -v: why"
+    assert answer(Outcome({}, (Text("all"),), written=pipeline.model))[0] == ["all"]
 
 
-def test_notes_that_say_the_same_of_several_files_are_one(told):
+def test_notes_that_say_the_same_of_several_files_are_one(answer):
     slow = [
         f"a log {name}.bin: logged at {rate} Hz (C1): too slow" for name, rate in (("x", 9.78), ("y", 10), ("z", 9.8))
     ]
     other = "a log y.bin: full of noise"
     blocks = tuple(Text(note, "warning", always=True) for note in (slow[0], other, *slow[1:]))
     merged = "a log x.bin and 2 more: logged at 9.78 to 10 Hz (C1): too slow"
-    assert told(Outcome({}, blocks))[1] == [f"cpfls: note: {each}" for each in (merged, other)]
+    assert answer(Outcome({}, blocks))[1] == [f"cpfls: note: {each}" for each in (merged, other)]
     # Asked for, each stands by itself.
-    assert told(Outcome({}, blocks), verbose=True)[1] == [f"cpfls: note: {block.text}" for block in blocks]
+    assert answer(Outcome({}, blocks), verbose=True)[1] == [f"cpfls: note: {block.text}" for block in blocks]
     without = tuple(Text(note, "warning") for note in ("no colon", "name: no colon", "other: no colon"))
     said = ["cpfls: note: no colon", "cpfls: note: name and 1 more: no colon"]
-    assert told(Outcome({}, without))[1] == said
+    assert answer(Outcome({}, without))[1] == said
 
 
 def test_on_a_terminal_notes_are_broken_between_words_and_come_before_the_answer(monkeypatch):
@@ -163,14 +163,14 @@ def test_on_a_terminal_notes_are_broken_between_words_and_come_before_the_answer
     assert order == ["cpfls: note: a note of several\nwords here", "the answer"]
 
 
-def test_notes_leave_the_answer_on_the_screen(told):
+def test_notes_leave_the_answer_on_the_screen(answer):
     notes = [f"note {number} {'x' * 80}" for number in range(5)]
     warned = [Text(note, "warning", always=number == 4) for number, note in enumerate(notes)]
     shown = [f"cpfls: note: {notes[index]}" for index in (0, 1, 4)]
-    assert told(Outcome({}, tuple(warned)))[1] == [*shown, "cpfls: note: 2 more notes: -v shows them"]
-    assert told(Outcome({}, tuple(warned)), verbose=True)[1] == [f"cpfls: note: {note}" for note in notes]
+    assert answer(Outcome({}, tuple(warned)))[1] == [*shown, "cpfls: note: 2 more notes: -v shows them"]
+    assert answer(Outcome({}, tuple(warned)), verbose=True)[1] == [f"cpfls: note: {note}" for note in notes]
     # One that is longer than that is shown all the same.
-    assert told(Outcome({}, (Text("x" * 1000, "warning"),)))[1] == [f"cpfls: note: {'x' * 1000}"]
+    assert answer(Outcome({}, (Text("x" * 1000, "warning"),)))[1] == [f"cpfls: note: {'x' * 1000}"]
 
 
 @pytest.mark.parametrize(

@@ -39,8 +39,8 @@ def write_log(path, seed, lacks=0.0):
     time = np.arange(800) / 100
     force = np.array([0, 0, 9.81]) + rng.normal(0, 0.3, (800, 3))
     share = np.exp(rng.normal(0, 0.01, 4)) / np.array([1, 1, 1 - lacks, 1])
-    told = HOVER * np.sqrt(share) * (1 + rng.normal(0, 0.01, (800, 4)))
-    table = np.column_stack([time, force, told, np.full(800, 15.0)])
+    answer = HOVER * np.sqrt(share) * (1 + rng.normal(0, 0.01, (800, 4)))
+    table = np.column_stack([time, force, answer, np.full(800, 15.0)])
     np.savetxt(path, table, fmt="%.5f", delimiter=",", header=HEADER, comments="")
 
 
@@ -56,7 +56,7 @@ def logs(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def told(cpfls, logs):
+def answer(cpfls, logs):
     """The trend of the first twelve, and of all with one that cannot be read."""
     out = logs / "trend"
     twelve = [logs / "logs" / f"log{number}.csv" for number in range(1, 13)]
@@ -69,54 +69,54 @@ def told(cpfls, logs):
     return SimpleNamespace(first=json.loads(first.stdout), second=second, out=out)
 
 
-def test_a_rotor_is_named_since_its_flight(told):
-    (shift,) = told.first["shifts"]
+def test_a_rotor_is_named_since_its_flight(answer):
+    (shift,) = answer.first["shifts"]
     assert (shift["since"], shift["flight"]) == ("log11.csv", 11)
     (cause,) = shift["causes"]
     assert (cause["name"], cause["named"]) == ("rotor M3", True)
     assert cause["sizes"][0]["low"] < 0.2 < cause["sizes"][0]["high"]
-    assert told.first["reference_flights"] == [f"log{number}.csv" for number in range(1, 7)]
-    assert told.first["order"] == "name"
-    assert told.first["new"] == 12
+    assert answer.first["reference_flights"] == [f"log{number}.csv" for number in range(1, 7)]
+    assert answer.first["order"] == "name"
+    assert answer.first["new"] == 12
 
 
-def test_the_first_screen(told):
-    lines = told.second.stdout.splitlines()
+def test_the_first_screen(answer):
+    lines = answer.second.stdout.splitlines()
     assert lines[0].startswith("CHANGED: Since log11.csv (flight 11 of 13): rotor M3 pulls ")
     assert len(lines) <= 15
-    assert "13 in the order of their names; the first 6 are the reference." in told.second.stdout
-    assert "look at its propeller" in told.second.stdout.lower()
+    assert "13 in the order of their names; the first 6 are the reference." in answer.second.stdout
+    assert "look at its propeller" in answer.second.stdout.lower()
 
 
-def test_a_second_call_reads_what_is_new_and_names_what_cannot_be_read(told):
-    assert "1 of 13 flights were new, the others kept" in told.second.stdout
-    assert "left out, 1 flight: " in told.second.stderr
-    assert "log14.csv" in told.second.stderr
-    assert "log15.csv" in (told.out / "trend.json").read_text()
-    assert len(list((told.out / "flights").iterdir())) == 13
+def test_a_second_call_reads_what_is_new_and_names_what_cannot_be_read(answer):
+    assert "1 of 13 flights were new, the others kept" in answer.second.stdout
+    assert "left out, 1 flight: " in answer.second.stderr
+    assert "log14.csv" in answer.second.stderr
+    assert "log15.csv" in (answer.out / "trend.json").read_text()
+    assert len(list((answer.out / "flights").iterdir())) == 13
 
 
-def test_what_the_folder_holds(cpfls, told):
-    assert {path.name for path in told.out.iterdir()} == {
+def test_what_the_folder_holds(cpfls, answer):
+    assert {path.name for path in answer.out.iterdir()} == {
         "trend.h5",
         "report.html",
         "trend.json",
         "trend.csv",
         "flights",
     }
-    rows = list(csv.DictReader((told.out / "trend.csv").read_text().splitlines()))
+    rows = list(csv.DictReader((answer.out / "trend.csv").read_text().splitlines()))
     assert [row["flight"] for row in rows] == [f"log{number}.csv" for number in range(1, 14)]
     assert [row["part"] for row in rows] == ["1"] * 10 + ["2"] * 3
     assert float(rows[-1]["thrust M3"]) - float(rows[0]["thrust M3"]) == pytest.approx(-np.log(0.8), abs=0.1)
-    summary = json.loads((told.out / "trend.json").read_text())
+    summary = json.loads((answer.out / "trend.json").read_text())
     assert [row["flight"] for row in summary["flights"]] == [row["flight"] for row in rows]
-    cpfls.done("check", told.out / "trend.h5")
-    assert "Since log11.csv" in cpfls("info", told.out / "trend.h5").stdout
+    cpfls.done("check", answer.out / "trend.h5")
+    assert "Since log11.csv" in cpfls("info", answer.out / "trend.h5").stdout
 
 
-def test_dates_of_all_logs_order_them(cpfls, logs, told, tmp_path):
+def test_dates_of_all_logs_order_them(cpfls, logs, answer, tmp_path):
     out = tmp_path / "trend"
-    shutil.copytree(told.out / "flights", out / "flights")
+    shutil.copytree(answer.out / "flights", out / "flights")
     for path in (out / "flights").iterdir():
         kept, origin = store.read(path, FlightNumbers)
         number = int(kept.name.removeprefix("log").removesuffix(".csv"))
@@ -133,7 +133,7 @@ def test_dates_of_all_logs_order_them(cpfls, logs, told, tmp_path):
     assert (out / "trend.csv").read_text().splitlines()[1].startswith("log1.csv,2023-11-13T22:13:20+00:00,")
 
 
-def test_workers_read_the_same(cpfls, logs, told, tmp_path, monkeypatch):
+def test_workers_read_the_same(cpfls, logs, answer, tmp_path, monkeypatch):
     def employed(reading, *, count, scheduler):
         assert (count, scheduler) == (2, None)
         return nullcontext(Serial(pickle.loads(pickle.dumps(reading))))
@@ -144,7 +144,7 @@ def test_workers_read_the_same(cpfls, logs, told, tmp_path, monkeypatch):
     assert result.exit_code == 0, result.stderr
     assert result.stdout.startswith("NO CHANGE: over 5 flights")
     for path in (tmp_path / "trend" / "flights").iterdir():
-        assert path.read_bytes() == (told.out / "flights" / path.name).read_bytes()
+        assert path.read_bytes() == (answer.out / "flights" / path.name).read_bytes()
 
 
 def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeypatch):
@@ -162,7 +162,7 @@ def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeyp
     assert stopped.exit_code == 130
     assert f"what was read is kept in {tmp_path / 'trend' / 'flights'}" in stopped.stderr
     monkeypatch.setattr(command, "kept_numbers", kept_numbers)
-    assert cpfls.told(*words, "-o", tmp_path / "trend")["new"] == 3
+    assert cpfls.summary(*words, "-o", tmp_path / "trend")["new"] == 3
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_an_interrupt_loses_nothing_that_was_read(cpfls, logs, tmp_path, monkeyp
         (["empty"], "holds no flight and no log"),
     ],
 )
-def test_what_is_refused(cpfls, logs, told, tmp_path, words, message):  # noqa: ARG001
+def test_what_is_refused(cpfls, logs, answer, tmp_path, words, message):  # noqa: ARG001
     (logs / "logs" / "empty").mkdir(exist_ok=True)
     given = [logs / "logs" / word if word[0] in "le" else word for word in words]
     result = cpfls("trend", logs / "study.yaml", *given, "-o", tmp_path / "trend")

@@ -33,13 +33,13 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def gains(cpfls, folder):
     """What the command says and writes for each autopilot."""
-    told = {}
+    answer = {}
     for name in AUTOPILOTS:
         result = cpfls.done(
             "tune", folder / "study.yaml", folder / "vehicle.h5", "--autopilot", name, "-o", folder / f"{name}.h5"
         )
-        told[name] = result
-    return told
+        answer[name] = result
+    return answer
 
 
 def read(path):
@@ -220,10 +220,10 @@ def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_told(cpfls
     )
     found = read(tmp_path / "gains.h5")
     assert any("no log holds 256 samples" in words for words in found.warnings)
-    told = json.loads(result.stdout)
-    assert told["parameters"]["MC_ROLLRATE_P"]["proposed"] > 0
-    assert told["falls_short"]["proposed"] == []
-    assert told["file"].endswith("gains.params")
+    answer = json.loads(result.stdout)
+    assert answer["parameters"]["MC_ROLLRATE_P"]["proposed"] > 0
+    assert answer["falls_short"]["proposed"] == []
+    assert answer["file"].endswith("gains.params")
 
 
 def test_an_imported_flight_keeps_the_parameters_of_its_log(cpfls, tmp_path):
@@ -277,12 +277,12 @@ def test_a_log_alone_takes_what_it_says_of_the_autopilot(cpfls, folder, looked):
         for name, hz in (("IMU_GYRO_NF0_FRQ", 81.0), ("another", 60.0))
     )
     log = looked(changes=(notch, other))
-    told = cpfls.told("tune", log, "-o", folder / "looked")
+    answer = cpfls.summary("tune", log, "-o", folder / "looked")
     changed = written(folder, "px4", "looked")
-    gains = {row["parameter"]: row["proposed"] for row in told["changes"]}
+    gains = {row["parameter"]: row["proposed"] for row in answer["changes"]}
     # What has no known range is said, and left to the pilot.
     assert changed == pytest.approx({**gains, "IMU_GYRO_NF0_FRQ": 81.0})
-    assert [each["parameter"] for each in told["filters"]] == ["IMU_GYRO_NF0_FRQ", "another"]
+    assert [each["parameter"] for each in answer["filters"]] == ["IMU_GYRO_NF0_FRQ", "another"]
     assert not (folder / "looked").exists()
     again = cpfls("tune", log, "-o", folder / "looked")
     assert again.exit_code == 2

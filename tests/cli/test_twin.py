@@ -65,7 +65,9 @@ def logged(tmp_path_factory):
 @pytest.fixture(scope="module")
 def twin(cpfls, logged):
     output = logged / "twin.h5"
-    return cpfls.told("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", output), output
+    return cpfls.summary(
+        "simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", output
+    ), output
 
 
 def test_a_log_is_flown_with_its_own_gains_on_its_own_clock(twin):
@@ -191,7 +193,7 @@ def test_a_flight_that_was_simulated_knows_its_autopilot(cpfls, tmp_path):
     )
     for words in steps:
         cpfls.done(*words)
-    said = cpfls.told("simulate", tmp_path / "study.yaml", flight, "-o", tmp_path / "twin.h5")
+    said = cpfls.summary("simulate", tmp_path / "study.yaml", flight, "-o", tmp_path / "twin.h5")
     assert (said["autopilot"], said["gains"]["source"], said["thrust_from"]) == ("crazyflie", "simulation", "setpoint")
     assert not said["vehicles"]["vehicle"]["channels"]["roll rate"]["parts"]
 

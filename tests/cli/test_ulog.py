@@ -275,10 +275,10 @@ def test_one_example_takes_logs_of_all_versions(cpfls, write, tmp_path, version)
     flight = tmp_path / "flight.h5"
     words = ["-v", "--set", "import.delay_s=0", "--set", "import.lowpass_hz=null"]
     result = cpfls.done("import", EXAMPLE, write(of_version(version)), "-o", flight, *words)
-    told = " ".join(result.stderr.split())
+    answer = " ".join(result.stderr.split())
     for signal, column in zip(("body_rate", "rotor_command"), VERSIONS[version], strict=True):
-        assert (f"{signal} is taken from {column}" in told) == (column is not None)
-    assert ("acceleration is taken from sensor_combined.accelerometer_m_s2[0]" in told) == (version != "1.17")
+        assert (f"{signal} is taken from {column}" in answer) == (column is not None)
+    assert ("acceleration is taken from sensor_combined.accelerometer_m_s2[0]" in answer) == (version != "1.17")
     with h5py.File(flight) as file:
         np.testing.assert_allclose(file["body_rate"][()], [[0.0, 0.0, -YAW_RATE]] * len(file["time"]), atol=1e-6)
         np.testing.assert_allclose(file["rotor_command"][-20], [0.5, 0.6, 0.6, 0.5], atol=1e-6)

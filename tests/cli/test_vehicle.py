@@ -47,46 +47,46 @@ def flights(cpfls, config):
 def found(cpfls, config, flights):
     """What is printed for machines, and the file."""
     output = config.parent / "vehicle.h5"
-    told = cpfls.told("vehicle", config, flights[0], "--held-out", flights[1], "-o", output)
-    return SimpleNamespace(output=output, told=told, record=found_vehicle(output))
+    summary = cpfls.summary("vehicle", config, flights[0], "--held-out", flights[1], "-o", output)
+    return SimpleNamespace(output=output, summary=summary, record=found_vehicle(output))
 
 
 def test_it_finds_what_was_put_in(found):
-    numbers, truth = {each["name"]: each for each in found.told["numbers"]}, dict.fromkeys("xyz", DAMPING)
+    numbers, truth = {each["name"]: each for each in found.summary["numbers"]}, dict.fromkeys("xyz", DAMPING)
     for axis, value in truth.items():
         number = numbers[f"linear_damping.d_{axis}"]
         assert number["value"] == pytest.approx(value, rel=0.15)
         assert number["low"] < number["value"] < number["high"]
         assert (number["stated"], number["determined"], number["at_bound"]) == (None, True, False)
-    (damping,) = [each for each in found.told["model"]["effects"] if each["name"] == "linear_damping"]
+    (damping,) = [each for each in found.summary["model"]["effects"] if each["name"] == "linear_damping"]
     assert damping["coefficients"] == pytest.approx([DAMPING] * 3, rel=0.15)
-    assert found.told["model"]["vehicle"]["mass_kg"] == 0.8
+    assert found.summary["model"]["vehicle"]["mass_kg"] == 0.8
 
 
 @pytest.mark.decides
 def test_json_tells_verdict_structures_and_what_was_held_out(found):
-    told = found.told
-    assert told["verdict"] == "good-for-simulation"
-    assert told["complete"] is True
-    names = [row["name"] for row in told["structures"]]
+    summary = found.summary
+    assert summary["verdict"] == "good-for-simulation"
+    assert summary["complete"] is True
+    names = [row["name"] for row in summary["structures"]]
     assert names[:5] == ["chosen", "best", "added", "everything", "nothing"]
     assert set(names[5:]) == {"front"}
-    errors = {row["name"]: row["error"] for row in told["structures"][:5]}
+    errors = {row["name"]: row["error"] for row in summary["structures"][:5]}
     assert errors["best"] <= errors["chosen"] < 0.1 * errors["nothing"]
-    assert set(told["structures"][3]["blocks"]) == set(TRIED)
-    assert told["held_out"]["flights"] == ["flight-2.h5"]
-    models = told["held_out"]["models"]
+    assert set(summary["structures"][3]["blocks"]) == set(TRIED)
+    assert summary["held_out"]["flights"] == ["flight-2.h5"]
+    models = summary["held_out"]["models"]
     assert models["model"]["body_rate"]["sum"] < 0.2 * models["stated"]["body_rate"]["sum"]
-    better = told["held_out"]["better"]
+    better = summary["held_out"]["better"]
     assert better["share"] > 0.9
     assert 0 <= better["speed_m_s"][0] < better["speed_m_s"][1] < 10
-    shares = {each["name"] for each in told["shares"]}
-    assert shares == {"rotors", *(each["name"] for each in told["model"]["effects"])}
+    shares = {each["name"] for each in summary["shares"]}
+    assert shares == {"rotors", *(each["name"] for each in summary["model"]["effects"])}
 
 
 def test_the_file_keeps_to_its_format_and_says_the_same(cpfls, found):
     cpfls.done("check", found.output)
-    assert plain(found.record) == found.told
+    assert plain(found.record) == found.summary
     assert "GOOD FOR SIMULATION AND CONTROL" in cpfls("info", found.output).stdout
 
 
@@ -107,15 +107,15 @@ def test_people_read_verdict_and_numbers(cpfls, config, flights, found, tmp_path
 def test_without_a_held_out_flight_it_is_not_judged(cpfls, config, flights, tmp_path):
     words = ("--set", f"playback.leave_out={json.dumps(left_out(TRIED[:2]))}", "--json")
     result = cpfls.done("vehicle", config, flights[0], "-o", tmp_path / "v.h5", *words)
-    told = json.loads(result.stdout)
-    assert (told["verdict"], told["held_out"]) == ("not-judged", None)
+    summary = json.loads(result.stdout)
+    assert (summary["verdict"], summary["held_out"]) == ("not-judged", None)
 
 
 @pytest.mark.usefixtures("sketched")
 def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     replayed = cpfls.done("replay", config, found.output, flights[1], "-o", tmp_path / "replay.h5", "--json")
     model = json.loads(replayed.stdout)["models"]["model"]
-    assert model["body_rate"]["sum"] == found.told["held_out"]["models"]["model"]["body_rate"]["sum"]
+    assert model["body_rate"]["sum"] == found.summary["held_out"]["models"]["model"]["body_rate"]["sum"]
     worth = cpfls("export", found.output, "-o", tmp_path / "worth.json").stdout.splitlines()[-3:]
     assert worth[0].startswith("GOOD FOR SIMULATION AND CONTROL: predicts motion ")
     rate, horizon = model["body_rate"]["mae"][-1], json.loads(replayed.stdout)["horizon_s"]
@@ -123,14 +123,14 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     assert worth[1].startswith(f"On held-out flights it ends {rate:.3g} rad/s, ")
     assert worth[1].endswith(f" m off the measured motion after {last:.3g} s, on average.")
     assert worth[2] == "JSON holds all of it."
-    compared = cpfls.told("compare", config, flights[1], "--model", found.output, "-o", tmp_path / "gap.h5")
+    compared = cpfls.summary("compare", config, flights[1], "--model", found.output, "-o", tmp_path / "gap.h5")
     assert max(compared["gap"]["floors"]) < 1.5
     alone = ("--model", found.output, "--set", "simulation.closed_loop.effects={}")
     cpfls.done("simulate", config, flights[1].parent / "path-2.h5", *alone, "-o", tmp_path / "f.h5")
     cpfls.done("export", found.output, "-o", tmp_path / "vehicle.json")
     page = cpfls("report", config, found.output, "-o", tmp_path / "page.html", "--json")
-    told = json.loads(page.stdout)
-    assert told["sections"] == ["summary", "vehicle", "stated-vehicle", "provenance"]
+    summary = json.loads(page.stdout)
+    assert summary["sections"] == ["summary", "vehicle", "stated-vehicle", "provenance"]
     text = (tmp_path / "page.html").read_text()
     assert "A vehicle found in flights" in text
     assert "Not shown, because" not in text
@@ -139,8 +139,8 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
 def test_it_is_a_model_of_its_own(cpfls, refuse, config, flights, found, tmp_path):
     """Its study is that which it was found with, so no config has to be given with it."""
     apart = ("--held-out", flights[1])
-    said = cpfls.told("gap", found.output, flights[0], *apart, "-o", tmp_path / "alone")
-    with_config = cpfls.told("gap", config, flights[0], *apart, "--model", found.output, "-o", tmp_path / "both")
+    said = cpfls.summary("gap", found.output, flights[0], *apart, "-o", tmp_path / "alone")
+    with_config = cpfls.summary("gap", config, flights[0], *apart, "--model", found.output, "-o", tmp_path / "both")
     assert said["effects"] == with_config["effects"]
     assert said["verdict"] == with_config["verdict"]
     assert load_study(tmp_path / "alone" / "study.yaml").vehicle == load_study(config).vehicle
@@ -176,13 +176,13 @@ def interrupt_at(monkeypatch):
         find = vehicle.find_vehicle
 
         def finding(stated, flights, settings, progress, kept):
-            def told(judged, total):
+            def summary(judged, total):
                 evaluated.append(len(judged))
                 if len(judged) == number:
                     os.kill(os.getpid(), signal.SIGINT)
                 progress(judged, total)
 
-            return find(stated, flights, settings, told, kept)
+            return find(stated, flights, settings, summary, kept)
 
         evaluated = []
         monkeypatch.setattr(vehicle, "find_vehicle", finding)
@@ -207,8 +207,8 @@ def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, int
         f"cpfls: note: {tmp_path / 'v.h5'}: is incomplete, because the search was interrupted; {RESUME}"
     ) in result.stderr.splitlines()
     cpfls.done("check", tmp_path / "v.h5.checkpoint")
-    told = json.loads(result.stdout)
-    assert (told["complete"], told["evaluated"]) == (False, 4)
+    summary = json.loads(result.stdout)
+    assert (summary["complete"], summary["evaluated"]) == (False, 4)
     cpfls.done("report", config, tmp_path / "v.h5", "-o", tmp_path / "page.md")
     assert "the search was stopped before its end" in (tmp_path / "page.md").read_text()
 
@@ -219,10 +219,10 @@ def test_an_interrupt_after_the_first_structure_gives_the_stated_vehicle(
     interrupt_at(1)
     result = cpfls("vehicle", config, flights[0], "-o", tmp_path / "v.h5", "--json")
     assert result.exit_code == 130
-    told = json.loads(result.stdout)
-    assert (told["complete"], told["evaluated"]) == (False, 1)
-    assert {each["name"] for each in told["structures"]} == {"chosen", "best", "nothing", "front"}
-    assert told["model"]["effects"] == []
+    summary = json.loads(result.stdout)
+    assert (summary["complete"], summary["evaluated"]) == (False, 1)
+    assert {each["name"] for each in summary["structures"]} == {"chosen", "best", "nothing", "front"}
+    assert summary["model"]["effects"] == []
     assert names(tmp_path) == ["v.h5", "v.h5.checkpoint"]
     cpfls.done("report", config, tmp_path / "v.h5", "-o", tmp_path / "page.md")
 
@@ -231,9 +231,9 @@ def test_an_interrupt_after_the_first_structure_gives_the_stated_vehicle(
 def test_a_quick_search_finds_the_same_effect_in_fewer_structures(cpfls, config, flights, found, tmp_path):
     words = ("vehicle", config, flights[0], "--held-out", flights[1], "--quick", "-v")
     result = cpfls.done(*words, "-o", tmp_path / "v.h5")
-    told = plain(found_vehicle(tmp_path / "v.h5"))
-    assert told["evaluated"] <= found.told["evaluated"]
-    assert told["model"]["effects"][0]["name"] == "linear_damping"
+    summary = plain(found_vehicle(tmp_path / "v.h5"))
+    assert summary["evaluated"] <= found.summary["evaluated"]
+    assert summary["model"]["effects"][0]["name"] == "linear_damping"
     assert "a first answer by --quick" in result.stderr
     assert "v-full.h5" in result.stdout
 
@@ -248,7 +248,7 @@ def test_an_interrupted_search_goes_on_to_the_same_end(
     monkeypatch.undo()
     after = interrupt_at(None)
     cpfls.done(*words, "--resume")
-    assert [*before, *after] == list(range(1, found.told["evaluated"] + 1))
+    assert [*before, *after] == list(range(1, found.summary["evaluated"] + 1))
     assert (tmp_path / "vehicle.h5").read_bytes() == found.output.read_bytes()
     assert names(tmp_path) == ["vehicle.h5"]
 

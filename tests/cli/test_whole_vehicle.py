@@ -275,7 +275,7 @@ def test_a_torque_that_was_logged_is_what_a_prediction_is_held_against(
 
 
 def gap(cpfls, config, output, *words):
-    return np.array(cpfls.told("compare", config, *words, "-o", output)["gap"]["floors"])
+    return np.array(cpfls.summary("compare", config, *words, "-o", output)["gap"]["floors"])
 
 
 def test_the_true_vehicle_leaves_noise_alone(cpfls, refuse, config, vehicle, flight, noisy, tmp_path):
@@ -356,7 +356,7 @@ def test_gusts_that_nobody_knows_are_refused(refuse, config, path, folder, vehic
 
 
 def test_gusts_are_told_by_info_and_exported(cpfls, gusty, folder):
-    held = cpfls.told("info", gusty)["result"]["model"]["gusts"]
+    held = cpfls.summary("info", gusty)["result"]["model"]["gusts"]
     assert held["size"] == [0.02, 0.03, 0.01, 0.2, 0.2, 0.2]
     cpfls.done("export", gusty, "-o", folder / "gusty.json")
     exported = json.loads((folder / "gusty.json").read_text())
@@ -387,14 +387,14 @@ def test_a_replay_uses_the_past_where_a_vehicle_holds_an_observer(
     cpfls, refuse, config, written, noisy, vehicle, tmp_path
 ):
     history = Observer(past_s=0.5, rate=np.full(6, 20.0), memory_s=np.full(6, 0.2))
-    model, told = written("remembers.h5", history=history), []
+    model, summary = written("remembers.h5", history=history), []
     for options in ((), ("--history", "0.5")):
-        output = tmp_path / f"{len(told)}.h5"
+        output = tmp_path / f"{len(summary)}.h5"
         result = cpfls.done("replay", config, model, noisy, "-o", output, "--every", "20", "--json", *options)
         cpfls.done("check", output)
-        told.append(json.loads(result.stdout))
-    without, known = told
-    assert [each["history_s"] for each in told] == [0.0, 0.5]
+        summary.append(json.loads(result.stdout))
+    without, known = summary
+    assert [each["history_s"] for each in summary] == [0.0, 0.5]
     assert without["windows"] == known["windows"]
     assert known["models"]["model"] != without["models"]["model"]
     assert known["models"]["stated"] == without["models"]["stated"]

@@ -15,9 +15,9 @@ EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["p
 
 
 def test_the_citation_is_of_this_version():
-    told = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    assert str(told["version"]) == __version__
-    assert {"cff-version", "message", "title", "authors"} <= told.keys()
+    result = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert str(result["version"]) == __version__
+    assert {"cff-version", "message", "title", "authors"} <= result.keys()
 
 
 def test_the_workflow_runs_what_has_to_be_green():

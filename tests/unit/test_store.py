@@ -352,15 +352,15 @@ def test_it_is_frozen_and_takes_its_fields_by_keyword():
 
 
 def test_json_holds_what_is_brief_and_what_is_shown():
-    told = plain(craft(mass=2.5))
-    assert told["heavy"] is True
-    assert told["hover"] == {"value": None, "low": None, "high": None}
-    assert told["rotors"][0]["share"] == {"value": 0.2, "low": -0.8, "high": 1.2}
-    assert told["rotors"][0]["lag"] is None
-    assert told["rotors"][1]["peaks"][0]["kinds"] == ["motor", "propeller"]
-    assert list(told["curves"]) == ["yaw", "roll"]
-    assert "gain" not in told["curves"]["roll"]
-    assert json.loads(json.dumps(told, allow_nan=False)) == told
+    answer = plain(craft(mass=2.5))
+    assert answer["heavy"] is True
+    assert answer["hover"] == {"value": None, "low": None, "high": None}
+    assert answer["rotors"][0]["share"] == {"value": 0.2, "low": -0.8, "high": 1.2}
+    assert answer["rotors"][0]["lag"] is None
+    assert answer["rotors"][1]["peaks"][0]["kinds"] == ["motor", "propeller"]
+    assert list(answer["curves"]) == ["yaw", "roll"]
+    assert "gain" not in answer["curves"]["roll"]
+    assert json.loads(json.dumps(answer, allow_nan=False)) == answer
 
 
 def test_fields_say_what_they_are():

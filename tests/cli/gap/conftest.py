@@ -27,7 +27,7 @@ def shifted(tmp_path_factory):
 def offset_answer(cpfls, gap_config, shifted, tmp_path_factory):
     """The folder that `cpfls gap` fills from these flights, and its summary; nobody writes into it."""
     folder = tmp_path_factory.mktemp("found") / "gap"
-    return SimpleNamespace(folder=folder, summary=cpfls.told("gap", gap_config, *shifted, "-o", folder))
+    return SimpleNamespace(folder=folder, summary=cpfls.summary("gap", gap_config, *shifted, "-o", folder))
 
 
 @pytest.fixture(scope="session")

@@ -106,7 +106,7 @@ def test_held_out_by_name(cpfls, gap_config, shifted, tmp_path):
 
 
 def test_one_flight_is_split_in_time(cpfls, gap_config, shifted, tmp_path):
-    summary = cpfls.told("gap", gap_config, shifted[0], "-o", tmp_path / "x")
+    summary = cpfls.summary("gap", gap_config, shifted[0], "-o", tmp_path / "x")
     assert summary["split"].endswith("flight_1.csv (last third)")
     with h5py.File(tmp_path / "x" / "diagnosis.h5") as file:
         assert len(file["recorded/flight-1/time"]) == 1600
@@ -181,7 +181,7 @@ def test_playback_of_measured_rotors_gets_better(found):
 
 def test_playback_is_that_of_the_command_for_it(cpfls, gap_config, found, shifted, tmp_path):
     asked = ("replay", gap_config, found.folder / "extended.h5", shifted[2], "--horizon", "0.1", "--every", "5")
-    played = cpfls.told(*asked, "-o", tmp_path / "replay.h5")["models"]
+    played = cpfls.summary(*asked, "-o", tmp_path / "replay.h5")["models"]
     ours = found.summary["playback"]["models"]
     for name, again in {"after": "model", "before": "stated", "rate-fades": "rate-fades"}.items():
         # The extended model is refitted once more.

@@ -35,7 +35,7 @@ def folder(cpfls, tmp_path_factory):
 
 
 def run(cpfls, folder, command, *options):
-    return cpfls.told(command, folder / "study.yaml", *options)
+    return cpfls.summary(command, folder / "study.yaml", *options)
 
 
 def diagnosed(cpfls, folder, name, *training):

@@ -72,10 +72,10 @@ def test_what_is_repeatable_is_written_after_the_verdict(found):
 def test_machines_read_the_same_of_all_flights_and_of_pairs_with_the_held_out_one(found):
     compared, before = found.summary["disagreement"]["repeatability"], found.summary["repeatability"]["before"]
     assert (compared["runs"], compared["paths"], before["runs"]) == (3, 1, 3)
-    for told in (compared, before):
-        assert told["channels"]["force x"]["share"][0] > 0.7
-        assert all(told["channels"]["force x"]["repeatable"][:5])
-        assert not any(told["channels"]["torque x"]["repeatable"])
+    for answer in (compared, before):
+        assert answer["channels"]["force x"]["share"][0] > 0.7
+        assert all(answer["channels"]["force x"]["repeatable"][:5])
+        assert not any(answer["channels"]["torque x"]["repeatable"])
     diagnosed, _ = read(found.folder / "diagnosis.h5", Diagnosis)
     assert diagnosed.repeatability_before.share[3, 0] == pytest.approx(before["channels"]["force x"]["share"][0])
 

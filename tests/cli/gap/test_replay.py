@@ -44,17 +44,17 @@ def test_json_tells_every_prediction_by_signal_and_horizon(of_vehicle):
     assert answer["horizon_s"] == pytest.approx(0.01 * np.arange(1, 51))
     assert answer["windows"] == 2 * len(range(0, 2400 - 50, 7))
     assert list(answer["models"]) == NAMES
-    for told in answer["models"].values():
-        assert set(told) == {"body_rate", "attitude", "velocity", "position", "diverged"}
-        assert told["diverged"] == 0
-        assert told["velocity"] is told["position"] is None
+    for summary in answer["models"].values():
+        assert set(summary) == {"body_rate", "attitude", "velocity", "position", "diverged"}
+        assert summary["diverged"] == 0
+        assert summary["velocity"] is summary["position"] is None
         for signal in ("body_rate", "attitude"):
-            mae, rms = (np.array(told[signal][name]) for name in ("mae", "rms"))
-            by_axis = np.array(told[signal]["rms_by_axis"])
+            mae, rms = (np.array(summary[signal][name]) for name in ("mae", "rms"))
+            by_axis = np.array(summary[signal]["rms_by_axis"])
             assert mae.shape == rms.shape == (50,)
             assert np.all(rms >= mae)
             assert rms == pytest.approx(np.sqrt((by_axis**2).sum(axis=1)))
-            assert told[signal]["sum"] == pytest.approx(mae.sum())
+            assert summary[signal]["sum"] == pytest.approx(mae.sum())
 
 
 def test_nothing_moves_is_what_the_log_says(of_vehicle, with_attitude):
@@ -64,9 +64,9 @@ def test_nothing_moves_is_what_the_log_says(of_vehicle, with_attitude):
         rate = np.loadtxt(path, delimiter=",", skiprows=1)[:, 1:4]
         starts = np.arange(0, len(rate) - 50, 7)
         errors.append(np.linalg.norm(rate[starts] - rate[starts + 20], axis=1))
-    told = answer["models"]["nothing-moves"]["body_rate"]["mae"]
-    assert told[19] == pytest.approx(np.concatenate(errors).mean())
-    assert answer["models"]["rate-stays"]["body_rate"]["mae"] == pytest.approx(told)
+    summary = answer["models"]["nothing-moves"]["body_rate"]["mae"]
+    assert summary[19] == pytest.approx(np.concatenate(errors).mean())
+    assert answer["models"]["rate-stays"]["body_rate"]["mae"] == pytest.approx(summary)
 
 
 def test_the_vehicle_is_what_is_stated(of_vehicle):
@@ -147,7 +147,7 @@ def test_a_simulated_flight_of_the_vehicle_itself_is_predicted(cpfls, replayed, 
     cpfls.done("simulate", config, path, "--mode", "closed-loop", "-o", flight)
     answer, _ = replayed("vehicle", flight, options=(*FAST, "--set", "seed=1"), config=config)
     for signal in ("body_rate", "attitude", "velocity", "position"):
-        sums = {name: told[signal]["sum"] for name, told in answer["models"].items()}
+        sums = {name: summary[signal]["sum"] for name, summary in answer["models"].items()}
         assert sums["model"] < 0.03 * min(sums["nothing-moves"], sums["rate-stays"]), signal
 
 
@@ -223,10 +223,10 @@ def test_people_read_to_which_horizon_it_is_better(cpfls, gap_config, extended, 
 
 @pytest.mark.usefixtures("sketched")
 def test_report_shows_it(cpfls, gap_config, of_vehicle, tmp_path):
-    told = cpfls.told("report", gap_config, of_vehicle[1], "-o", tmp_path / "page.html")
-    assert "replay" in told["sections"]
+    summary = cpfls.summary("report", gap_config, of_vehicle[1], "-o", tmp_path / "page.html")
+    assert "replay" in summary["sections"]
     figures = ["replay-1-errors", "replay-1-worst", "replay-1-drawn", "replay-1-where"]
-    assert [name for name in told["figures"] if name.startswith("replay")] == figures
+    assert [name for name in summary["figures"] if name.startswith("replay")] == figures
 
 
 def test_a_report_of_it_alone_has_a_title_of_its_own(cpfls, gap_config, of_vehicle, tmp_path):

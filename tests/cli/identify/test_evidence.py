@@ -134,11 +134,11 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
 
 
 def test_use_of_a_model_that_was_judged_unfit_is_told(validated, cpfls, study, pipeline, tmp_path):
-    for number, (label, told) in enumerate((("do-not-use", "do not use"), ("good-for-control", None))):
+    for number, (label, answer) in enumerate((("do-not-use", "do not use"), ("good-for-control", None))):
         model, output = tmp_path / f"{number}.h5", tmp_path / f"replay-{number}.h5"
         write_changed(validated[0], model, verdict__label=label)
         stderr = cpfls("replay", study, model, pipeline.flight, "--every", "50", "-o", output).stderr
-        assert (told in stderr) if told else ("verdict" not in stderr)
+        assert (answer in stderr) if answer else ("verdict" not in stderr)
 
 
 HELD_OUT = ("--set", "identification.choice=held-out")
@@ -161,7 +161,7 @@ def others(cpfls, study, tmp_path_factory):
 def test_a_model_is_chosen_on_a_flight_and_judged_on_another(cpfls, study, pipeline, others, tmp_path):
     model, (kept, judged) = tmp_path / "model.h5", others
     words = ("--choose-on", kept, "--validate", judged, *HELD_OUT, *SEARCH)
-    summary = cpfls.told("identify", study, pipeline.flight, *words, "-o", model)
+    summary = cpfls.summary("identify", study, pipeline.flight, *words, "-o", model)
     assert list(summary["held_out"]) == [judged.name]
     again = cpfls("identify", study, pipeline.flight, "--validate", kept, *SEARCH, "-o", tmp_path / "b.h5", "--json")
     # The same search, chosen by its objectives: never better on the flight that the other was chosen on.

@@ -161,7 +161,7 @@ def test_time_limit_that_is_none(cpfls, words, tmp_path, text):
 
 def test_stalled_search_ends_converged(cpfls, words, tmp_path):
     stall = ("--set", "identification.stall_generations=1", "--set", "identification.stall_improvement=0.9")
-    summary = cpfls.told(*words, "-o", tmp_path / "model.h5", *stall)
+    summary = cpfls.summary(*words, "-o", tmp_path / "model.h5", *stall)
     assert (summary["stop_reason"], summary["complete"], summary["generations"] < 6) == ("converged", True, True)
     assert names(tmp_path) == ["model.h5"]
     lines = cpfls(*words, "-o", tmp_path / "told.h5", *stall, "-v").stdout.splitlines()

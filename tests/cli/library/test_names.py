@@ -32,7 +32,7 @@ def test_the_page_is_what_the_docstrings_say(capsys):
 DOCS = Path(__file__).parents[3] / "docs"
 
 
-def told(notebook):
+def summary(notebook):
     """What its cells print and give as text, cell by cell; hashes and numbers of versions stay out."""
     for cell in notebook["cells"]:
         texts = [output.get("text") or output["data"]["text/plain"] for output in cell.get("outputs", ())]
@@ -44,7 +44,7 @@ def test_it_gives_what_it_shows():
     printed = subprocess.run([sys.executable, DOCS / "run_notebook.py"], capture_output=True, text=True)
     assert printed.returncode == 0, printed.stderr
     run = json.loads(printed.stdout)
-    assert list(told(run)) == list(told(shown)), "make docs/notebook.ipynb"
+    assert list(summary(run)) == list(summary(shown)), "make docs/notebook.ipynb"
     pictures = [
         output for cell in run["cells"] for output in cell.get("outputs", ()) if "image/png" in output.get("data", {})
     ]

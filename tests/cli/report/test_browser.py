@@ -87,7 +87,7 @@ def framed(folder, name, height, pages):
     return path
 
 
-def told(browse, path, scheme):
+def summary(browse, path, scheme):
     shown = browse(path, "dump-dom", f"window-size=1400,{HEIGHT}", f"blink-settings=preferredColorScheme={scheme}")
     return json.loads(html.unescape(re.search(r'<pre id="told">(.*?)</pre>', shown, re.DOTALL)[1]))
 
@@ -96,7 +96,7 @@ def told(browse, path, scheme):
 def light(browse, page):
     """What is seen of the page where it is light, by the width of the screen, and of the printed one on paper."""
     pages = {PHONE: page.text, 1400: page.text, 900: page.text, PAPER: printed(page.text)}
-    return dict(zip(pages, told(browse, framed(page.path.parent, "light", HEIGHT, pages), 1), strict=True))
+    return dict(zip(pages, summary(browse, framed(page.path.parent, "light", HEIGHT, pages), 1), strict=True))
 
 
 def printed(text):
@@ -120,7 +120,7 @@ def test_every_section_and_figure_is_there_and_the_page_is_no_wider_than_the_scr
 
 
 def test_it_is_dark_where_the_reader_wants_it_dark(browse, page, light):
-    (dark,) = told(browse, framed(page.path.parent, "dark", HEIGHT, {900: page.text}), 0)
+    (dark,) = summary(browse, framed(page.path.parent, "dark", HEIGHT, {900: page.text}), 0)
     grounds = {
         scheme: [sum(map(int, re.findall(r"\d+", seen[key])[:3])) for key in ("background", "figure")]
         for scheme, seen in (("dark", dark), ("light", light[900]))

@@ -87,7 +87,7 @@ def test_a_model_without_evidence_names_the_command_that_adds_it(report, bare):
 
 
 @pytest.mark.parametrize(
-    ("label", "short", "told", "tone"),
+    ("label", "short", "answer", "tone"),
     [
         ("good-for-control", "GOOD FOR CONTROL", "Good for control", "good"),
         ("good-inside-region", "GOOD INSIDE ITS REGION", "Good inside the region that training visited", "note"),
@@ -96,10 +96,12 @@ def test_a_model_without_evidence_names_the_command_that_adds_it(report, bare):
         ("of-a-newer-version", "OF-A-NEWER-VERSION", "Of-a-newer-version", "note"),
     ],
 )
-def test_the_verdict_comes_first_and_with_its_reasons(report, model, label, short, told, tone):
+def test_the_verdict_comes_first_and_with_its_reasons(report, model, label, short, answer, tone):
     page = report(model(label=label))
     summary, evidence = section(page, "summary"), section(page, "identify")
-    assert re.match(rf"Summary {short}: model-\d+\.h5: .*{told}.* Region: roll and pitch within 32 degrees\.", summary)
+    assert re.match(
+        rf"Summary {short}: model-\d+\.h5: .*{answer}.* Region: roll and pitch within 32 degrees\.", summary
+    )
     assert f'<article class="card {tone} open wide">' in page.text
     for sign, reason in zip(("For it", "Against it", "To know"), REASONS, strict=True):
         assert f"{sign}: {reason[0].upper()}{reason[1:]}." in f"{summary} {evidence}"
@@ -128,14 +130,14 @@ def test_structures_are_compared_and_the_least_error_is_marked_in_words(page):
 
 
 @pytest.mark.parametrize(
-    ("error", "told"),
+    ("error", "answer"),
     [
         ((0.9, 0.5, 1.0), "reduces the error of the rigid body by 50.0 %, 5.0 standard errors"),
         ((0.99, 0.95, 1.0), "within one standard error: the flight holds hardly any evidence"),
         ((1.2, 1.1, 1.0), "this flight holds no evidence"),
     ],
 )
-def test_the_ridge_curve_says_whether_there_is_evidence_for_a_fuzzy_part(report, model, error, told):
+def test_the_ridge_curve_says_whether_there_is_evidence_for_a_fuzzy_part(report, model, error, answer):
     ridge = {
         "ridge/weight": np.array([1e-3, 1.0, np.inf]),
         "ridge/error": np.array(error),
@@ -143,7 +145,7 @@ def test_the_ridge_curve_says_whether_there_is_evidence_for_a_fuzzy_part(report,
         "ridge/chosen": 1,
     }
     page = report(model(**ridge))
-    assert told in section(page, "identify")
+    assert answer in section(page, "identify")
     assert "identify-1-ridge-curve" in page.figures
 
 
@@ -193,8 +195,8 @@ def test_a_prediction_that_is_lost_is_a_dash_and_the_least_error_is_marked(page)
     assert re.search(r"0\.500 s 50 model \S+ ◂ \S+ ◂", shown)
 
 
-@pytest.mark.parametrize(("condition", "told"), [(3.0, "one rule holds everywhere"), (1e4, "the model extrapolates")])
-def test_one_rule_that_training_determined_holds_everywhere(cpfls, pipeline, study, tmp_path, condition, told):
+@pytest.mark.parametrize(("condition", "answer"), [(3.0, "one rule holds everywhere"), (1e4, "the model extrapolates")])
+def test_one_rule_that_training_determined_holds_everywhere(cpfls, pipeline, study, tmp_path, condition, answer):
     single, known = (tmp_path / f"{name}.h5" for name in ("single", "known"))
     options = ("--set", "identification.membership_functions=1", "--set", "identification.validation.enabled=false")
     cpfls("identify", study, pipeline.flight, "-o", single, *options)
@@ -209,7 +211,7 @@ def test_one_rule_that_training_determined_holds_everywhere(cpfls, pipeline, stu
     with warnings.catch_warnings(record=True) as noted:
         warnings.simplefilter("always")
         cpfls_cli.load_model(known).predict(pipeline.flight)
-    assert any(told in str(each.message) for each in noted)
+    assert any(answer in str(each.message) for each in noted)
 
 
 GAP_FIGURES = [

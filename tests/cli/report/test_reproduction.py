@@ -53,7 +53,7 @@ def test_a_run_is_that_of_reduce_and_identify(cpfls, folder, found, tmp_path):
     rule = ("--set", "reduction.size=30", "--set", "reduction.criterion=sigma_min")
     cpfls.done("reduce", folder / "study.yaml", folder / "flight.h5", *rule, "-o", tmp_path / "few.h5")
     words = ("--selection", tmp_path / "few.h5", "--seed", "2", *SIZE, "--set", "identification.judged_on=learned")
-    alone = cpfls.told("identify", folder / "study.yaml", folder / "flight.h5", *words, "-o", tmp_path / "m.h5")
+    alone = cpfls.summary("identify", folder / "study.yaml", folder / "flight.h5", *words, "-o", tmp_path / "m.h5")
     run = setting.replicates[1]
     assert (run.seed, setting.samples) == (2, 30)
     assert alone["errors"]["mse"] == pytest.approx(run.mse[0], rel=1e-9)

@@ -30,17 +30,17 @@ def config(tmp_path_factory):
 @pytest.fixture(scope="module")
 def mission(cpfls, config, tmp_path_factory):
     output = tmp_path_factory.mktemp("planned") / "mission.h5"
-    return output, cpfls.told("trajectory", config, *HOVER, "-o", output)
+    return output, cpfls.summary("trajectory", config, *HOVER, "-o", output)
 
 
 def test_the_summary_tells_runs_and_excitation(mission):
-    output, told = mission
-    assert [run["begin"] for run in told["runs"]] == pytest.approx([0.0, 12.0, 24.0, 36.0])
-    assert told["duration_s"] == pytest.approx(44.0)
-    assert told["excited"]["axes"] == ["roll", "pitch"]
-    assert told["excited"]["band_hz"] == [0.7, 3.0]
-    assert told["excited"]["size_rad"] == pytest.approx([np.radians(2.0)] * 2)
-    assert told["files"] == [str(output.with_name("mission-waypoints.csv"))]
+    output, summary = mission
+    assert [run["begin"] for run in summary["runs"]] == pytest.approx([0.0, 12.0, 24.0, 36.0])
+    assert summary["duration_s"] == pytest.approx(44.0)
+    assert summary["excited"]["axes"] == ["roll", "pitch"]
+    assert summary["excited"]["band_hz"] == [0.7, 3.0]
+    assert summary["excited"]["size_rad"] == pytest.approx([np.radians(2.0)] * 2)
+    assert summary["files"] == [str(output.with_name("mission-waypoints.csv"))]
     assert len(output.with_name("mission-waypoints.csv").read_text().splitlines()) == 2202
 
 
@@ -171,7 +171,7 @@ def next_config(tmp_path_factory):
 @pytest.fixture(scope="module")
 def planned(cpfls, next_config, tmp_path_factory):
     output = tmp_path_factory.mktemp("planned") / "next.h5"
-    return output, cpfls.told("trajectory", next_config, *PAIR, *SMALL, *FEW, "-o", output)
+    return output, cpfls.summary("trajectory", next_config, *PAIR, *SMALL, *FEW, "-o", output)
 
 
 def test_the_flight_keeps_to_the_box_and_starts_and_ends_at_rest(planned):
@@ -222,7 +222,7 @@ def test_it_flies_like_any_other_and_its_page_says_what_it_tells(cpfls, next_con
 
 
 def test_a_single_effect_is_shown(cpfls, next_config, tmp_path):
-    (row,) = cpfls.told("trajectory", next_config, "--to-tell", "rotor_drag", *SMALL, *FEW, "-o", tmp_path / "n.h5")[
+    (row,) = cpfls.summary("trajectory", next_config, "--to-tell", "rotor_drag", *SMALL, *FEW, "-o", tmp_path / "n.h5")[
         "questions"
     ]
     assert (row["true"], row["rival"]) == ("rotor_drag", "")

@@ -33,9 +33,9 @@ def position(path):
 
 
 def test_every_waypoint_is_reached_at_rest(cpfls, tmp_path, config, points):
-    first, second = cpfls.told("trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE)[
-        "legs"
-    ]
+    first, second = cpfls.summary(
+        "trajectory", config, "--waypoints", points, "-o", tmp_path / "t.h5", *LIMITED, *FREE
+    )["legs"]
     time, place, yaw = position(tmp_path / "t.h5")
     np.testing.assert_allclose(place[0], [1, 2, 3])
     # The pause of the first point comes before the first leg, that of the last one after the last leg.
@@ -164,8 +164,8 @@ def test_tilt_beyond_its_limit_is_refused_or_reported(cpfls, refuse, tmp_path, c
     steep = ("trajectory", config, "-o", tmp_path / "t.h5", "--set", "trajectory.tilt_max_rad=0.1")
     messages = refuse(*steep, code=1)
     assert messages[0].startswith("tilt of up to 0.18")
-    told = cpfls.done(*steep, "--set", "trajectory.infeasible=report")
-    assert "tilt of up to 0.18" in told.stderr
+    summary = cpfls.done(*steep, "--set", "trajectory.infeasible=report")
+    assert "tilt of up to 0.18" in summary.stderr
 
 
 def test_a_turn_in_yaw_that_is_too_fast_is_named(refuse, tmp_path, config):
@@ -277,9 +277,9 @@ def test_a_held_vehicle_has_no_position(cpfls, tmp_path, study):
 
 
 def test_optimised_says_what_the_path_is_worth(cpfls, tmp_path, study):
-    told = cpfls.told("trajectory", study("optimised"), "-o", tmp_path / "t.h5")
-    assert told["condition_number"] <= told["random"]["best"] <= told["random"]["median"]
-    assert told["evaluations"] == 5
+    summary = cpfls.summary("trajectory", study("optimised"), "-o", tmp_path / "t.h5")
+    assert summary["condition_number"] <= summary["random"]["best"] <= summary["random"]["median"]
+    assert summary["evaluations"] == 5
 
 
 @pytest.mark.usefixtures("sketched")

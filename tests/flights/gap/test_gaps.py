@@ -76,10 +76,10 @@ def test_nothing_has_changed_between_flights_with_whole_propellers(changed, toda
 
 
 def test_a_cut_propeller_is_named_and_pulls_the_less_the_more_is_cut(changed):
-    told = [changed(flights, NORMAL) for flights in CUT.values()]
-    assert [[cause["name"] for cause in each["causes"]] for each in told] == [["rotor M3"]] * len(CUT)
-    assert all(each["causes"][0]["named"] for each in told)
-    losses = [each["causes"][0]["sizes"][0]["value"] for each in told]
+    output = [changed(flights, NORMAL) for flights in CUT.values()]
+    assert [[cause["name"] for cause in each["causes"]] for each in output] == [["rotor M3"]] * len(CUT)
+    assert all(each["causes"][0]["named"] for each in output)
+    losses = [each["causes"][0]["sizes"][0]["value"] for each in output]
     assert all(0 < less < more for less, more in pairwise(losses))
 
 

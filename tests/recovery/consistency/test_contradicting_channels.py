@@ -44,8 +44,8 @@ def lively():
 
 
 def dragged(also):
-    told = {"noise": NOISE, "also": also, "effects": {"rotor_drag": [DRAG]}, "integration_rate_hz": COARSE}
-    flown_twice = (flown(20.0, seed=seed, **told) for seed in (1, 2))
+    result = {"noise": NOISE, "also": also, "effects": {"rotor_drag": [DRAG]}, "integration_rate_hz": COARSE}
+    flown_twice = (flown(20.0, seed=seed, **result) for seed in (1, 2))
     return [headed(signals_of(flight), 60.0) for flight in flown_twice]
 
 

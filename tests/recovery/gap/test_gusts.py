@@ -114,9 +114,9 @@ def test_an_inertia_that_nothing_was_asked_of_is_told_by_what_was_before(flown, 
     ]
     recordings = recorded(along_x, stated, setpoints=True)
     run = diagnosed(recordings)
-    told, found = run.diagnosis, [run.estimates]
+    result, found = run.diagnosis, [run.estimates]
     if extends:
-        refit = extend(recordings[:3], recordings[3:], told.effects, run.audit, FEW, None, told.gap.floor)
+        refit = extend(recordings[:3], recordings[3:], result.effects, run.audit, FEW, None, result.gap.floor)
         found.append(refit.estimates)
     for estimates in found:
         numbers = {each.name: each for each in estimates.parameters}

@@ -61,10 +61,10 @@ def test_the_repeatable_share_is_that_of_the_effects(found):
 def test_the_share_that_is_explained_is_that_of_still_air(found):
     """From 0.25 to 3 Hz, where a model without damping explains 0.88 to 0.92 of roll and pitch."""
     gusty, calm = found["gusts"], found["calm"]
-    told = (slice(0, 2), slice(2, 5))
-    half = half_width(gusty.explained_error, gusty.blocks)[told]
-    assert calm.explained[told] == pytest.approx(0.9, abs=0.03)
-    assert (np.abs(gusty.explained[told] - calm.explained[told]) < 1.5 * half).all()
+    result = (slice(0, 2), slice(2, 5))
+    half = half_width(gusty.explained_error, gusty.blocks)[result]
+    assert calm.explained[result] == pytest.approx(0.9, abs=0.03)
+    assert (np.abs(gusty.explained[result] - calm.explained[result]) < 1.5 * half).all()
 
 
 @pytest.mark.parametrize("name", ["gusts alone", "storm alone"])

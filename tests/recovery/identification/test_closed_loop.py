@@ -136,8 +136,8 @@ def test_gusts_of_a_flight_do_not_leak_into_what_its_setpoint_foretells():
     """A setpoint that moves nothing tells nothing of a flight, however many columns predict."""
     rng = np.random.default_rng(4)
     gusts, asked = rng.standard_normal((2000, 1)).cumsum(axis=0) * 0.1, rng.standard_normal((2000, 60))
-    told = first_stage_fit(asked, gusts - gusts.mean())
-    assert np.sum(told * (gusts - gusts.mean())) < 0.05 * np.sum((gusts - gusts.mean()) ** 2)
+    answer = first_stage_fit(asked, gusts - gusts.mean())
+    assert np.sum(answer * (gusts - gusts.mean())) < 0.05 * np.sum((gusts - gusts.mean()) ** 2)
 
 
 @pytest.mark.parametrize("length", [9, 50, 80, 300])

@@ -117,12 +117,12 @@ def alone(known):
 def test_without_instruments_what_was_before_tells_them(flights):
     """What the model lacks of the motion goes on as it was, and is no gust."""
     known, model = flights["45 g", "setpoints"], VehicleModel(vehicle=SMALL.vehicle)
-    found, told = find_gusts(model, alone(known)), find_gusts(model, known)
+    found, result = find_gusts(model, alone(known)), find_gusts(model, known)
     assert found.instrument_kind == "past"
     assert np.abs(np.log(found.size[:3] / bodies(SMALL)[:3] / GUSTS)).max() < 0.25
     assert np.abs(np.log(found.memory[:3] / MEMORY_S)).max() < 0.5
     assert found.lack is None
-    assert told.lack is not None
+    assert result.lack is not None
     # Nor are they asked where nothing told the body.
     bound = find_gusts(model, known, identified=False)
     assert bound.instrument_kind == "none"

@@ -300,12 +300,12 @@ def test_every_model_answers_the_same_questions(kind):
 
 
 def test_machines_read_what_the_model_has():
-    told = plain(vehicle_of(MODELS["quad"]))["model"]
-    assert told["vehicle"]["mass_kg"] == 0.9
-    assert told["vehicle"]["inertia_kg_m2"][4] == -2e-4
-    assert told["response"]["lag_s"] == 0.035
-    assert [each["name"] for each in told["effects"]] == [one.name for one in MODELS["quad"].effects]
-    assert told["remainder"]["rows"] == [0, 2, 5]
+    answer = plain(vehicle_of(MODELS["quad"]))["model"]
+    assert answer["vehicle"]["mass_kg"] == 0.9
+    assert answer["vehicle"]["inertia_kg_m2"][4] == -2e-4
+    assert answer["response"]["lag_s"] == 0.035
+    assert [each["name"] for each in answer["effects"]] == [one.name for one in MODELS["quad"].effects]
+    assert answer["remainder"]["rows"] == [0, 2, 5]
 
 
 def test_a_forecast_has_parts_of_its_own(tmp_path):

@@ -65,12 +65,12 @@ def space(listed, freedom=6.0, kinds=("thrust",) * 3):
 def test_density_of_no_change_is_a_multivariate_t_of_each_kind():
     own, covariance = space([], kinds=["thrust"] * 3 + ["delay"] * 2)
     rows = np.random.default_rng(1).normal(size=(5, 5)) * np.linspace(0.2, 3.0, 5)[:, None]
-    told = own._density(own.whitened(rows.T), np.zeros((5, 0)), np.arange(0), {})
+    result = own._density(own.whitened(rows.T), np.zeros((5, 0)), np.arange(0), {})
     expected = sum(
         multivariate_t(shape=covariance[part, part], df=6.0).logpdf(rows[:, part]) for part in (np.s_[:3], np.s_[3:])
     )
     # By quadrature; what all have in common is left out.
-    assert told - told[0] == pytest.approx(expected - expected[0], abs=0.1)
+    assert result - result[0] == pytest.approx(expected - expected[0], abs=0.1)
 
 
 def test_quiet_numbers_of_another_kind_tell_nothing_of_a_change():
@@ -154,7 +154,7 @@ def test_a_change_is_found(cause, change, size):
     rng = np.random.default_rng(3)
     found = changed(flights(2, rng, change), flights(6, rng), QUAD, rng)
     assert found.p <= FALSE_ALARM
-    (first, *more), (told, *_) = found.causes, found.causes[0].sizes
+    (first, *more), (result, *_) = found.causes, found.causes[0].sizes
     assert not more
     alike = {first.name, *(each.name for each in first.alike)}
     assert cause in alike
@@ -162,7 +162,7 @@ def test_a_change_is_found(cause, change, size):
         assert first.name == cause
         assert first.belief > 0.9
     if first.name == cause:
-        assert told.low < size < told.high
+        assert result.low < size < result.high
 
 
 def test_two_rotors_at_once_are_no_third_change():
@@ -358,5 +358,5 @@ def test_a_ratio_that_may_be_zero_is_undetermined_where_it_is_nearer_to_that_tha
     left = {name: value for name, value in today.values.items() if name != "delay yaw"}
     for share, expected in ((0.7, ()), (0.3, ("delay yaw",)), (-0.1, ("delay yaw",))):
         unsure = having(today, left, unsure=(UnsureRatio(name="delay yaw", ratio=share * usual),))
-        told = changed([unsure], before, QUAD, rng)
-        assert (told.missing, told.undetermined) == (("delay yaw",), expected)
+        result = changed([unsure], before, QUAD, rng)
+        assert (result.missing, result.undetermined) == (("delay yaw",), expected)

@@ -57,8 +57,8 @@ def test_names_and_noise(usual):
 
 def test_a_weak_rotor_is_asked_for_more(usual):
     """Of a cross each rotor carries its share alone, but for what its drag turns about z."""
-    told = flight_numbers(recorded(weaker(2, 0.2)))
-    more = [told.values[f"thrust M{index}"] - usual.values[f"thrust M{index}"] for index in range(1, 5)]
+    result = flight_numbers(recorded(weaker(2, 0.2)))
+    more = [result.values[f"thrust M{index}"] - usual.values[f"thrust M{index}"] for index in range(1, 5)]
     # The drag factor stayed: M3 turns faster, so that all others have to hold it.
     assert more[2] > 0.1
     assert int(np.argmax(more)) == 2
@@ -168,8 +168,8 @@ def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():
         signals = Signals(
             time=time, vehicle=VEHICLE, body_rate=np.stack(columns[:3], axis=1), rotor_speed=speed, commanded=True
         )
-        told = flight_numbers(Recording("flight.csv", signals)).values
-        return np.array([told["gain roll"], told["gain pitch"]])
+        result = flight_numbers(Recording("flight.csv", signals)).values
+        return np.array([result["gain roll"], result["gain pitch"]])
 
     less = follows(*WEAK) - follows(1.0, 1.0, 1.0, 1.0)
     assert less == pytest.approx([0.0, np.log(0.9)], abs=0.03)
@@ -196,17 +196,17 @@ def test_how_late_a_rotor_answers():
     speed = np.stack(
         [delayed(own[:, None], each / PERIOD)[:, 0] for own, each in zip(signals.speed.T, late, strict=True)], axis=1
     )
-    told = flight_numbers(
+    result = flight_numbers(
         Recording("flight.h5", replace(signals, rotor_speed=speed, rotor_command=signals.speed))
     ).values
-    assert [told[f"lag M{index}"] for index in range(1, 5)] == pytest.approx(late, abs=0.002)
+    assert [result[f"lag M{index}"] for index in range(1, 5)] == pytest.approx(late, abs=0.002)
 
 
 def test_a_gyroscope_of_another_scale(usual):
     """Beside an attitude that is right; about one axis."""
     flight = recorded()
     rates = flight.signals.body_rate * [1.1, 1.0, 1.0]
-    told = flight_numbers(Recording("flight.h5", replace(flight.signals, body_rate=rates)))
-    more = [told.values[f"scale {axis}"] - usual.values[f"scale {axis}"] for axis in "xyz"]
+    result = flight_numbers(Recording("flight.h5", replace(flight.signals, body_rate=rates)))
+    more = [result.values[f"scale {axis}"] - usual.values[f"scale {axis}"] for axis in "xyz"]
     assert more == pytest.approx([np.log(1.1), 0.0, 0.0], abs=1e-3)
     assert abs(usual.values["scale x"]) < 0.02

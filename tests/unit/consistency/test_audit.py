@@ -156,10 +156,10 @@ def test_constant_clipped_and_rounded_channels_are_named(turning):
     rate = turning.body_rate.copy()
     rate[:, 0] = np.clip(rate[:, 0], -1.0, 1.0)
     rate[:, 1] = np.round(rate[:, 1] / 0.05) * 0.05
-    told = " ".join(audit([replace(turning, body_rate=rate, voltage=np.ones(len(turning)))], WINDOWS).warnings)
-    assert "about x is clipped at 1 rad/s" in told
-    assert "about y is rounded to steps of 0.05 rad/s" in told
-    assert "The channel voltage never changes" in told
+    result = " ".join(audit([replace(turning, body_rate=rate, voltage=np.ones(len(turning)))], WINDOWS).warnings)
+    assert "about x is clipped at 1 rad/s" in result
+    assert "about y is rounded to steps of 0.05 rad/s" in result
+    assert "The channel voltage never changes" in result
 
 
 def test_a_slow_rounded_gyroscope_is_not_called_clipped():
@@ -199,8 +199,8 @@ def test_a_torque_that_moves_nothing_tells_no_delay(turning):
 def test_rotors_that_hold_one_speed_are_named(turning):
     speed = np.full((len(turning), 4), 348.0)
     assert body_wrench(turning.vehicle, speed).thrust.std() == 0
-    told = audit([replace(turning, rotor_speed=speed)], WINDOWS).warnings
-    assert sum("rotor speed" in sentence for sentence in told) == 4
+    result = audit([replace(turning, rotor_speed=speed)], WINDOWS).warnings
+    assert sum("rotor speed" in sentence for sentence in result) == 4
 
 
 def test_of_a_part_of_a_flight_the_rotors_are_held_against_the_whole():
@@ -209,8 +209,8 @@ def test_of_a_part_of_a_flight_the_rotors_are_held_against_the_whole():
     swapped = replace(signals, rotor_speed=signals.rotor_speed[:, [1, 0, 2, 3]])
     part = stretch_of(swapped, slice(0, 300))
     assert audit([part], WINDOWS).contradictions == ()
-    (told,) = audit([part], WINDOWS, [swapped]).contradictions
-    assert told.startswith("judged by the motion, the rotors are")
+    (result,) = audit([part], WINDOWS, [swapped]).contradictions
+    assert result.startswith("judged by the motion, the rotors are")
 
 
 def test_a_delay_that_runs_away_is_no_repair():
@@ -254,19 +254,19 @@ def test_one_motion_is_not_warned_of(signals, lowpass_hz):
 @pytest.mark.parametrize("signal", ["attitude", "body_rate"])
 def test_swapped_roll_and_pitch_are_named_with_axis_and_key(signal):
     signals = log(noise=0.1)
-    told = found(replace(signals, **{signal: getattr(signals, signal)[:, [1, 0, 2]]}))
-    assert [each.what.split(" the ")[0] for each in told[:2]] == ["about body x (roll)", "about body y (pitch)"]
-    assert all("check columns, signs and frames of import.signals.attitude" in each.remedy for each in told)
-    assert all("import.signals.body_rate" in each.remedy for each in told)
-    assert all(each.contradiction and not each.repairable for each in told)
+    result = found(replace(signals, **{signal: getattr(signals, signal)[:, [1, 0, 2]]}))
+    assert [each.what.split(" the ")[0] for each in result[:2]] == ["about body x (roll)", "about body y (pitch)"]
+    assert all("check columns, signs and frames of import.signals.attitude" in each.remedy for each in result)
+    assert all("import.signals.body_rate" in each.remedy for each in result)
+    assert all(each.contradiction and not each.repairable for each in result)
 
 
 @pytest.mark.parametrize(("axis", "words"), [(0, "x (roll)"), (1, "y (pitch)"), (2, "z (yaw)")])
 def test_a_wrong_sign_is_found_about_its_axis_alone(axis, words):
-    (told,) = found(turned(log(noise=0.1), [-1.0 if each == axis else 1.0 for each in range(3)]))
-    assert words in told.what
-    assert "opposite signs" in told.what
-    assert told.size == pytest.approx(-1.0, abs=0.05)
+    (result,) = found(turned(log(noise=0.1), [-1.0 if each == axis else 1.0 for each in range(3)]))
+    assert words in result.what
+    assert "opposite signs" in result.what
+    assert result.size == pytest.approx(-1.0, abs=0.05)
 
 
 def test_an_attitude_in_other_axes_than_the_gyroscope_is_found():
@@ -294,22 +294,22 @@ def gains(signals):
     ("factor", "unit"), [(180 / np.pi, "deg/s"), (np.pi / 180, "rad/s")], ids=["taken for rad/s", "taken for deg/s"]
 )
 def test_rates_in_the_other_unit_are_named_by_their_gain(factor, unit, noise):
-    told = gains(turned(log(noise=noise), [factor] * 3))
-    assert [each.what.split(" the ")[0] for each in told] == [
+    result = gains(turned(log(noise=noise), [factor] * 3))
+    assert [each.what.split(" the ")[0] for each in result] == [
         "about body x (roll)",
         "about body y (pitch)",
         "about body z (yaw)",
     ]
-    np.testing.assert_allclose([each.size for each in told], factor, rtol=0.1 if noise else 0.005)
-    assert all(f"does the log give rates in {unit} (import.signals.body_rate.unit" in each.remedy for each in told)
-    assert all(each.contradiction for each in told)
+    np.testing.assert_allclose([each.size for each in result], factor, rtol=0.1 if noise else 0.005)
+    assert all(f"does the log give rates in {unit} (import.signals.body_rate.unit" in each.remedy for each in result)
+    assert all(each.contradiction for each in result)
 
 
 @pytest.mark.parametrize(("gain", "warned"), [(0.45, True), (0.55, False), (1.9, False), (2.1, True)])
 def test_a_gain_between_a_half_and_two_is_let_pass(gain, warned):
-    told = gains(turned(log(), [1.0, gain, 1.0]))
-    assert len(told) == warned
-    assert all("about body y (pitch)" in each.what and "check the units" in each.remedy for each in told)
+    result = gains(turned(log(), [1.0, gain, 1.0]))
+    assert len(result) == warned
+    assert all("about body y (pitch)" in each.what and "check the units" in each.remedy for each in result)
 
 
 def test_noise_alone_is_no_gain():

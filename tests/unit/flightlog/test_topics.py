@@ -165,10 +165,10 @@ def test_it_is_told_which_columns_stand_in():
     mapped = {"body_rate": SignalMap(columns=RATE, unit="rad/s", otherwise=(old,))}
     settings = ImportSettings(time_column=None, torque_source=None, signals=mapped)
     assert on_one_clock({"gyro": gyro(), "old": gyro()}, {}, settings)[2] == ()
-    told = "body_rate is taken from old.x, old.y, old.z: the log lacks some of gyro.x and its kind"
-    assert on_one_clock({"old": gyro()}, {}, settings)[2] == (told,)
+    answer = "body_rate is taken from old.x, old.y, old.z: the log lacks some of gyro.x and its kind"
+    assert on_one_clock({"old": gyro()}, {}, settings)[2] == (answer,)
     flat = {"": {"t": GYRO} | dict.fromkeys(old.columns, GYRO)}
-    assert on_one_clock(flat, {}, replace(settings, time_column="t"))[2] == (told,)
+    assert on_one_clock(flat, {}, replace(settings, time_column="t"))[2] == (answer,)
 
 
 def test_signals_that_a_log_may_lack_are_left_out_where_they_say_nothing():

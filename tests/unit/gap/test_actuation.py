@@ -50,9 +50,9 @@ def apart(monkeypatch, own, left, sizes=None):
         lambda found, *_: left[tuple(each.effect.name for each in found.hypothesis.chosen)] * np.ones(BLOCKS),
     )
     start = found_with(own, [SURE] * len(own))
-    told = decided_by_instruments(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], GIVEN)
-    names = tuple(each.effect.name for each in told.found.hypothesis.chosen)
-    return names, {(each.name, each.instead_of, each.jointly_with) for each in told.alike}, told, tried
+    result = decided_by_instruments(start, [CATALOGUE[name] for name in (*LATE, "com_offset")], GIVEN)
+    names = tuple(each.effect.name for each in result.found.hypothesis.chosen)
+    return names, {(each.name, each.instead_of, each.jointly_with) for each in result.alike}, result, tried
 
 
 @pytest.mark.parametrize("own", [LAG, DELAY, ()], ids=["lag", "delay", "nothing"])
@@ -67,9 +67,9 @@ def apart(monkeypatch, own, left, sizes=None):
 )
 def test_what_is_needed_beside_the_other_is_named_whatever_was_found(own, together, names, rivals, monkeypatch):
     left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
-    found, alike, told, tried = apart(monkeypatch, own, left, {BOTH: together})
+    found, alike, result, tried = apart(monkeypatch, own, left, {BOTH: together})
     assert (found, alike) == (names, rivals)
-    assert told.chances[names[0]] < 1e-6
+    assert result.chances[names[0]] < 1e-6
     # A filter has a number more, and nothing is left for it.
     assert not {"low_pass_filter", "notch_filter"} & {*sum(tried, ())}
 
@@ -138,15 +138,15 @@ def test_more_numbers_are_tried_where_one_leaves_something(together, filtered, n
 
 def test_where_instruments_tell_nothing_or_the_number_may_be_0_nothing_is_named(monkeypatch):
     for left, sizes in (({(): 90.0}, {}), ({(): 90.0, LAG: LITTLE}, {LAG: [ABSENT]})):
-        names, rivals, told, _ = apart(monkeypatch, LAG, left, sizes)
-        assert (names, rivals, told.chances) == ((), set(), {})
+        names, rivals, result, _ = apart(monkeypatch, LAG, left, sizes)
+        assert (names, rivals, result.chances) == ((), set(), {})
 
 
 def test_rotors_that_are_measured_are_never_late():
     found = found_with((), [])
     found.hypothesis.can = lambda _candidate: False
-    told = decided_by_instruments(found, [CATALOGUE["motor_lag"]], None)
-    assert told.found is found
+    result = decided_by_instruments(found, [CATALOGUE["motor_lag"]], None)
+    assert result.found is found
 
 
 def test_numbers_that_instruments_do_not_tell_are_listed():

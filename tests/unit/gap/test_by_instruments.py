@@ -48,8 +48,8 @@ def test_alone_it_is_a_test_of_means():
     assert _chance(products, OWN, nothing, np.zeros(2)) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("apart", "told"), [(0.6, [True, True, False]), (0.02, [True, False, False])])
-def test_of_numbers_that_instruments_hardly_tell_apart_the_weaker_is_not_told(apart, told):
+@pytest.mark.parametrize(("apart", "result"), [(0.6, [True, True, False]), (0.02, [True, False, False])])
+def test_of_numbers_that_instruments_hardly_tell_apart_the_weaker_is_not_told(apart, result):
     """A load and a wrong thrust, which in hover do the same; and one of which nothing is known."""
     rng = np.random.default_rng(5)
     known = rng.standard_normal((BLOCKS, WINDOWS, 3))
@@ -58,10 +58,10 @@ def test_of_numbers_that_instruments_hardly_tell_apart_the_weaker_is_not_told(ap
     known[..., 2] = rng.standard_normal((BLOCKS, WINDOWS))
     left = np.zeros((BLOCKS, WINDOWS, 1))
     products = np.einsum("bwk,bwl->bkl", np.concatenate([known, left], axis=2), np.concatenate([moved, left], axis=2))
-    assert _strong(products, np.ones(3, dtype=bool)).tolist() == told
+    assert _strong(products, np.ones(3, dtype=bool)).tolist() == result
 
 
-def told(true, found, reach, rng):
+def result(true, found, reach, rng):
     """What a source knows of three numbers, found where they are not: `reach` of what they move, beside gusts."""
     known = rng.standard_normal((BLOCKS, WINDOWS, 3)) * reach
     gust = rng.standard_normal((BLOCKS, WINDOWS, 1))
@@ -88,7 +88,7 @@ def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that
     fit = NamedFit(hypothesis, numbers, np.ones(6), GapSettings())
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        sources = [told(true, found, 1.0 if knows else 0.03, rng), told(true, found, 1.0, rng)]
+        sources = [result(true, found, 1.0 if knows else 0.03, rng), result(true, found, 1.0, rng)]
         monkeypatch.setattr(by_instruments, "_sources", lambda *_, those=sources: those)
         stand.append([each.effect.name for each, _ in significant_effects(fit, None)])
     assert stand.count(names) >= 17

@@ -25,13 +25,13 @@ def named(name, *coefficients):
 SURE = number("inertia_x", 0.15, 0.02)
 
 
-def told(*numbers, effects=(), share=0.5):
+def result(*numbers, effects=(), share=0.5):
     effect = wrong_numbers(found(*numbers), effects, np.broadcast_to(share, 6))
     return () if effect is None else tuple(each.name for each in effect.numbers)
 
 
 def test_sure_numbers_are_told():
-    assert told(SURE, number("inertia_y", -0.1, 0.02)) == ("inertia_x", "inertia_y")
+    assert result(SURE, number("inertia_y", -0.1, 0.02)) == ("inertia_x", "inertia_y")
 
 
 @pytest.mark.parametrize(
@@ -45,18 +45,18 @@ def test_sure_numbers_are_told():
     ids=["not sure", "does not matter", "not seen", "coupling"],
 )
 def test_others_are_not(quiet):
-    assert told(quiet) == ()
+    assert result(quiet) == ()
 
 
 def test_a_refit_that_takes_nothing_off_the_gap_tells_nothing():
-    assert told(SURE, share=0.04) == ()
+    assert result(SURE, share=0.04) == ()
 
 
 def test_the_channel_of_the_number_has_to_shrink():
     elsewhere, there = np.zeros(6), np.zeros(6)
     elsewhere[1:], there[0] = 0.9, 0.9
-    assert told(SURE, share=elsewhere) == ()
-    assert told(SURE, share=there) == ("inertia_x",)
+    assert result(SURE, share=elsewhere) == ()
+    assert result(SURE, share=there) == ("inertia_x",)
 
 
 def test_probability_is_that_of_a_normal_error_of_the_surest_number():
@@ -77,7 +77,7 @@ def test_probability_is_that_of_a_normal_error_of_the_surest_number():
     ids=["offset", "three small ones", "weak rotor", "drag only", "load"],
 )
 def test_effects_that_change_the_number_account_for_it(effects, expected):
-    assert told(SURE, effects=effects) == expected
+    assert result(SURE, effects=effects) == expected
 
 
 def test_a_wrong_drag_factor_accounts_for_as_much_of_izz():
@@ -85,13 +85,13 @@ def test_a_wrong_drag_factor_accounts_for_as_much_of_izz():
     small, large, other = (
         number(name, value, 0.02) for name, value in (("inertia_z", -0.15), ("inertia_z", -0.25), ("inertia_x", -0.15))
     )
-    assert told(small, effects=(wrong,)) == ()
-    assert told(large, effects=(wrong,)) == ("inertia_z",)
-    assert told(other, effects=(wrong,)) == ("inertia_x",)
+    assert result(small, effects=(wrong,)) == ()
+    assert result(large, effects=(wrong,)) == ("inertia_z",)
+    assert result(other, effects=(wrong,)) == ("inertia_x",)
 
 
 def test_a_load_accounts_for_any_thrust():
-    assert told(number("thrust_scale", 0.5, 0.01), effects=[named("payload")]) == ()
+    assert result(number("thrust_scale", 0.5, 0.01), effects=[named("payload")]) == ()
 
 
 def test_numbers_that_no_vehicle_has_are_ratios_to_the_config():

@@ -14,7 +14,7 @@ GUSTS = [f"gusts {axis}" for axis in ("roll", "pitch", "yaw")]
 
 
 @pytest.fixture
-def told(monkeypatch):
+def result(monkeypatch):
     """Tell the loads of flights whose names say by how much M3 is asked for more, and the air is rougher."""
     rng = np.random.default_rng(1)
     signals = signals_of(flown())
@@ -31,21 +31,21 @@ def told(monkeypatch):
     )
 
 
-def test_a_weak_rotor_in_the_held_out_flight(told):
-    (sentence,) = told("0 0", "0 0", "0.5 0")
+def test_a_weak_rotor_in_the_held_out_flight(result):
+    (sentence,) = result("0 0", "0 0", "0.5 0")
     assert "is not that of the training flights" in sentence
     assert "rotor M3, sure to" in sentence
 
 
-def test_nothing_is_said_of_like_flights_or_of_one(told):
-    assert told("0 0", "0 0", "0 0") == ()
-    assert told("0 0", "0.5 0") == ()
+def test_nothing_is_said_of_like_flights_or_of_one(result):
+    assert result("0 0", "0 0", "0 0") == ()
+    assert result("0 0", "0.5 0") == ()
 
 
-def test_rougher_air_is_no_other_vehicle(told):
+def test_rougher_air_is_no_other_vehicle(result):
     calm = ["0 0"] * 5
-    assert told(*calm, "0 2") == ()
-    (sentence,) = told(*calm, "0.5 2")
+    assert result(*calm, "0 2") == ()
+    (sentence,) = result(*calm, "0.5 2")
     assert "rotor M3, sure to" in sentence
 
 

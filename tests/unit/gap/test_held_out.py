@@ -124,8 +124,8 @@ def test_nothing_is_judged_where_no_flight_learned_from_went():
     assert 0.3 < beyond.unlearned["vertical_descent"] < 0.5
     left = beyond.after[beyond.known[:, 0], 0]
     assert beyond.size(beyond.after).value[0] == pytest.approx(np.sqrt(np.mean(left**2)))
-    (told,) = not_judged(beyond)
-    assert told.startswith(
+    (result,) = not_judged(beyond)
+    assert result.startswith(
         f"{100 * beyond.unlearned['vertical_descent']:.2g} % of what is held out goes where no training flight"
     )
 

@@ -63,7 +63,7 @@ def question(true, linear, rival):
     return Question(SizedEffect(candidate(true), np.array(linear)), CATALOGUE[rival] if rival else None)
 
 
-def told(asked, *paths):
+def result(asked, *paths):
     return LOGGING.gathered(asked, [LOGGING.weak(along(path)) for path in paths]).left.sum()
 
 
@@ -81,15 +81,15 @@ def test_an_offset_is_told_from_a_bias_by_changes_of_thrust_alone():
     assert np.ptp(thrust) > 5
     offset = question("com_offset", [LEVER, 0.0], "torque_bias")
     expected = LEVER**2 * ((thrust - thrust.mean()) ** 2).sum() / FLOOR[1] ** 2
-    assert told(offset, path) == pytest.approx(expected, rel=1e-6)
+    assert result(offset, path) == pytest.approx(expected, rel=1e-6)
     bias = question("torque_bias", [0.0, BIAS, 0.0], "com_offset")
     expected = BIAS**2 * (len(thrust) - thrust.sum() ** 2 / (thrust**2).sum()) / FLOOR[1] ** 2
-    assert told(bias, path) == pytest.approx(expected, rel=1e-6)
+    assert result(bias, path) == pytest.approx(expected, rel=1e-6)
 
 
 def test_hovering_tells_nothing_of_the_two_whatever_the_yaw():
     for path in (path_of(2, 0.0), path_of(3, 0.3, 1)):
-        assert told(question("com_offset", [LEVER, LEVER], "torque_bias"), path) < 1e-6
+        assert result(question("com_offset", [LEVER, LEVER], "torque_bias"), path) < 1e-6
 
 
 @pytest.mark.decides
@@ -97,15 +97,15 @@ def test_flights_are_taken_together():
     """Two hovers at different thrust would tell; two at the same do not: what is fitted is the same in both."""
     hover, climb = path_of(2, 0.0), path_of(2, 0.15)
     offset = question("com_offset", [LEVER, 0.0], "torque_bias")
-    assert told(offset, hover, hover) < 1e-6
-    assert told(offset, hover, climb) >= told(offset, climb)
+    assert result(offset, hover, hover) < 1e-6
+    assert result(offset, hover, climb) >= result(offset, climb)
 
 
 def test_evidence_of_flights_adds_up_to_that_of_all():
     paths = path_of(2, 0.15), path_of(0, 1.0, 3)
     offset = question("com_offset", [LEVER, LEVER], "rotor_mismatch")
     one, two = (LOGGING.gathered(offset, [LOGGING.weak(along(path))]) for path in paths)
-    assert two.after(one).left.sum() == pytest.approx(told(offset, *paths), rel=1e-9)
+    assert two.after(one).left.sum() == pytest.approx(result(offset, *paths), rel=1e-9)
 
 
 def test_effects_that_are_there_besides_are_free_too():
@@ -114,17 +114,17 @@ def test_effects_that_are_there_besides_are_free_too():
     thrust = thrusts(path)
     alone = question("com_offset", [LEVER, 0.0], None)
     bias = SizedEffect(candidate("torque_bias"), np.array([0.0, BIAS, 0.0]))
-    assert told(alone, path) == pytest.approx(LEVER**2 * (thrust**2).sum() / FLOOR[1] ** 2, rel=1e-6)
+    assert result(alone, path) == pytest.approx(LEVER**2 * (thrust**2).sum() / FLOOR[1] ** 2, rel=1e-6)
     both = LEVER**2 * ((thrust - thrust.mean()) ** 2).sum() / FLOOR[1] ** 2
-    assert told(replace(alone, besides=(bias,)), path) == pytest.approx(both, rel=1e-6)
+    assert result(replace(alone, besides=(bias,)), path) == pytest.approx(both, rel=1e-6)
 
 
 def test_without_a_rival_the_vehicles_own_numbers_are_all_that_imitates():
     hover = path_of(2, 0.0)
     count = windows(0.02, 0.4, 0.5).count(601)
-    seen = told(question("torque_bias", [0.0, BIAS, 0.0], None), hover)
+    seen = result(question("torque_bias", [0.0, BIAS, 0.0], None), hover)
     assert seen == pytest.approx(count * (BIAS / FLOOR[1]) ** 2, rel=1e-6)
-    assert told(question("torque_bias", [0.0, BIAS, 0.0], "parameter_error"), hover) == pytest.approx(seen)
+    assert result(question("torque_bias", [0.0, BIAS, 0.0], "parameter_error"), hover) == pytest.approx(seen)
 
 
 def evidence(*left, off=0.0):

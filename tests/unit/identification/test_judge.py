@@ -306,7 +306,7 @@ def rotations(seed=5, samples=400, tilt=4.0):
     return with_torque(data, torque)
 
 
-def told(data, held_out=None, stated=INERTIA, **changed):
+def result(data, held_out=None, stated=INERTIA, **changed):
     settings = IdentificationSettings(
         **{"membership_functions": 1, "consequents": "seesaw", "products": "additive", **changed}
     )
@@ -315,7 +315,7 @@ def told(data, held_out=None, stated=INERTIA, **changed):
 
 
 def test_a_good_flight_is_only_told_that_the_rigid_body_is_enough():
-    sentences = told(small_angle_flight())
+    sentences = result(small_angle_flight())
     assert "fuzzy part off" in sentences
     for word in ("positive definite", "constant torque", "hardly", "times those stated", "explains less"):
         assert word not in sentences
@@ -323,7 +323,7 @@ def test_a_good_flight_is_only_told_that_the_rigid_body_is_enough():
 
 def test_a_wrong_sign_gives_an_inertia_that_no_body_has():
     data = small_angle_flight()
-    sentences = told(with_torque(data, -data.torque))
+    sentences = result(with_torque(data, -data.torque))
     assert "not positive definite at 300 of 300 training samples" in sentences
     assert "check signs, axes, frames and units" in sentences
 
@@ -331,7 +331,7 @@ def test_a_wrong_sign_gives_an_inertia_that_no_body_has():
 def test_a_constant_torque_is_named_with_its_size():
     data = small_angle_flight()
     offset = np.tile([0.0, -0.5, 0.0], (300, 1))
-    sentences = told(with_torque(data, data.torque + generalised_torque(data.motion.attitude, offset)))
+    sentences = result(with_torque(data, data.torque + generalised_torque(data.motion.attitude, offset)))
     assert "pitch: a constant torque of -0.5" in sentences
     assert "roll: a constant" not in sentences
     assert "hardly" not in sentences
@@ -340,7 +340,7 @@ def test_a_constant_torque_is_named_with_its_size():
 def test_an_axis_that_does_not_move_is_called_hardly_excited():
     data = small_angle_flight(yaw=0.01, tilt=0.05)
     noise = 0.2 * np.random.default_rng(3).standard_normal((300, 3)) * [0, 0, 1]
-    sentences = told(with_torque(data, data.torque + noise))
+    sentences = result(with_torque(data, data.torque + noise))
     assert "yaw is hardly excited: motion and a constant explain less than half" in sentences
     assert "roll is" not in sentences
 
@@ -349,22 +349,22 @@ def test_torque_on_a_moving_axis_that_is_not_inertia_is_not_called_unexcited():
     data = small_angle_flight()
     wrong = data.torque.copy()
     wrong[:, 1] = np.random.default_rng(4).standard_normal(300)
-    sentences = told(with_torque(data, wrong))
+    sentences = result(with_torque(data, wrong))
     assert "pitch: something other than inertia acts, or columns are wrong" in sentences
     assert "hardly excited" not in sentences
 
 
 def test_a_wrong_unit_shows_in_the_ratio_to_the_stated_inertia():
     data = small_angle_flight()
-    assert "times those stated" in told(with_torque(data, 57.3 * data.torque))
-    assert "times those stated" not in told(with_torque(data, 2.0 * data.torque))
-    assert "times those stated" not in told(with_torque(data, 57.3 * data.torque), stated=None)
+    assert "times those stated" in result(with_torque(data, 57.3 * data.torque))
+    assert "times those stated" not in result(with_torque(data, 2.0 * data.torque))
+    assert "times those stated" not in result(with_torque(data, 57.3 * data.torque), stated=None)
 
 
 def test_another_vehicle_is_told_on_held_out_flights():
     data, other = small_angle_flight(), small_angle_flight(seed=2)
-    assert "other: the model explains less than half" in told(data, {"other": with_torque(other, 5 * other.torque)})
-    assert "explains less than half" not in told(data, {"other": other})
+    assert "other: the model explains less than half" in result(data, {"other": with_torque(other, 5 * other.torque)})
+    assert "explains less than half" not in result(data, {"other": other})
 
 
 @pytest.mark.parametrize(
@@ -402,18 +402,18 @@ def test_near_a_vertical_pitch_a_matrix_may_dip_below_zero_by_a_hair(pitch, smal
 
 
 def test_a_flight_through_a_vertical_pitch_is_told_what_is_left_out():
-    sentences = told(rotations())
+    sentences = result(rotations())
     assert "body torque is judged without the samples closer than 6 degrees to a pitch of +-90 degrees" in sentences
-    assert "closer than" not in told(small_angle_flight())
+    assert "closer than" not in result(small_angle_flight())
 
 
 def test_a_structure_that_fails_on_a_good_flight_is_not_blamed_on_the_log():
     data, rules = rotations(tilt=3.0), {"base": "none", "membership_functions": 3, "population": 6, "generations": 1}
-    sentences = told(data, **rules)
+    sentences = result(data, **rules)
     assert "D(q) is not positive definite" in sentences
     assert "the structure or its excitation is at fault" in sentences
     assert "check signs" not in sentences
-    assert "check signs" in told(with_torque(data, -data.torque), **rules)
+    assert "check signs" in result(with_torque(data, -data.torque), **rules)
 
 
 def test_noise_near_a_vertical_pitch_does_not_make_an_axis_badly_explained():

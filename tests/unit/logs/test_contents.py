@@ -297,12 +297,12 @@ def flown(tmp_path):
     return call
 
 
-@pytest.mark.parametrize(("told", "at"), [([0, 5], AT), ([0], None)])
-def test_of_px4_by_its_receiver_once_that_knows(flown, told, at):
+@pytest.mark.parametrize(("answer", "at"), [([0, 5], AT), ([0], None)])
+def test_of_px4_by_its_receiver_once_that_knows(flown, answer, at):
     fields = {"sensor_gps": "uint64_t timestamp;uint64_t time_utc_usec"}
     rows = [
         ulogs.message("D", struct.pack("<HQQ", 0, ulogs.BEGIN + since * 10**6, int(AT + since) * 10**6 if since else 0))
-        for since in told
+        for since in answer
     ]
     begins = flown("log.ulg", ulogs.ulog([], fields) + b"".join(rows))
     assert begins == at if at else isnan(begins)

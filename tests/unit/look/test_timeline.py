@@ -60,8 +60,8 @@ def test_what_px4_states():
         "vehicle_status": state([0, 8, 15], nav_state=[2, 3, 5], failsafe=[0, 0, 1]),
         "actuator_armed": state([0, 4.5, 27], armed=[0, 1, 0]),
     }
-    told = ((3.0, "INFO", "ready"), (9.0, "WARNING", "wind"))
-    found = events(logs.px4(HOP, more=more), told)
+    result = ((3.0, "INFO", "ready"), (9.0, "WARNING", "wind"))
+    found = events(logs.px4(HOP, more=more), result)
     on = {"actuator_armed": state([0, 27], armed=[1, 0])}
     assert of(events(logs.px4(HOP, more=on)), "armed") == [(0.0, "armed when the log begins"), (27.0, "disarmed")]
     counted = {
@@ -84,8 +84,8 @@ def test_what_ardupilot_states():
         "ERR": state([10, 12], Subsys=[6, 6], ECode=[1, 0]),
         "VIBE": state([6, 7, 8, 9], Clip0=[0, 0, 3, 4], Clip1=[2, 2, 2, 2]),
     }
-    told = ((0.1, "", "ArduCopter V4.5.7 (abc)"), (11.0, "", "EKF3 lane switch 1"))
-    found = events(logs.ardupilot(HOP, more=more), told)
+    result = ((0.1, "", "ArduCopter V4.5.7 (abc)"), (11.0, "", "EKF3 lane switch 1"))
+    found = events(logs.ardupilot(HOP, more=more), result)
     assert of(found, "mode") == [(0.0, "mode Stabilize"), (8.0, "mode Loiter")]
     assert of(found, "take-off") == [(5.6, "takes off")]
     assert of(found, "failsafe") == [(10.0, "failsafe: battery")]

@@ -174,11 +174,11 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tell
         "Of the held-out gap above the noise, 97 % is gone. "
         "It could be constant torque instead of offset of the centre of mass."
     )
-    told = "constant torque from offset of the centre of mass: change the thrust"
-    assert ("To separate", told) in below
+    answer = "constant torque from offset of the centre of mass: change the thrust"
+    assert ("To separate", answer) in below
     _, facts, _, _, below = screen(diagnosis("AMBIGUOUS", alternatives=RIVALS))
     planned = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight."
-    assert facts["Next"] == f"To separate {told}. {planned} Until then t{USE[1:]}."
+    assert facts["Next"] == f"To separate {answer}. {planned} Until then t{USE[1:]}."
     untried = diagnosis("AMBIGUOUS", alternatives=[("wind", "com_offset", np.nan, "log velocity", "")])
     assert planned not in next_steps(untried)
     assert next_steps(untried).startswith("To separate steady wind from offset of the centre of mass: log velocity.")
@@ -188,8 +188,8 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tell
 
 def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tells_them():
     pair = [("motor_lag", "low_pass_filter", 1.0, "log the speeds of the rotors", "command_delay")]
-    told = diagnosis("AMBIGUOUS", named=({"name": "low_pass_filter"},), alternatives=pair)
-    box, facts, *_ = screen(told)
+    answer = diagnosis("AMBIGUOUS", named=({"name": "low_pass_filter"},), alternatives=pair)
+    box, facts, *_ = screen(answer)
     assert "from motor lag with delay of the command" in str(box)
     assert "trajectory" not in facts["Next"]
 

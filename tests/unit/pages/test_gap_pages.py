@@ -91,8 +91,8 @@ def test_every_form_says_what_the_command_says(stage, found):
     _require_in_all_forms(made.source_of(found, stage), made.blocks_of(found, stage))
 
 
-def _holds(told, phrase):
-    return set(words(phrase).split()) <= set(told.split())
+def _holds(answer, phrase):
+    return set(words(phrase).split()) <= set(answer.split())
 
 
 def _require_in_all_forms(source, blocks):
@@ -100,11 +100,11 @@ def _require_in_all_forms(source, blocks):
     assert len(said) > 6
     warned = [block.text for block in blocks if isinstance(block, Text) and block.tone == "warning"]
     for form, text in in_all_forms(source, blocks).items():
-        told = words(text)
+        answer = words(text)
         for phrase in said:
             # Warnings of a command go to standard error, and a terminal breaks long cells.
-            assert words(phrase) in told or (
-                form == "terminal" and (phrase in warned or (len(phrase) > _WIDE and _holds(told, phrase)))
+            assert words(phrase) in answer or (
+                form == "terminal" and (phrase in warned or (len(phrase) > _WIDE and _holds(answer, phrase)))
             ), (form, phrase)
 
 
@@ -286,8 +286,10 @@ def again_box(before, after=None):
             replace(made.diagnosis(), repeatability_before=before, repeatability_after=after), "diagnose"
         )
     box = next(each for each in blocks if isinstance(each, Box) and each.label == "REPEATS")
-    told = next(each for each in blocks if isinstance(each, Folded) and each.summary.startswith("repeatable part, ch"))
-    return box, [each.text for each in told.blocks]
+    answer = next(
+        each for each in blocks if isinstance(each, Folded) and each.summary.startswith("repeatable part, ch")
+    )
+    return box, [each.text for each in answer.blocks]
 
 
 def test_the_largest_repeatable_share_is_first():
@@ -464,11 +466,11 @@ def test_where_flights_show_the_loop_alone_sizes_are_not_known():
 
 
 def test_machines_read_sizes():
-    told = plain(found_in())
-    assert told["disturbance"]["name"] == ["roll", "pitch", "yaw", "x", "y", "z"]
-    assert told["disturbance"]["size"][0] == pytest.approx(3.0 * BODIES[0])
-    assert told["disturbance"]["size"][1] is None
-    assert told["model"]["gusts"]["size"][3] == pytest.approx(0.3 * QUAD.mass_kg)
+    answer = plain(found_in())
+    assert answer["disturbance"]["name"] == ["roll", "pitch", "yaw", "x", "y", "z"]
+    assert answer["disturbance"]["size"][0] == pytest.approx(3.0 * BODIES[0])
+    assert answer["disturbance"]["size"][1] is None
+    assert answer["model"]["gusts"]["size"][3] == pytest.approx(0.3 * QUAD.mass_kg)
     assert plain(vehicle_of(whole()))["disturbance"] is None
 
 

@@ -59,16 +59,16 @@ def test_a_search_stopped_before_all_blocks_were_judged_lacks_these_baselines(fl
 @pytest.fixture(scope="module")
 def searched(flights):
     """Search to the end: what was chosen, and what was told on the way."""
-    told = []
-    return chosen(flights, lambda judged, total: told.append((judged, total))), told
+    result = []
+    return chosen(flights, lambda judged, total: result.append((judged, total))), result
 
 
 def test_a_search_tells_how_far_it_is(searched):
-    choice, told = searched
+    choice, result = searched
     assert choice.complete
-    assert [len(judged) for judged, _ in told] == list(range(1, choice.evaluated + 1))
-    assert all(len(judged) <= total for judged, total in told)
-    assert min(each.error for each in told[-1][0]) == choice.best.error
+    assert [len(judged) for judged, _ in result] == list(range(1, choice.evaluated + 1))
+    assert all(len(judged) <= total for judged, total in result)
+    assert min(each.error for each in result[-1][0]) == choice.best.error
     assert choice.chosen.numbers <= choice.best.numbers
     assert "flapping_moment" in choice.chosen.structure.blocks
     assert choice.chosen.error < 0.3 * choice.nothing.error
@@ -78,14 +78,14 @@ def test_a_search_tells_how_far_it_is(searched):
 def test_a_first_answer_grows_from_one_start(flights, quick):
     """It adds a response of the rotors as it adds other blocks; a whole search begins with each of them alone."""
     left_out = tuple(set(QUICK.leave_out) - {"lag", "slow_actuation"})
-    told = []
+    result = []
     choice = chosen(
         flights,
-        lambda judged, _: told.append(judged[-1].structure.blocks),
+        lambda judged, _: result.append(judged[-1].structure.blocks),
         settings=replace(QUICK, leave_out=left_out, quick=quick),
     )
     starts = {("lag",), ("slow_actuation",)}
-    assert starts.isdisjoint(told) if quick else starts <= {*told}
+    assert starts.isdisjoint(result) if quick else starts <= {*result}
     assert "lag" in choice.chosen.structure.blocks
 
 
@@ -106,13 +106,13 @@ def test_a_search_goes_on_from_what_was_kept(flights, searched, number):
         if len(judged) == number:
             raise SearchStoppedError
 
-    without, told = searched
+    without, result = searched
     with suppress(SearchStoppedError):
         chosen(flights, stopping)
     kept = dict(KeptStructure.of(each).pair for each in parts[-1])
     resumed = chosen(flights, lambda judged, _: parts.append(judged), kept)
     assert [len(judged) for judged in parts] == list(range(1, without.evaluated + 1))
-    pairs = list(zip(told[-1][0], parts[-1], strict=True))
+    pairs = list(zip(result[-1][0], parts[-1], strict=True))
     assert [one.structure for one, _ in pairs] == [other.structure for _, other in pairs]
     assert all(a.error == b.error and np.array_equal(a.by_block, b.by_block) for a, b in pairs)
     assert resumed.chosen.structure == without.chosen.structure

@@ -90,8 +90,8 @@ def test_an_accelerometer_that_feels_no_lift_leaves_the_thrust_factor_open(sense
         replace(flight, specific_force=sensed(flight.specific_force, (flight.speed**2).sum(axis=1)))
         for flight in without_velocity(flown(TRUE, noise=MIDDLING, seed=1, hold="linear"), accelerometer=True)
     ]
-    vehicle, told = carrying_weight(OPEN, flights)
-    assert told == ()
+    vehicle, result = carrying_weight(OPEN, flights)
+    assert result == ()
     squares = np.concatenate([(flight.speed**2).sum(axis=1) for flight in flights])
     for rotor in vehicle.rotors:
         weight = STATED.mass_kg * STATED.gravity_m_s2
@@ -103,8 +103,8 @@ def test_rotors_that_stand_or_turn_for_a_moment_tell_no_thrust():
     assert carrying_weight(OPEN, [replace(flight, speed=0.0 * flight.speed) for flight in flights]) == (OPEN, ())
     brief = [replace(flight, speed=0.0 * flight.speed) for flight in flights]
     brief[0].speed[:3] = flights[0].speed[:3]
-    _, told = carrying_weight(OPEN, brief)
-    assert told == ()
+    _, result = carrying_weight(OPEN, brief)
+    assert result == ()
 
 
 @pytest.mark.parametrize(("heavier", "known"), [(1.0, True), (8.0, False)])
@@ -134,8 +134,8 @@ def test_no_vehicle_has_its_centre_of_mass_beyond_the_hubs_nor_a_damping_beyond_
     values = {"com_offset.c_x": (0.05, -0.83), "linear_damping.d_x": (size, 1e3 * size)}
     for place, possible in enumerate((True, False)):
         numbers = [FoundNumber(name, "", own[place], 0, 1, np.nan, True, False) for name, own in values.items()]
-        told = list(bodily(TRUE.vehicle, numbers))
-        assert [(number.possible, number.determined) for number in told] == [(possible, possible)] * len(values)
+        result = list(bodily(TRUE.vehicle, numbers))
+        assert [(number.possible, number.determined) for number in result] == [(possible, possible)] * len(values)
 
 
 def test_where_nothing_turns_no_factor_of_the_loop_overflows():

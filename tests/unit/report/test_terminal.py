@@ -172,7 +172,7 @@ def source_of(result, name):
     return replace(made_of(result, name), vehicle=QUAD)
 
 
-def told(name, **more):
+def answer(name, **more):
     """Give the blocks of the answer."""
     result = replace(made[name](), **more)
     return page.blocks(loaded(name).text(result, about=source_of(result, name)))
@@ -231,7 +231,7 @@ NOTHING = {"p": 0.5, "causes": (), "numbers": ()}
     ],
 )
 def test_verdicts_of_today(more, verdict, title, tone):
-    (box,) = [block for block in told("changed", **more) if isinstance(block, Box)]
+    (box,) = [block for block in answer("changed", **more) if isinstance(block, Box)]
     assert (box.label, box.tone) == (verdict, tone)
     assert title in box.title
 
@@ -240,7 +240,7 @@ def test_alike_changes_and_notes():
     alike = tuple(Alike(name=name, belief=0.2) for name in ("rotors M1 and M3", "mass", "delay"))
     causes = (found("rotor M3", 0.2, alike=alike), found("hover", 0.1, named=False, belief=0.5, alike=alike[1:]))
     notes = ("left out: b.csv: flies for 1 s", "another <note> of *it*")
-    blocks = told("changed", causes=causes, warnings=notes, other_ranges=("c.csv",))
+    blocks = answer("changed", causes=causes, warnings=notes, other_ranges=("c.csv",))
     assert blocks[0].title.endswith(", perhaps with another; sure to 97 %.")
     assert blocks[0].sentences[0].endswith("sure to 50 %; or another weight, 20 %; or another delay of the body, 20 %.")
     assert "Commands of c.csv are shares of another range" in blocks[0].sentences[-1]
@@ -261,7 +261,7 @@ def test_verdicts_of_a_trend(more, verdict, title):
     if "flights" in more:
         flights = tuple(replace(own, beyond=()) for own in made["trend"]().flights)
         more, title = more | {"flights": flights}, title.replace(" 0 ", " 20 ")
-    box = told("trend", **more)[0]
+    box = answer("trend", **more)[0]
     assert (box.label, title in box.title) == (verdict, True)
 
 

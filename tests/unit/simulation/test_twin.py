@@ -173,9 +173,9 @@ def among(rng, larger=1.0):
 
 def test_one_flight_of_twenty_that_is_like_the_others_is_told_not_to_be():
     rng = drawing(5)
-    told = [bool(among(rng).beyond) for _ in range(400)]
+    result = [bool(among(rng).beyond) for _ in range(400)]
     # 20 are expected; 4 deviations of a binomial on either side.
-    assert 3 <= sum(told) <= 37
+    assert 3 <= sum(result) <= 37
     larger = [among(rng, 20.0).beyond for _ in range(50)]
     assert all("roll" in beyond for beyond in larger)
     # Its other channels are told no more often.

@@ -199,13 +199,13 @@ def test_torque_is_scaled_by_axis_and_left_out_where_the_pitch_is_vertical():
     torque = rng.standard_normal((400, 3)) * [10.0, 1.0, 0.1]
     attitude = np.zeros((400, 3))
     attitude[::7, 1] = np.pi / 2
-    told = np.arange(400) % 7 != 0
+    result = np.arange(400) % 7 != 0
     found = compare_torque(
         still_flight(torque, attitude),
         lambda motion: 0.9 * torque[: len(motion)],
         lambda motion: 0.8 * torque[: len(motion)],
     )
-    scaled = np.sum((0.1 * torque[told]) ** 2 / np.mean(torque[told] ** 2, axis=0), axis=1)
+    scaled = np.sum((0.1 * torque[result]) ** 2 / np.mean(torque[result] ** 2, axis=0), axis=1)
     assert found.ours == pytest.approx(np.mean(scaled), rel=0.01)
     assert found.ratio == pytest.approx(0.25)
     assert found.lower

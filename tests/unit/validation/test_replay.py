@@ -183,8 +183,8 @@ def test_flights_that_explain_roll_and_pitch_leave_the_verdict(loop):
 
 
 def test_the_band_of_a_moment_is_no_narrower_than_instruments_know_it():
-    told = SimpleNamespace(half=np.array([0.1, 0.05, np.inf]), identified=np.array([True, True, False]))
-    known = SimpleNamespace(band=np.full(3, 0.005), identification=SimpleNamespace(freed=told))
+    result = SimpleNamespace(half=np.array([0.1, 0.05, np.inf]), identified=np.array([True, True, False]))
+    known = SimpleNamespace(band=np.full(3, 0.005), identification=SimpleNamespace(freed=result))
     (reason,) = _band(known)
     assert "20 %" in reason.text
     known.identification.freed = None
