@@ -177,7 +177,7 @@ class Mixed(NamedTuple):
 
 
 def fitting_yaw(upright: Value, yaw: Value, limit: float) -> Value:
-    """Give the part of a yaw command that fits, by rotor, between 0 and a limit beside all else; symbols."""
+    """Give the part of a yaw command that fits, by rotor, between 0 and a limit together with all else; symbols."""
     functions, least, share = SYMBOLS, _LEAST_YAW * limit, 1.0
     for straight, turned in zip(upright, yaw, strict=True):
         size = functions.absolute(turned)

@@ -82,7 +82,7 @@ _ALIKE = {"delay": 0.3, "lag": 0.5, "gusts": 0.5, "unbalance": 0.5}
 """Kinds of which all numbers change at once, and the share of that by which each does so by itself."""
 
 _BY_LOOP = ("gain", "delay")
-"""Kinds whose numbers hold how the loop answers gusts, which it does otherwise with other motors."""
+"""Kinds whose numbers hold how the loop answers gusts, which it may do otherwise with other motors."""
 
 _ONE_TOO = ("unbalance",)
 """Of these the kinds of which one number can change as well: rotors that turn alike are hardly separated."""
@@ -205,13 +205,16 @@ def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:
     together = np.sum(each, axis=0)
     if kind in _ALIKE:
         columns = [together, *(_ALIKE[kind] * column for column in each)]
+        alone = Cause(kind, np.stack(columns, axis=1), usual, unit)
         if kind == "lag":
-            columns += [
+            answers = [
                 _ALONE[other][0] * numbers.direction({name: 1.0})
                 for other in _BY_LOOP
                 for name in numbers.of_kind(other)
             ]
-        yield Cause(kind, np.stack(columns, axis=1), usual, unit)
+            yield replace(alone, directions=np.stack([*columns, *answers], axis=1), prior=0.5, searched=0.5)
+            alone = replace(alone, prior=0.5, searched=0.5)
+        yield alone
     elif kind in _AT_ONCE:
         yield Cause(kind, np.stack(each, axis=1), usual, unit, reported=len(each))
     if kind in _ONE_TOO or kind not in (*_ALIKE, *_AT_ONCE):

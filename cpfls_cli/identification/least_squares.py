@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import linalg
 from scipy.linalg import lapack
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from cpfls_cli.arrays import Array, Numbers
 
@@ -248,20 +248,21 @@ def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
     def apply(right_side: Array) -> Array:
         return np.asarray(linalg.cho_solve(factor, right_side, check_finite=False))
 
-    upper, lower = _extreme(lambda vector: matrix @ vector, len(matrix)), _extreme(apply, len(matrix))
+    size = len(matrix)
+    upper, lower = _extreme(lambda vector: matrix @ vector, size, 1), _extreme(apply, size, _LOWEST_DIRECTIONS)
     # Far enough from zero that no rounding decides the rank.
     if upper is None or lower is None or not 1.0 / lower[0] > 4.0 * tolerance * upper[0]:
         return None
     return _Inverse(apply, 0, upper[0], 1.0 / lower[0], lower[1])
 
 
-def _extreme(apply: Callable[[Array], Array], size: int) -> tuple[float, Array] | None:
+def _extreme(apply: Callable[[Array], Array], size: int, count: int) -> tuple[float, Array] | None:
     """Find the largest eigenvalue of a symmetric operator, and directions, by Lanczos; None if it does not settle."""
     operator = LinearOperator((size, size), matvec=apply, dtype=np.float64)
-    start, count = np.random.default_rng(0).standard_normal(size), _LOWEST_DIRECTIONS
+    start = np.random.default_rng(0).standard_normal(size)
     try:
         values, vectors = eigsh(operator, count, which="LA", v0=start, maxiter=_STEPS, tol=_SETTLED)
-    except ArpackNoConvergence:
+    except ArpackError:
         return None
     return float(values[-1]), np.asarray(vectors[:, ::-1])
 

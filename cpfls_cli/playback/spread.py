@@ -223,8 +223,8 @@ def _impossible(model: VehicleModel, numbers: Sequence[FoundNumber], row: Array)
         return "a principal moment of inertia that is not above 0"
     if largest > (smallest + middle) * (1.0 + _EDGE):
         return "a principal moment of inertia above the sum of the others"
-    drawn = [number._replace(value=values[number.name]) for number in numbers]
-    of_none = [each.name for each in bodily(model.vehicle, drawn) if not each.possible]
+    placed = [number._replace(value=values[number.name]) for number in numbers]
+    of_none = [each.name for each in bodily(model.vehicle, placed) if not each.possible]
     if of_none:
         return f"such a {of_none[0]}"
     beyond = next(broken_limits(figures_of_vehicle(model_at(model, numbers, row).vehicle)), None)

@@ -99,8 +99,8 @@ class Symbol:
     __sub__, __rsub__ = _operators("-")
     __mul__, __rmul__ = _operators("*")
     __truediv__, __rtruediv__ = _operators("/")
-    __lt__, _ = _operators("<")
-    __gt__, _ = _operators(">")
+    __lt__ = _operators("<")[0]
+    __gt__ = _operators(">")[0]
 
     def __neg__(self) -> Symbol:
         return self.made("negative", self)
