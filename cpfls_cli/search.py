@@ -371,8 +371,11 @@ class Resumable:
         @contextmanager
         def workers(evaluate: Evaluate) -> Iterator[Workforce]:
             asked = f"--workers {count}" if scheduler is None else f"--scheduler {scheduler}"
-            employed = employ(evaluate, count=count, scheduler=scheduler)
-            with about_option(asked, WorkerError), watch.deferring(), employed as workforce:
+            with (
+                about_option(asked, WorkerError),
+                watch.deferring(),
+                employ(evaluate, count=count, scheduler=scheduler) as workforce,
+            ):
                 yield workforce
 
         return SearchRun(

@@ -281,8 +281,9 @@ class Stage:
         for act in run.afterwards:
             act()
         cautions = run.cautions_of(*results, *(self.fills.parts if self.fills else ()))
-        summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
-        summary = {} if self.kind is dict else summary
+        summary: dict[str, Any] = {}
+        if self.kind is not dict:
+            summary = {name: plain(each) for name, each in results.items()} if several else plain(*results.values())
         return Outcome(
             {**summary, **run.also, **({"cautions": list(cautions)} if cautions else {})},
             (

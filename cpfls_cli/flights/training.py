@@ -187,7 +187,7 @@ class SplitFlights:
         """Indices of the samples that are learned from, as of those that train."""
         return self.training_indices if self.selected is None else self.selected
 
-    @property
+    @cached_property
     def learned(self) -> TorqueSource:
         """The samples that parameters are learned from."""
         if self.selected is None:
@@ -201,7 +201,7 @@ class SplitFlights:
             (split.training.stop, len(flight)) for flight, split in zip(self.flights, self.splits, strict=True)
         )
 
-    @property
+    @cached_property
     def rests(self) -> dict[str, TorqueSource]:
         """The parts that are held out, by name."""
         several = len(self.paths) > 1

@@ -23,7 +23,7 @@ def answer(tmp_path_factory):
     flights = [*sorted(logs.glob("train_*.csv")), *sorted(logs.glob("held_out_*.csv"))]
     folder = place / "gap"
     held = [word for path in flights[3:] for word in ("--held-out", path)]
-    result = run("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.horizon_s=0.1")
+    result = run("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.shifts=39")
     assert result.exit_code == 0, result.stderr
     return SimpleNamespace(folder=folder, summary=json.loads(result.stdout), hidden=case.hidden, logs=logs, held=held)
 

@@ -115,7 +115,7 @@ def known_motion(recordings: Sequence[Recording]) -> Instruments:
 
     Flights that were asked to stay where they are, and did, were asked for nothing that moves.
     """
-    key = (known_motion, *(each.signals for each in recordings))
+    key = (known_motion, *((each.name, each.signals) for each in recordings))
     return recordings[0].signals.once(key, lambda: _known_motion(recordings))
 
 
@@ -286,5 +286,5 @@ def _asked(given: Instruments, windows: Windows) -> dict[int, Array]:
             np.hstack([past_setpoints(setpoint, windows.period, apart), np.c_[np.arange(len(setpoint))]])
         )
         for number, setpoint in enumerate(given.setpoints)
-        if setpoint is not None
+        if setpoint is not None and len(setpoint) >= len(windows.weight)
     }

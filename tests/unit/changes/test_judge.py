@@ -298,7 +298,7 @@ def test_two_changes_at_once_hide_each_other_and_are_found():
 
 
 def test_a_lag_that_makes_the_loop_answer_gusts_otherwise_is_no_second_change():
-    """Rotors 20 ms slower, and a body that seems to follow them 20 ms sooner; the second alone is a delay, and the first a lag."""
+    """Rotors 20 ms slower, and a body that seems to follow them 20 ms sooner; the second alone is a delay."""
     names = [*LOADS, *(f"{kind} {axis}" for kind in ("gain", "delay") for axis in ("roll", "pitch", "yaw"))]
     names += [f"lag M{index}" for index in range(1, 5)]
     slower = np.array([0.02 * name.startswith("lag") for name in names])
