@@ -82,7 +82,7 @@ def tuned(values: dict[str, float], autopilot: Autopilot, axis: int, gain: float
             values[each.name] = value / each.scale
 
 
-def lateness(axis: AxisLaw) -> float:
+def filters_delay(axis: AxisLaw) -> float:
     """Sum the delays of the filters of a gyroscope, s."""
     return sum({"first": 0.16, "second": 0.23, "notch": 0.0}[each.kind] / each.hz for each in axis.measured)
 
@@ -97,7 +97,7 @@ def draw_case(rng: np.random.Generator, autopilot: str, vehicle: str, gusts: str
     law = AUTOPILOTS[autopilot].law(values)
     for axis in range(3):
         fastest = (CROSSOVER[autopilot] if vehicle == "racer" else 25.0) * (1.0 if axis < 2 else 0.4)
-        late = lags[axis] + delay[axis] + law.period + lateness(law.axes[axis])
+        late = lags[axis] + delay[axis] + law.period + filters_delay(law.axes[axis])
         # What accelerates the rotors turns the vehicle too.
         at_once = gain[axis] * float(np.hypot(1.0, speed * fastest * leads[axis]))
         tuned(values, AUTOPILOTS[autopilot], axis, at_once, speed * fastest, late)

@@ -17,7 +17,7 @@ from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.law import flown_feedback
 from cpfls_cli.look.vibration import Change
 from cpfls_cli.result import Estimate, about, part, result
-from cpfls_cli.tuning.gains import USUAL_LEADS, AskedMargins, Tuned, floored, lateness, parameter_of, tuned
+from cpfls_cli.tuning.gains import USUAL_LEADS, AskedMargins, Tuned, floored, parameter_of, total_delay, tuned
 from cpfls_cli.tuning.margins import axis_loops, crossing_margins, disk_of, frequencies, is_stable, moved_by
 from cpfls_cli.tuning.plant import AxisPlant as LinearPlant
 from cpfls_cli.tuning.plant import HoverPlant, Noise, noise_of
@@ -290,7 +290,7 @@ class _Work:
         law = self.open.law(values)
         # All plants get derivatives in one proportion, else gains of neighbours jump from one to the next.
         leads = {
-            axis: (law.axes[axis].d / max(law.axes[axis].p, _FINE) / lateness(law, self.best[axis]),)
+            axis: (law.axes[axis].d / max(law.axes[axis].p, _FINE) / total_delay(law, self.best[axis]),)
             for axis in self.axes
         }
         hardest = [self._hardest(axis, values) for axis in range(len(AXES))]

@@ -225,7 +225,7 @@ def _follows(p: float, d: float, plant: AxisPlant) -> float:
     return p * _torque(plant) / (1 + d * _torque(plant))
 
 
-def lateness(law: Law, plant: AxisPlant) -> float:
+def total_delay(law: Law, plant: AxisPlant) -> float:
     """Give lags and delays between command and rate, s."""
     return plant.lag + plant.delay + 1.5 * law.period
 
@@ -282,7 +282,7 @@ class _Search:
     def _rate(self, angle: float | None) -> AxisLaw:
         """Find the gains of the rate with a given gain of the angle, or with one that suits them."""
         found = self.plants[0]
-        late = lateness(self.law, found)
+        late = total_delay(self.law, found)
         best: AxisLaw | None = None
         for lead in self.leads:
 

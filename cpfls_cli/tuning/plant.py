@@ -129,7 +129,7 @@ def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, 
     share = _hover_share(plant, motors)
     speed = np.full(len(flown.rotors), motors.speed_at(share))
     slope = motors.speed_slope(share)
-    lag, delay, slow_s = _lateness(model, effects, rotor_lag)
+    lag, delay, slow_s = _lags_and_delay(model, effects, rotor_lag)
     by_speed, by_acceleration, by_slow = _slopes(plant, speed)
     by_rate = _damping(plant, speed)
     turned = slope * motors.mix[:, 1:]
@@ -168,7 +168,9 @@ def _hover_share(plant: Plant, motors: Motors) -> float:
     return 0.5 * (low + high)
 
 
-def _lateness(model: VehicleModel | None, effects: SimulatedEffects, rotor_lag: float) -> tuple[float, float, float]:
+def _lags_and_delay(
+    model: VehicleModel | None, effects: SimulatedEffects, rotor_lag: float
+) -> tuple[float, float, float]:
     """Give lag, delay, and the time of slow actuation, s, of all between command and torque."""
     lags = [
         one.effect.actuation.lag(one.values)
