@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from cpfls_cli.flights.flights import read_flights
 
 from benchmarks.blind_study.fly import fly
 from benchmarks.blind_study.sets import Size, sets
@@ -19,7 +20,6 @@ from benchmarks.shared.measure import count, program, table
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.config.load import load_study
-from cpfls_cli.flights.recordings import read_flights
 
 REFERENCE = 5
 
@@ -29,8 +29,8 @@ def flown(own, folder):
     (logs,) = fly([own], folder)
     key = json.loads((Path(folder) / "keys" / logs.name / "key.json").read_text(encoding="ascii"))
     files = [path for role in ("train", "held_out") for path in sorted(logs.glob(f"{role}_*.csv"))]
-    read = read_flights(files, load_study(logs / "study.yaml")).recordings
-    return key, [flight_numbers(each) for each in read], read[0].signals.vehicle
+    read = read_flights(files, load_study(logs / "study.yaml")).flights
+    return key, [flight_numbers(each) for each in read], read[0].vehicle
 
 
 def said(today, before, vehicle):

@@ -377,11 +377,11 @@ def _wrong(kind: Kind, trim: Trim, fleet: Fleet, series: int) -> Iterator[list[o
         own = day_of(kind, body, trim, np.random.default_rng([kind.rotors, series, index, 7]))
         for instrument, right in flown(kind, vehicle, own, [series, index, 7]).items():
             for name, make in WRONG.items():
-                recording = replace(right, signals=make(right.signals))
+                recording = make(right)
                 today = flight_numbers(recording, kind.volts)
                 before = [day[0][instrument] for day in fleet.days[index][:USUAL]]
                 change = changed([today], before, vehicle, np.random.default_rng(index))
-                accused = tuple(contradictions(check([recording.signals], GapSettings())))
+                accused = tuple(contradictions(check([recording], GapSettings())))
                 record = replace(change, contradictions=accused)
                 said.setdefault((name, instrument), []).append(record.verdict)
     verdicts = ("CHANGED", "CANNOT TELL", "NO CHANGE SEEN", "NO CHANGE")

@@ -15,7 +15,6 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 
 EFFECTS = ("com_offset", "rotor_drag")
 
@@ -44,20 +43,20 @@ def main() -> None:
     table("gap", "flights | seconds | ratio to the first", rows)
 
 
-def time(recordings: list[Recording], settings: GapSettings) -> float:
+def time(recordings: list[Signals], settings: GapSettings) -> float:
     """Time one diagnosis by its own processor time, half of the flights held out."""
     # A flight keeps what was made of it; a copy has to make it all.
-    copies = [Recording(each.name, replace(each.signals)) for each in recordings]
+    copies = [replace(each) for each in recordings]
     start = process_time()
     diagnose(copies[:3], copies[3:], settings, np.random.default_rng(1))
     return process_time() - start
 
 
-def fly(case, seconds: float, rng: np.random.Generator) -> list[Recording]:
+def fly(case, seconds: float, rng: np.random.Generator) -> list[Signals]:
     """Fly a case and log it with middling noise."""
     flown = simulate_many([case], 1, seconds)[0]
     logs = (disturb(flight.table, flown.vehicle, "mid", "white", rng) for flight in flown.flights)
-    return [Recording(f"flight {n}", signals(log, vehicle_of(flown.vehicle))) for n, log in enumerate(logs)]
+    return [replace(signals(log, vehicle_of(flown.vehicle)), name=f"flight {n}") for n, log in enumerate(logs)]
 
 
 def signals(log: np.ndarray, vehicle: VehicleSettings) -> Signals:

@@ -18,7 +18,6 @@ from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 from tests.builders.gusty_flights import CALM, GUSTS, MEMORY_S, SMALL, STORM, Flight, Truth, gusty_flights, logged
 
 FLIGHTS, SECONDS, REACH_HZ = 4, 40.0, 3.0
@@ -83,7 +82,7 @@ def _flown(hidden: Hidden, gusts: tuple[float, float, float], instrument: str, d
 def _diagnosed(hidden: Hidden, flown: Sequence[PlaybackFlight], instrument: str) -> DiagnosisRun:
     kept = flown if instrument == "setpoints" else [replace(flight, setpoints={}) for flight in flown]
     recordings = [
-        Recording(flight.name, logged(flight, hidden.vehicle, commanded=hidden.commands).parts[0]) for flight in kept
+        replace(logged(flight, hidden.vehicle, commanded=hidden.commands).parts[0], name=flight.name) for flight in kept
     ]
     return diagnose(recordings[:-1], recordings[-1:], GapSettings(), np.random.default_rng(1))
 

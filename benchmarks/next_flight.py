@@ -33,7 +33,7 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 
 SEEDS = (31, 47)
 # A load on a cable costs as much as the rest of the catalogue, and its swing is no look-alike of a gentle flight.
@@ -65,7 +65,7 @@ class OpenSet:
     rival: str
     advice: str
     room: Room
-    flights: tuple[Recording, Recording]
+    flights: tuple[Signals, Signals]
     diagnosis: DiagnosisRun
 
 
@@ -171,7 +171,7 @@ def floor_of(craft) -> np.ndarray:
     return expected_floor(room, Logging(LOGGED, False, np.ones(6), SETTINGS), noise, 0.01, np.random.default_rng(1))
 
 
-def fly(room: Room, path: HarmonicPath, hidden: SizedEffect, rng: np.random.Generator, name: str) -> Recording:
+def fly(room: Room, path: HarmonicPath, hidden: SizedEffect, rng: np.random.Generator, name: str) -> Signals:
     """Fly a path in closed loop with the hidden effect, and log it with noise."""
     planned = room.planned(path, 0.01)
     effects = {hidden.candidate.effect.name: physical_values(hidden)}
@@ -180,7 +180,7 @@ def fly(room: Room, path: HarmonicPath, hidden: SizedEffect, rng: np.random.Gene
     )
     logged = measure(planned.time, vars(planned), room.vehicle, loop, rng).signals
     signals = {name: logged[name] for name in NOISE}
-    return Recording(name, Signals(time=planned.time, vehicle=room.vehicle, **signals))
+    return Signals(time=planned.time, vehicle=room.vehicle, **signals, name=name)
 
 
 def settle(opened: OpenSet, rng: np.random.Generator) -> dict[str, tuple[str, float]]:

@@ -7,6 +7,7 @@ know, in gusts and in still air, and with neither, in gusts.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from cpfls_cli.gap.extended import plain
 from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 from tests.builders.gusty_flights import CALM, GUSTS, SMALL, Flight, gusty_flights, logged
 
 RUNS = 4
@@ -63,9 +64,9 @@ def main(draws: int = 6) -> None:
 
 def split(flown: Sequence[PlaybackFlight]) -> Repeatability:
     """Split what a model without drag and damping leaves of flights."""
-    recordings = [Recording(flight.name, logged(flight, SMALL.vehicle).parts[0]) for flight in flown]
+    recordings = [replace(logged(flight, SMALL.vehicle).parts[0], name=flight.name) for flight in flown]
     windows, model = common_windows(recordings, GapSettings()), plain(None)
-    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    flights = [weak_flight(each, windows, None, force=True) for each in recordings]
     repeated = RepeatedRuns.of(recordings)
     again = None if repeated is None else repeated.split(model.system(flights), model.linear)
     assert again is not None, "each path is flown again"

@@ -31,7 +31,6 @@ from cpfls_cli.simulators.formats import read_model
 from cpfls_cli.simulators.results import Change
 from cpfls_cli.simulators.study import of_log
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.gusty_flights import GUSTS, LARGE, SMALL, Flight, Truth, gusty_flights, logged
 
@@ -138,7 +137,7 @@ def _answer(hidden: Hidden, draw: int) -> Answer:
     flies = zip(vehicle.rotors, hidden.truth.vehicle.rotors, strict=True)
     stated = replace(vehicle, rotors=tuple(replace(own, spin=true.spin) for own, true in flies))
     parts = [logged(each, stated, commanded=hidden.commands).parts[0] for each in gusty_flights(asked, SECONDS)]
-    flights = [Recording(f"flight-{run}.csv", part) for run, part in zip(runs, parts, strict=True)]
+    flights = [replace(part, name=f"flight-{run}.csv") for run, part in zip(runs, parts, strict=True)]
     found = diagnose(flights[:-1], flights[-1:], GapSettings(), np.random.default_rng(draw)).diagnosis
     formats = {}
     with tempfile.TemporaryDirectory() as folder:

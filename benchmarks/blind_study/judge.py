@@ -5,10 +5,11 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+from cpfls_cli.flights.flights import read_flights
+
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import generator
 from cpfls_cli.errors import CpflsError
-from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.result import plain
 
@@ -27,7 +28,7 @@ def judge(folder):
 def _judged(folder):
     study = load_study(folder / "study.yaml")
     logs = [sorted(folder.glob(f"{role}_*.csv")) for role in ("train", "held_out")]
-    read = read_flights([*logs[0], *logs[1]], study).recordings
+    read = read_flights([*logs[0], *logs[1]], study).flights
     training, held = read[: len(logs[0])], read[len(logs[0]) :]
     run = diagnose(training, held, study.gap, generator(study, "diagnose"))
     found = run.diagnosis

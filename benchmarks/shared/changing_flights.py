@@ -12,7 +12,6 @@ from cpfls_cli.compiling import compiled
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import euler_angles
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 
 STEP_S, EVERY = 2e-3, 5
 SECONDS, SETTLES_S, RESTS_S = 30.0, 3.0, 1.6
@@ -168,7 +167,7 @@ def day_of(kind: Kind, body: Body, trim: Trim, rng: np.random.Generator) -> Body
     )
 
 
-def flown(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int], pace: float = 1.0) -> dict[str, Recording]:
+def flown(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int], pace: float = 1.0) -> dict[str, Signals]:
     """Fly once, legs in a time divided by the pace; give the flight with its commands alone, and with speeds too."""
     rng = np.random.default_rng(seed)
     samples = round((SECONDS + SETTLES_S) / STEP_S)
@@ -194,7 +193,7 @@ def flown(kind: Kind, vehicle: VehicleSettings, body: Body, seed: list[int], pac
 
 def _logged(
     vehicle: VehicleSettings, body: Body, places: Array, log: Array, rng: np.random.Generator
-) -> list[tuple[str, Recording]]:
+) -> list[tuple[str, Signals]]:
     """Log what was flown, with a vibration at the rotors' frequencies, after a rest on the ground."""
     felt, rate = log[:, 15:18], log[:, 18:21]
     attitude = euler_angles(log[:, 6:15].reshape(-1, 3, 3))
@@ -226,8 +225,8 @@ def _logged(
     }
     speeds, commands = after(speed, 0.0), after(command, 0.0)
     return [
-        ("commands", Recording("flight", Signals(**common, rotor_speed=commands, commanded=True))),
-        ("speeds", Recording("flight", Signals(**common, rotor_speed=speeds, rotor_command=commands))),
+        ("commands", Signals(**common, rotor_speed=commands, commanded=True, name="flight")),
+        ("speeds", Signals(**common, rotor_speed=speeds, rotor_command=commands, name="flight")),
     ]
 
 

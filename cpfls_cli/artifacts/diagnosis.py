@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
 from cpfls_cli.consistency.check import Audit
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, LeftOut, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import Comparison
@@ -28,7 +29,6 @@ from cpfls_cli.result import about, part, result
 from cpfls_cli.simulators.results import Corrected
 from cpfls_cli.validation.trust import capped, trust_by_playback
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.before_after import BeforeAfter
@@ -89,8 +89,8 @@ class Diagnosis(Conclusion, _OfGap):
         cls,
         diagnosed: DiagnosisRun,
         change: BeforeAfter,
-        training: Sequence[Recording],
-        held: Sequence[Recording],
+        training: Sequence[Signals],
+        held: Sequence[Signals],
         split: str,
         warnings: Sequence[str],
         base: VehicleModel,

@@ -17,7 +17,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.lag import DelayFit, delayed, fit_delay
 from cpfls_cli.result import about, part, result
-from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Recording, Windows, windows
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, FEWEST_WINDOWS, Windows, windows
 
 _LOAD = next(effect for effect in CATALOGUE.values() if "length_m" in {shape.name for shape in effect.shapes})
 _SHAPES = {shape.name: shape for shape in _LOAD.shapes}
@@ -167,14 +167,14 @@ def unit_of(name: str) -> str:
     return KINDS[name.split()[0]].unit
 
 
-def flight_numbers(recording: Recording, full_voltage: float = 1.0, *, has_gyroscope: bool = False) -> FlightNumbers:
+def flight_numbers(signals: Signals, full_voltage: float = 1.0, *, has_gyroscope: bool = False) -> FlightNumbers:
     """Compute the numbers of a flight.
 
     `full_voltage`: what its voltage is a share of, V; 1 for shares.
     `has_gyroscope`: whether the log holds body rates, though they never move.
     Raises InputError if the flight has no speeds or commands of single rotors, or flies for less than four seconds.
     """
-    signals, name = recording.signals, recording.name
+    name = signals.name
     if signals.rotor_speed is None:
         raise InputError(
             f"{name}: has no rotor_speed or rotor_command, and what a rotor does shows nowhere else; name their columns"

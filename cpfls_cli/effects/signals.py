@@ -32,6 +32,9 @@ class Signals:
     time: Array  # Shape (time,), s.
     body_rate: Array  # Shape (time, 3), rad/s, body frame.
     vehicle: VehicleSettings
+    name: str = ""  # Of its file, with the part of it where one flight was split.
+    begins: float = np.nan  # Stamp of the log's own clock at time 0, s; NaN where there is none.
+    slow_rotors: str = ""  # What cannot be found where its log holds the rotors rarely, and the remedy; else empty.
     attitude: Array | None = None  # Shape (time, 3), rad: roll, pitch, yaw.
     velocity: Array | None = None  # Shape (time, 3), m/s, world frame: relative to the ground.
     position: Array | None = None  # Shape (time, 3), m, world frame.

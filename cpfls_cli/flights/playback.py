@@ -39,7 +39,6 @@ from cpfls_cli.playback.player import made_ready, player_of
 from cpfls_cli.playback.replay import Played
 from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 from cpfls_cli.words import joined
 
 _STATE = ("body_rate", "attitude", "velocity", "position")
@@ -170,9 +169,8 @@ def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) 
 def _of_full_battery(flights: Sequence[LoggedFlight], read: Sequence[ReadFlight]) -> list[LoggedFlight]:
     """Take a voltage in V as a share of the largest of all flights."""
     owners = [index for index, flight in enumerate(flights) for _ in flight.parts]
-    recordings = [Recording(flight.name, part) for flight in flights for part in flight.parts]
-    scaled, _ = with_voltage(recordings, [read[index] for index in owners])
-    parts = [[r.signals for r, owner in zip(scaled, owners, strict=True) if owner == i] for i in range(len(flights))]
+    scaled, _ = with_voltage([part for flight in flights for part in flight.parts], [read[at] for at in owners])
+    parts = [[part for part, owner in zip(scaled, owners, strict=True) if owner == at] for at in range(len(flights))]
     return [replace(flight, parts=tuple(own)) for flight, own in zip(flights, parts, strict=True)]
 
 

@@ -175,10 +175,10 @@ def _beyond(model: IdentifiedModel, found: AlongFlight, flight: str) -> Iterator
 def _of_vehicle(path: Path, flight: Path, study: Study) -> tuple[AlongFlight, tuple[str, ...]]:
     """Predict torque and force on a whole vehicle, compared with a logged torque or with what the motion takes."""
     model, alone = read_model(path, study), read_alone(flight, study)
-    (recording,) = of_vehicle([alone.recording], model)
-    if recording.signals.attitude is None:
+    (given,) = of_vehicle([alone.signals], model)
+    if given.attitude is None:
         raise InputError(f"{flight}: lacks the attitude; a prediction is in Euler coordinates")
-    signals = model.acting(model.repaired(recording.signals))
+    signals = model.acting(model.repaired(given))
     wrench = model.wrench_along(signals)
     if torque_source_of(flight, study) == "column" and "body_torque" in alone.flight.signals:
         first = int(np.searchsorted(alone.flight.signals["time"], signals.time[0]))

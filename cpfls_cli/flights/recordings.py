@@ -33,7 +33,7 @@ from cpfls_cli.logs.formats import LogColumns, is_log, read_log
 from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.vehicle.rotors import AXES, body_wrench, require_control, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 
 
 def imported(log: Path, study: Study) -> ImportedFlight:
@@ -117,10 +117,10 @@ _FULL = 1.5
 
 
 @dataclass(frozen=True)
-class Recordings:
-    """Flights as signals on one clock each, and what to know about them."""
+class FlightSet:
+    """Flights on one clock each, and what to know about them."""
 
-    recordings: tuple[Recording, ...]
+    flights: tuple[Signals, ...]
     warnings: tuple[str, ...]
 
 
@@ -153,30 +153,30 @@ class ReadAlone(NamedTuple):
     """
 
     flight: ReadFlight
-    recording: Recording
+    signals: Signals
     full_voltage: float
     warnings: tuple[str, ...]
     contradictions: tuple[str, ...]
 
 
-def read_flights(paths: Sequence[Path], study: Study) -> Recordings:
+def read_flights(paths: Sequence[Path], study: Study) -> FlightSet:
     """Read flights, and import those that are logs."""
-    flights = [read_flight(path, study) for path in paths]
-    made = [_recording(flight, study) for flight in flights]
-    recordings, notes = with_voltage([recording for recording, _ in made], flights)
-    warnings = [f"{flight.name}: {w}" for flight, (_, about) in zip(flights, made, strict=True) for w in about]
-    return Recordings(tuple(recordings), (*warnings, *notes))
+    read = [read_flight(path, study) for path in paths]
+    made = [_longest_stretch(flight, study) for flight in read]
+    flights, notes = with_voltage([flight for flight, _ in made], read)
+    warnings = [f"{flight.name}: {w}" for flight, about in made for w in about]
+    return FlightSet(tuple(flights), (*warnings, *notes))
 
 
 def read_alone(path: Path, study: Study) -> ReadAlone:
     """Read one flight, and hold it against itself and its vehicle."""
     flight = read_flight(path, study)
-    recording, about = _recording(flight, study)
-    volts = _largest_volts(recording.signals, flight)
+    signals, about = _longest_stretch(flight, study)
+    volts = _largest_volts(signals, flight)
     found = [each for each in check_flight(flight, study) if each.contradiction]
     wrong = contradictions(each for each in found if not each.of_constants)
     about = (*about, *(each.sentence for each in found if each.of_constants))
-    return ReadAlone(flight, _share(recording, volts) if volts else recording, volts or 1.0, about, wrong)
+    return ReadAlone(flight, _share(signals, volts) if volts else signals, volts or 1.0, about, wrong)
 
 
 def read_flight(path: Path, study: Study) -> ReadFlight:
@@ -238,7 +238,7 @@ def _units(study: Study) -> dict[str, str]:
     return {name: signal.unit for name, signal in study.import_.signals.items()}
 
 
-def _recording(flight: ReadFlight, study: Study) -> tuple[Recording, tuple[str, ...]]:
+def _longest_stretch(flight: ReadFlight, study: Study) -> tuple[Signals, tuple[str, ...]]:
     known, warnings = _known_part(flight)
     signals, notes = signals_of(flight, known, study)
     if signals.rotor_speed is not None:
@@ -251,7 +251,7 @@ def _recording(flight: ReadFlight, study: Study) -> tuple[Recording, tuple[str, 
             f" {log_faster('rotors and body rates', FAST_HZ, flight.system)}"
         )
     notes = (*warnings, *notes, *doubts_on_voltage(known, flight.units))
-    return Recording(flight.name, signals, flight.begins, slow), notes
+    return replace(signals, slow_rotors=slow), notes
 
 
 def require_rotors(study: Study) -> None:
@@ -288,6 +288,8 @@ def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
         time=time,
         body_rate=rate,
         vehicle=study.vehicle,
+        name=flight.name,
+        begins=flight.begins,
         voltage=None if doubts_on_voltage(known, flight.units) else known.get("voltage"),
         ground_height_m=study.gap.ground_height_m,
         setpoints={name: own.reshape(len(time), -1) for name, own in asked.items() if np.isfinite(own).all()},
@@ -388,14 +390,12 @@ def longest_known(name: str, known: BoolArray, time: Array) -> tuple[slice, tupl
     return best, (note,)
 
 
-def with_voltage(
-    recordings: Sequence[Recording], flights: Sequence[ReadFlight]
-) -> tuple[list[Recording], tuple[str, ...]]:
+def with_voltage(flights: Sequence[Signals], read: Sequence[ReadFlight]) -> tuple[list[Signals], tuple[str, ...]]:
     """Take a voltage in V as a share of the largest of all flights."""
-    full = [_largest_volts(r.signals, s) for r, s in zip(recordings, flights, strict=True)]
+    full = [_largest_volts(*pair) for pair in zip(flights, read, strict=True)]
     if not any(full):
-        return list(recordings), ()
-    scaled = [_share(r, max(full)) if volts else r for r, volts in zip(recordings, full, strict=True)]
+        return list(flights), ()
+    scaled = [_share(flight, max(full)) if volts else flight for flight, volts in zip(flights, full, strict=True)]
     note = f"voltage: the largest of these flights, {max(full):.3g} V, is taken as that of a full battery"
     return scaled, (note,)
 
@@ -440,23 +440,22 @@ def _largest_volts(signals: Signals, flight: ReadFlight) -> float:
     return float(signals.voltage.max()) if in_volts(flight.units) and signals.voltage is not None else 0.0
 
 
-def _share(recording: Recording, full: float) -> Recording:
-    signals = recording.signals
-    assert signals.voltage is not None, "its largest value was taken"
-    return replace(recording, signals=replace(signals, voltage=signals.voltage / full))
+def _share(flight: Signals, full: float) -> Signals:
+    assert flight.voltage is not None, "its largest value was taken"
+    return replace(flight, voltage=flight.voltage / full)
 
 
 @dataclass(frozen=True)
 class FlightSplit:
     """Flights to learn from, flights to judge on, and why; all flights as they were given, whole."""
 
-    training: tuple[Recording, ...]
-    held_out: tuple[Recording, ...]
+    training: tuple[Signals, ...]
+    held_out: tuple[Signals, ...]
     sentence: str
-    whole: tuple[Recording, ...]
+    whole: tuple[Signals, ...]
 
 
-def split_flights(given: Sequence[Recording], held_out: Sequence[Recording], settings: GapSettings) -> FlightSplit:
+def split_flights(given: Sequence[Signals], held_out: Sequence[Signals], settings: GapSettings) -> FlightSplit:
     """Split flights for learning and judging.
 
     If none are held out, the last third of the flights is, or of one flight its last third.
@@ -498,15 +497,12 @@ def refuse_seen(given: Iterable[InputFile], held_out: Iterable[InputFile]) -> No
             )
 
 
-def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
+def _thirds(flight: Signals, settings: GapSettings) -> FlightSplit:
     # A flight whose windows are refused as a whole is refused for another reason than its length.
     common_windows([flight], settings)
-    cut = 2 * len(flight.signals) // 3
+    cut = 2 * len(flight) // 3
     parts = {" (first two thirds)": slice(0, cut), " (last third)": slice(cut, None)}
-    training, last = (
-        replace(flight, name=flight.name + which, signals=stretch_of(flight.signals, part))
-        for which, part in parts.items()
-    )
+    training, last = (replace(stretch_of(flight, part), name=flight.name + which) for which, part in parts.items())
     try:
         common_windows([training, last], settings)
     except InputError as error:
@@ -518,5 +514,5 @@ def _thirds(flight: Recording, settings: GapSettings) -> FlightSplit:
     return FlightSplit((training,), (last,), sentence, (flight,))
 
 
-def _names(flights: Sequence[Recording]) -> str:
+def _names(flights: Sequence[Signals]) -> str:
     return ", ".join(flight.name for flight in flights)

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Preparation, dense, weak_flight
 from cpfls_cli.gap.extended import ExtendedModel, plain
@@ -24,7 +25,7 @@ from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
 from cpfls_cli.playback.replay import Played, Replay, drawn_runs, fading, replay
 from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import largest
-from cpfls_cli.weak_form.windows import Recording, Windows, common_windows
+from cpfls_cli.weak_form.windows import Windows, common_windows
 
 _EVERY = 5  # Samples between starts of free runs, which are alike.
 
@@ -42,14 +43,14 @@ class PlayedPair(Played):
         return super().runs(prediction, starts, horizon)
 
 
-def rates_fade(training: Sequence[Recording], horizon_s: float) -> float:
+def rates_fade(training: Sequence[Signals], horizon_s: float) -> float:
     """Fit the time constant with which body rates of training flights fade, s."""
-    flights = [LoggedFlight.of(recording.name, recording.signals).playback for recording in training]
+    flights = [LoggedFlight.of(each).playback for each in training]
     return fading(flights, max(1, round(horizon_s / flights[0].motion.period)))
 
 
 def played_pairs(
-    recordings: Sequence[Recording], model: VehicleModel, given: VehicleModel, fading_s: float | None = None
+    flights: Sequence[Signals], model: VehicleModel, given: VehicleModel, fading_s: float | None = None
 ) -> list[PlayedPair]:
     """Make flights, a model with effects and the model as given ready for playback.
 
@@ -57,8 +58,7 @@ def played_pairs(
     Raises InputError if a flight lacks a signal that an effect needs.
     """
     pairs = []
-    for recording in recordings:
-        flight = LoggedFlight.of(recording.name, recording.signals)
+    for flight in map(LoggedFlight.of, flights):
         along, player = made_ready(model, flight)
         logged, stated = (along, player) if given is model else made_ready(given, flight)
         pairs.append(PlayedPair(along, player, stated, logged, fading_s=fading_s))
@@ -82,9 +82,7 @@ class LeftOut(NamedTuple):
     ]
 
 
-def left_out(
-    model: VehicleModel, names: Sequence[str], recordings: Sequence[Recording], horizon_s: float
-) -> list[LeftOut]:
+def left_out(model: VehicleModel, names: Sequence[str], flights: Sequence[Signals], horizon_s: float) -> list[LeftOut]:
     """Play a model back along flights, as it is and without single effects.
 
     `names`: of effects.
@@ -95,7 +93,7 @@ def left_out(
     for name in names:
         others = tuple(effect for effect in model.effects if effect.name != name)
         squares, ends, runs, samples = np.zeros(6), np.zeros(4), 0, 0
-        for pair in played_pairs(recordings, model, replace(model, effects=others)):
+        for pair in played_pairs(flights, model, replace(model, effects=others)):
             difference = pair.model.wrench(pair.flight) - pair.stated.wrench(pair.logged)
             squares, samples = squares + (difference**2).sum(axis=0), samples + len(difference)
             horizon = min(max(1, round(horizon_s / pair.flight.motion.period)), len(pair.flight) - 1)
@@ -132,7 +130,7 @@ class FreeRuns:
 
 
 def worst_stretch(
-    pairs: Sequence[PlayedPair], recordings: Sequence[Recording], horizon_s: float, shown_s: float
+    pairs: Sequence[PlayedPair], flights: Sequence[Signals], horizon_s: float, shown_s: float
 ) -> FreeRuns:
     """Find where free runs of the model as given, one after another, are farthest off.
 
@@ -141,9 +139,7 @@ def worst_stretch(
     """
     samples = max(2, round(horizon_s / pairs[0].flight.motion.period))
     most = max(1, round(shown_s / horizon_s))
-    found = [
-        _worst(pair, recording.signals.time, samples, most) for pair, recording in zip(pairs, recordings, strict=True)
-    ]
+    found = [_worst(pair, flight.time, samples, most) for pair, flight in zip(pairs, flights, strict=True)]
     return largest(found, lambda stretch: float(((stretch.before - stretch.measured) ** 2).mean()))
 
 
@@ -245,8 +241,8 @@ class BeforeAfter:
 
 
 def before_after(
-    training: Sequence[Recording],
-    held: Sequence[Recording],
+    training: Sequence[Signals],
+    held: Sequence[Signals],
     unseen: HeldOut,
     model: ExtendedModel,
     settings: GapSettings,
@@ -260,9 +256,9 @@ def before_after(
     part.
     """
     windows = common_windows(held, settings)
-    centres = [windows.centres(recording.signals.time) for recording in held]
+    centres = [windows.centres(flight.time) for flight in held]
     index = np.repeat(np.arange(len(held)), [len(each) for each in centres])
-    stated = held[0].signals.vehicle
+    stated = held[0].vehicle
     with_effects, given = (whole_vehicle(each, stated) for each in (model, plain(model.base)))
     if base is not None:
         with_effects, given = on_top_of(base, with_effects), on_top_of(base, given)
@@ -282,35 +278,35 @@ def before_after(
 
 
 def _again(
-    training: Sequence[Recording], held: Sequence[Recording], model: ExtendedModel, settings: GapSettings
+    training: Sequence[Signals], held: Sequence[Signals], model: ExtendedModel, settings: GapSettings
 ) -> tuple[Repeatability | None, Repeatability | None]:
     """Split the gap of the model as given, of signals as logged, and of the model with effects where paths repeat."""
-    recordings = [*training, *held]
-    repeated = RepeatedRuns.of(recordings, len(held))
+    flights = [*training, *held]
+    repeated = RepeatedRuns.of(flights, len(held))
     if repeated is None or model.audit is None:
         return None, None
-    prepared = Preparation(common_windows(recordings, settings), model.base, settings, model.audit)
-    given, known = plain(model.base), system(prepared.repaired(recordings), model.chosen)
-    before = repeated.split(given.system(prepared.logged(recordings)), given.linear)
+    prepared = Preparation(common_windows(flights, settings), model.base, settings, model.audit)
+    given, known = plain(model.base), system(prepared.repaired(flights), model.chosen)
+    before = repeated.split(given.system(prepared.logged(flights)), given.linear)
     return before, repeated.split(known, model.linear)
 
 
 def _picture(
-    held: Sequence[Recording], stretch: GapStretch, windows: Windows, model: ExtendedModel, settings: GapSettings
+    held: Sequence[Signals], stretch: GapStretch, windows: Windows, model: ExtendedModel, settings: GapSettings
 ) -> WorstWindows:
     channel = CHANNELS.index(stretch.channel)
     close = dense(windows)
-    recording = held[stretch.flight]
+    flight = held[stretch.flight]
     raw, repaired = (
-        weak_flight(recording.name, signals, close, model.base, settings.force, settings.axes)
-        for signals in (recording.signals, model.repaired(recording.signals))
+        weak_flight(signals, close, model.base, settings.force, settings.axes)
+        for signals in (flight, model.repaired(flight))
     )
-    time = close.centres(recording.signals.time)
+    time = close.centres(flight.time)
     middle, half = 0.5 * (stretch.start_s + stretch.end_s), 0.5 * max(settings.block_s, stretch.end_s - stretch.start_s)
     shown = np.abs(time - middle) <= half
     measured = repaired.averaged(repaired.inertial)[shown, channel]
     logged = close.average(raw.signals.wrench)[shown, channel]
     after = measured - model.residual([repaired])[shown, channel]
     return WorstWindows(
-        flight=recording.name, channel=stretch.channel, time=time[shown], measured=measured, before=logged, after=after
+        flight=flight.name, channel=stretch.channel, time=time[shown], measured=measured, before=logged, after=after
     )

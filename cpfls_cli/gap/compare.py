@@ -9,6 +9,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.consistency.check import Audit, audit
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, known_size
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, weak_flight
 from cpfls_cli.gap.before_after import errors_by_horizon, played_pairs
@@ -23,7 +24,7 @@ from cpfls_cli.gap.whole_vehicle import with_effects
 from cpfls_cli.playback.errors import STATED, AlongFlights
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 
 
 @result
@@ -98,32 +99,30 @@ class Comparison:
 
 
 def compare(
-    recordings: Sequence[Recording],
+    given: Sequence[Signals],
     model: VehicleModel,
     settings: GapSettings,
     rng: np.random.Generator,
     progress: Callable[[float, str], None] = lambda _done, _note: None,
     *,
-    whole: Sequence[Recording] = (),
+    whole: Sequence[Signals] = (),
 ) -> Comparison:
     """Compare a model with flights.
 
     Faults of the sensors are repaired where they are sure; the gap is that of the model with its own numbers.
 
-    `model`: its rigid body is what `recordings` state as their vehicle, see `of_vehicle`.
+    `model`: its rigid body is what `given` state as their vehicle, see `of_vehicle`.
     `rng`: of the shifts that say what chance explains.
     `progress`: takes the share of the work that is done and a note.
     `whole`: flights that rotors and attitude are held against, where there are more than these, or longer ones.
     Raises InputError if the flights are too short or of different rates, or lack a signal that the model needs.
     """
-    windows = common_windows(recordings, settings)
+    windows = common_windows(given, settings)
     progress(0.0, "sensor audit")
     extended = with_effects(model)
-    own = [recording.signals for recording in recordings]
-    audited = model.repairs or audit(own, windows, [recording.signals for recording in whole])
+    audited = model.repairs or audit(given, windows, whole)
     flights = [
-        weak_flight(r.name, audited.repaired(r.signals), windows, model.fuzzy, settings.force, settings.axes)
-        for r in recordings
+        weak_flight(audited.repaired(each), windows, model.fuzzy, settings.force, settings.axes) for each in given
     ]
     progress(0.3, "noise floor")
     hypothesis = extended.system(flights)
@@ -139,8 +138,8 @@ def compare(
     rms = known_size(residual, known)
     effects = [effect for name, effect in CATALOGUE.items() if name not in settings.ignore]
     repairing = replace(model, repairs=audited)
-    played = played_pairs(recordings, repairing, repairing)
-    repeated = RepeatedRuns.of(recordings)
+    played = played_pairs(given, repairing, repairing)
+    repeated = RepeatedRuns.of(given)
     replayed = errors_by_horizon(played, settings.horizon_s)
     return Comparison(
         sizes=ChannelGaps(

@@ -18,6 +18,7 @@ from cpfls_cli.consistency.rotors import impossible
 from cpfls_cli.dynamics import InertiaModel
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds
@@ -61,7 +62,7 @@ from cpfls_cli.gap.residual.rotor_loss import RotorLoss, rotor_losses
 from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 
 
 @dataclass(frozen=True)
@@ -82,12 +83,12 @@ class DiagnosisRun:
 
 
 def diagnose(
-    training: Sequence[Recording],
-    held: Sequence[Recording],
+    training: Sequence[Signals],
+    held: Sequence[Signals],
     settings: GapSettings,
     rng: np.random.Generator,
     *,
-    whole: Sequence[Recording] = (),
+    whole: Sequence[Signals] = (),
     model: InertiaModel | None = None,
     progress: Callable[[float, str], None] = lambda _done, _note: None,
 ) -> DiagnosisRun:
@@ -106,7 +107,7 @@ def diagnose(
     """
     progress(0.0, "sensor audit")
     windows = common_windows([*training, *held], settings)
-    audited = audit([each.signals for each in training], windows, [each.signals for each in whole])
+    audited = audit(training, windows, whole)
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)
@@ -152,7 +153,7 @@ def diagnose(
     return DiagnosisRun(diagnosis, gusts, audited, hypothesis, estimates, held_out)
 
 
-def _changed_between(training: Sequence[Recording], held: Sequence[Recording]) -> tuple[str, ...]:
+def _changed_between(training: Sequence[Signals], held: Sequence[Signals]) -> tuple[str, ...]:
     """Say how the vehicle changed between the training flights and the held-out ones; nothing where it did not.
 
     What no effect explains may be the same in all of them; what they differ by is not.
@@ -161,9 +162,9 @@ def _changed_between(training: Sequence[Recording], held: Sequence[Recording]) -
         # Of one flight nobody knows what it differs by from the next.
         return ()
     try:
-        before, today = ([flight_numbers(recording) for recording in flights] for flights in (training, held))
+        before, today = ([flight_numbers(each) for each in flights] for flights in (training, held))
         # What chance gives is drawn, and hangs on no seed of the study.
-        change = changed(today, before, training[0].signals.vehicle, np.random.default_rng(0))
+        change = changed(today, before, training[0].vehicle, np.random.default_rng(0))
     except InputError:
         # Torques are stated, or it hardly flies.
         return ()
@@ -349,7 +350,7 @@ def _concluded(
     excited: bool,
     audited: Audit,
     notes: Sequence[str],
-    flown: tuple[Sequence[Recording], Sequence[Recording]],
+    flown: tuple[Sequence[Signals], Sequence[Signals]],
     settings: GapSettings,
 ) -> Conclusion:
     (hypothesis, estimates, *_), held_out = found.judgement

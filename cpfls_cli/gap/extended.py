@@ -25,7 +25,7 @@ from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.naming.results import NamedEffect
 from cpfls_cli.gap.residual.air import in_air, known_motion
 from cpfls_cli.gap.settings import VISIBLE, GapSettings
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 
 
 class FittedEffect(NamedTuple):
@@ -101,8 +101,8 @@ class Refit:
 
 
 def extend(
-    training: Sequence[Recording],
-    held: Sequence[Recording],
+    training: Sequence[Signals],
+    held: Sequence[Signals],
     effects: Sequence[NamedEffect],
     audit: Audit,
     settings: GapSettings,

@@ -1,17 +1,15 @@
 """Flights as the results of the gap workflow hold them, so that later stages need no logs."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Self
+from typing import Any, Self
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.result import about, described_fields, result
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 
 GIVEN, TRAINING, HELD_OUT = "given", "training", "held-out"  # Roles of flights: of a comparison, and of a diagnosis.
 _BODY, _WORLD = "body (FLU)", "world (z up)"
-_ASKED = "setpoint_"  # Before the name of a signal that was asked for.
 
 
 @result
@@ -56,20 +54,10 @@ class RecordedFlight:
     )
 
     @classmethod
-    def of(cls, recording: Recording, role: str) -> Self:
+    def of(cls, flight: Signals, role: str) -> Self:
         """Take the signals of a flight."""
-        signals = recording.signals
-        held = {name: getattr(signals, name) for name in SIGNALS if not name.startswith(_ASKED)}
-        asked = signals.setpoints.get("position")
-        return cls(
-            name=recording.name,
-            role=role,
-            commanded=signals.commanded,
-            begins=recording.begins,
-            slow_rotors=recording.slow_rotors,
-            setpoint_position=asked,
-            **held,
-        )
+        held: dict[str, Any] = {each.name: getattr(flight, each.name, None) for each in described_fields(cls)}
+        return cls(**held | {"role": role, "setpoint_position": flight.setpoints.get("position")})
 
     @property
     def signals(self) -> dict[str, Array]:
@@ -77,28 +65,22 @@ class RecordedFlight:
         held = {name: getattr(self, name) for name in SIGNALS if name != "time"}
         return {name: values for name, values in held.items() if values is not None}
 
-    def recording(self, vehicle: VehicleSettings, ground_height_m: float) -> Recording:
+    def flight(self, vehicle: VehicleSettings, ground_height_m: float) -> Signals:
         """Rebuild the flight, with its vehicle and the height of the ground."""
-        held = self.signals
-        asked = {name: held.pop(_ASKED + name) for name in ("position",) if _ASKED + name in held}
-        signals = Signals(
-            time=self.time,
-            vehicle=vehicle,
-            commanded=self.commanded,
-            ground_height_m=ground_height_m,
-            setpoints=asked,
-            **held,
-        )
-        return Recording(self.name, signals, self.begins, self.slow_rotors)
+        held = dict(vars(self))
+        del held["role"]
+        position = held.pop("setpoint_position")
+        asked = {} if position is None else {"position": position}
+        return Signals(**held, vehicle=vehicle, ground_height_m=ground_height_m, setpoints=asked)
 
 
 SIGNALS = tuple(each.name for each in described_fields(RecordedFlight) if each.about and each.about.axes)
 """Names of the signals that are held."""
 
 
-def recorded(recordings: Iterable[Recording], roles: Iterable[str]) -> dict[str, RecordedFlight]:
+def recorded(flights: Iterable[Signals], roles: Iterable[str]) -> dict[str, RecordedFlight]:
     """Hold flights by number."""
-    pairs = enumerate(zip(recordings, roles, strict=True), start=1)
+    pairs = enumerate(zip(flights, roles, strict=True), start=1)
     return {f"flight-{number}": RecordedFlight.of(*pair) for number, pair in pairs}
 
 

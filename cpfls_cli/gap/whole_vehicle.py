@@ -22,7 +22,6 @@ from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rounding import less
 from cpfls_cli.simulation.model import late_effects
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 
 
 def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleModel:
@@ -173,21 +172,19 @@ def with_effects(model: VehicleModel) -> ExtendedModel:
     return replace(base, parameters=np.where(of_log, numbers, 0.0), effects=(whole,))
 
 
-def of_vehicle(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
+def of_vehicle(flights: Sequence[Signals], model: VehicleModel) -> list[Signals]:
     """Exchange the stated vehicle of flights for that of a model.
 
     Raises InputError if a flight lacks a signal that the model needs.
     """
     wind, given = np.array(model.wind) if any(model.wind) else None, []
-    for recording in recordings:
-        signals = recording.signals
-        missing = tuple(sorted(model.needs - signals.available))
+    for flight in flights:
+        missing = tuple(sorted(model.needs - flight.available))
         if missing:
             lacking = " and ".join(name.replace("_", " ") for name in missing)
-            raise InputError(f"{recording.name}: lacks {lacking}, which the model of the whole vehicle needs")
-        if signals.vehicle != model.vehicle or wind is not None:
-            signals = replace(signals, vehicle=model.vehicle, wind=wind)
-        given.append(replace(recording, signals=signals))
+            raise InputError(f"{flight.name}: lacks {lacking}, which the model of the whole vehicle needs")
+        same = flight.vehicle == model.vehicle and wind is None
+        given.append(flight if same else replace(flight, vehicle=model.vehicle, wind=wind))
     return given
 
 
@@ -196,7 +193,7 @@ def has_effects(model: VehicleModel) -> bool:
     return not model.is_rigid_body and model.fuzzy is None
 
 
-def with_known_wrench(recordings: Sequence[Recording], model: VehicleModel) -> list[Recording]:
+def with_known_wrench(flights: Sequence[Signals], model: VehicleModel) -> list[Signals]:
     """Give flights the vehicle of a model, and take all that it does beyond squared rotor speeds as known.
 
     A vehicle that was found may have no effects, and other numbers than the config.
@@ -204,19 +201,14 @@ def with_known_wrench(recordings: Sequence[Recording], model: VehicleModel) -> l
     Raises InputError if a flight lacks a signal that the model needs.
     """
     if not has_effects(model):
-        return [_with_vehicle(recording, model.vehicle) for recording in recordings]
+        vehicle = model.vehicle
+        return [each if each.vehicle == vehicle else replace(each, vehicle=vehicle) for each in flights]
     given = []
-    for recording in of_vehicle(recordings, model):
+    for flight in of_vehicle(flights, model):
         # What another model knew is no part of the rotors.
-        signals = replace(recording.signals, known_wrench=None)
-        known = model.wrench_along(model.acting(signals)) - signals.wrench
-        given.append(replace(recording, signals=replace(signals, known_wrench=known)))
+        signals = replace(flight, known_wrench=None)
+        given.append(replace(signals, known_wrench=model.wrench_along(model.acting(signals)) - signals.wrench))
     return given
-
-
-def _with_vehicle(recording: Recording, vehicle: VehicleSettings) -> Recording:
-    same = recording.signals.vehicle == vehicle
-    return recording if same else replace(recording, signals=replace(recording.signals, vehicle=vehicle))
 
 
 def on_top_of(base: VehicleModel, found: VehicleModel) -> VehicleModel:

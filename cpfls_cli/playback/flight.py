@@ -188,9 +188,9 @@ class LoggedFlight:
         return self.updated_hz or 1 / self.parts[0].period
 
     @classmethod
-    def of(cls, name: str, signals: Signals) -> LoggedFlight:
+    def of(cls, signals: Signals) -> LoggedFlight:
         """Take a flight without pauses; commands stay until the next sample."""
-        return cls(name, (signals,), "previous" if signals.commanded else "linear", "", ())
+        return cls(signals.name, (signals,), "previous" if signals.commanded else "linear", "", ())
 
     @property
     def time(self) -> Array:

@@ -47,7 +47,6 @@ from cpfls_cli.simulators.results import Change, Corrected
 from cpfls_cli.simulators.study import VehicleOf
 from cpfls_cli.vehicle.rotors import gain_modes
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 from cpfls_cli.words import joined
 
 _WAYS = (("forward", "back"), ("left", "right"), ("up", "down"))
@@ -291,7 +290,7 @@ class _Corrections:
 
 
 def corrected(
-    of: VehicleOf, vehicle: VehicleSettings, found: Conclusion, flights: Sequence[Recording]
+    of: VehicleOf, vehicle: VehicleSettings, found: Conclusion, flights: Sequence[Signals]
 ) -> tuple[Corrected, dict[str, bytes]]:
     """Put what a diagnosis names into a simulator's file: what there is to say, and the files by name.
 
@@ -299,12 +298,12 @@ def corrected(
     ----------
     vehicle : VehicleSettings
         That flights were compared with: of the study that was made of the file, with what it leaves open.
-    flights : sequence of Recording
+    flights : sequence of Signals
         That it was found in.
     """
     made = _Corrections(of, vehicle, sum(len(each.numbers) for each in found.effects))
     if not found.contradictions:
-        _directions(made, [each.signals for each in flights])
+        _directions(made, flights)
     if found.verdict in _WRITES and not found.contradictions:
         sure = []
         for each in found.effects:

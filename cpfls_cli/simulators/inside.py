@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import install_command, visible
 from cpfls_cli.gap.before_after import PlaybackChange, PlayedPair, errors_by_horizon
 from cpfls_cli.playback.course import Course, Flies
@@ -30,7 +31,6 @@ from cpfls_cli.simulators.model import SimulatorModel
 from cpfls_cli.simulators.results import InSimulator
 from cpfls_cli.simulators.study import VehicleOf, corrected_files
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 
 
 def quad_params(file: Path, model: SimulatorModel) -> dict[str, Any]:
@@ -207,7 +207,7 @@ def in_simulator(
     of: VehicleOf,
     texts: Mapping[str, bytes],
     stated: VehicleSettings,
-    held: Sequence[Recording],
+    held: Sequence[Signals],
     pairs: Sequence[PlayedPair],
     horizon_s: float,
 ) -> InSimulator | None:
@@ -237,7 +237,7 @@ def in_simulator(
         why = f"{known.name} {has} is too old; it needs {known.oldest} or later: pip install -U {known.package}"
     elif not of.order:
         why = f"{of.model.file.name} states no rotors"
-    elif any(recording.signals.rotor_speed is None for recording in held):
+    elif any(flight.rotor_speed is None for flight in held):
         why = "the flights have no rotor speeds"
     if why:
         return InSimulator(program=known.name, why_not=why, refused=False, flown=None)
@@ -255,8 +255,8 @@ def in_simulator(
                         loaded[prediction] = known.load(file, of)
             flies = {which: known.flies(own, loaded[STATED], of, thrusts) for which, own in loaded.items()}
             flown = [
-                _Flown(**vars(pair), flies=flies, rotors=rotors, lags=recording.signals.commanded)
-                for pair, recording in zip(pairs, held, strict=True)
+                _Flown(**vars(pair), flies=flies, rotors=rotors, lags=flight.commanded)
+                for pair, flight in zip(pairs, held, strict=True)
             ]
             replayed = errors_by_horizon(flown, horizon_s, known.samples)
             change = PlaybackChange.of_pairs(flown, replayed)

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import Airframe
 from cpfls_cli.flightlog.proposal import Proposal
@@ -25,7 +26,6 @@ from cpfls_cli.simulators.document import Stated
 from cpfls_cli.simulators.formats import FORMATS, as_stated
 from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 
 _BESIDES = {
     "lag_up": ("time constant", "s"),
@@ -371,8 +371,8 @@ def played(
     of: VehicleOf,
     texts: Mapping[str, bytes],
     stated: VehicleSettings,
-    training: Sequence[Recording],
-    held: Sequence[Recording],
+    training: Sequence[Signals],
+    held: Sequence[Signals],
     settings: GapSettings,
 ) -> list[PlayedPair]:
     """Make held-out flights and the vehicle of the file as given and as corrected ready for playback.
@@ -383,7 +383,7 @@ def played(
         Corrected files by their names in the output.
     stated : VehicleSettings
         Of the study that was made of the file as given.
-    training, held : sequence of Recording
+    training, held : sequence of Signals
         Flights that the corrections were found in, and those that are played back.
     """
     before = vehicle_of(of, of, stated)

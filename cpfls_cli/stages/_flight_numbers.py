@@ -47,7 +47,7 @@ def kept_numbers(
     read = read_alone(flight, study)
     has_gyroscope = "body_rate" in read.flight.signals
     made = replace(
-        numbers_of(read.recording, read.full_voltage, has_gyroscope=has_gyroscope),
+        numbers_of(read.signals, read.full_voltage, has_gyroscope=has_gyroscope),
         flown_at_s=read.flight.flown_at,
         code=code_fingerprint(),
         contradictions=tuple(read.contradictions),

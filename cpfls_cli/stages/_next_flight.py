@@ -129,9 +129,9 @@ def _left_open(study: Study, path: Path) -> Case:
     """Ask what a diagnosis leaves open, or for the effects that the config names with what the diagnosis knows."""
     found, _ = read_result_of_vehicle(path, Diagnosis, study)
     base, ground = found.base.fuzzy, study.gap.ground_height_m
-    recordings = [each.recording(study.vehicle, ground) for each in in_roles(found.recorded, TRAINING)]
-    prepared = Preparation(common_windows(recordings, study.gap), base, study.gap, found.audit)
-    flights = tuple(prepared.repaired(recordings))
+    recorded = [each.flight(study.vehicle, ground) for each in in_roles(found.recorded, TRAINING)]
+    prepared = Preparation(common_windows(recorded, study.gap), base, study.gap, found.audit)
+    flights = tuple(prepared.repaired(recorded))
     named = [each for each in found.effects or found.closest if each.candidate is not None]
     chosen = [each.candidate for each in named if each.candidate is not None]
     explained = system(flights, chosen)
@@ -140,7 +140,7 @@ def _left_open(study: Study, path: Path) -> Case:
     if found.air is not None:
         # What a file holds of them lacks the noise with them.
         linear, block = fit(explained, floor), block_index(explained, study.gap)
-        known = air(explained, linear, block, known_motion(recordings), study.gap)
+        known = air(explained, linear, block, known_motion(recorded), study.gap)
         gusts = known if known is not None and known.split.any() else None
     if gusts is not None:
         flights = tuple(gusts.around(flights, gusts.floor(flights, flights)))

@@ -18,9 +18,10 @@ from cpfls_cli.artifacts.model import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.models import is_found, is_identified, learned_by, read_model
-from cpfls_cli.flights.recordings import Recordings, read_flights
+from cpfls_cli.flights.recordings import FlightSet, read_flights
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import compare as compare_flights
@@ -35,7 +36,6 @@ from cpfls_cli.report.canvas import Drawn, in_columns, line, plain_ticks, stacke
 from cpfls_cli.report.content import Command, plain
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, why_no_body_found, with_numbers
-from cpfls_cli.weak_form.windows import Recording
 from cpfls_cli.words import did_you_mean
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ def compare(run: Run, flights: FlightsArgument, model: ModelOption = None) -> Di
     with_numbers(run, "compare", model, whole=model is not None and is_found(model))
     read, learned = read_flights(flights, run.study), learned_by(model)
     base = VehicleModel(vehicle=run.study.vehicle) if model is None else read_model(model, run.study)
-    given = replace(read, recordings=tuple(of_vehicle(read.recordings, base)))
+    given = replace(read, flights=tuple(of_vehicle(read.flights, base)))
     if run.dry_run:
         return None
     given = with_seen(given, model, learned, known_by(roles, inputs))
@@ -233,7 +233,7 @@ def to_gap(job: Job, flights: Sequence[Path], model: Path | None) -> Command:
     return go_on(job, "gap", *flights, *given, output=job.beside("gap"))
 
 
-def with_seen(given: Recordings, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> Recordings:
+def with_seen(given: FlightSet, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> FlightSet:
     """Say of flights which of them the model that is held against them learned from."""
     seen = () if model is None else seen_warnings(model.name, learned, judged)
     return replace(given, warnings=(*seen, *given.warnings))
@@ -247,19 +247,19 @@ def learned_from(run: Run, found: Disagreement, learned: Sequence[LearnedFlight]
 
 def compared(
     study: Study,
-    given: Recordings,
+    given: FlightSet,
     model: VehicleModel,
     progress: Callable[[float, str], None],
-    whole: Sequence[Recording] = (),
+    whole: Sequence[Signals] = (),
 ) -> Disagreement:
     """Compare a model with flights; rotors are held against `whole` ones, where there are more than these."""
     rng = generator(study, "compare")
-    found = compare_flights(given.recordings, model, study.gap, rng, progress, whole=whole)
+    found = compare_flights(given.flights, model, study.gap, rng, progress, whole=whole)
     return Disagreement(
         **vars(found),
         warnings=(*found.audit.filtered, *given.warnings),
         base=model,
-        recorded=recorded(given.recordings, [GIVEN] * len(given.recordings)),
+        recorded=recorded(given.flights, [GIVEN] * len(given.flights)),
     )
 
 

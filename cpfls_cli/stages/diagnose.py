@@ -214,8 +214,8 @@ def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOpti
     unseen = [inputs[role] for role in numbered_roles("held-out", held_out)]
     refuse_seen(flights.values(), unseen)
     held, study = read_flights(held_out, run.study), run.study
-    given = [each.recording(study.vehicle, study.gap.ground_height_m) for each in compared.recorded.values()]
-    split = split_flights(given, held.recordings, study.gap)
+    given = [each.flight(study.vehicle, study.gap.ground_height_m) for each in compared.recorded.values()]
+    split = split_flights(given, held.flights, study.gap)
     if run.dry_run:
         return None
     found = diagnosed(study, split, (*compared.warnings, *held.warnings), compared.base, progress_of(run.progress))

@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.diagnosis import Diagnosis, Extended
 from cpfls_cli.artifacts.model import as_inputs, joined_flights
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import effect
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
@@ -39,7 +40,6 @@ from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import with_numbers
-from cpfls_cli.weak_form.windows import Recording
 
 _EXTENDS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 WORDS: Mapping[str, Any] = {**GAP_WORDS, **MODEL_WORDS, **PLAYBACK_WORDS}
@@ -63,7 +63,7 @@ def extend(run: Run, diagnosis: DiagnosisArgument, model: ModelOption = None) ->
         return None
     flights = (in_roles(diagnosed.recorded, role) for role in (TRAINING, HELD_OUT))
     training, held = (
-        with_known_wrench([each.recording(study.vehicle, study.gap.ground_height_m) for each in own], base)
+        with_known_wrench([each.flight(study.vehicle, study.gap.ground_height_m) for each in own], base)
         for own in flights
     )
     known = diagnosed.learned if model is None else learned_by(model)
@@ -88,8 +88,8 @@ def named_effects(diagnosis: Diagnosis) -> Sequence[NamedEffect]:
 
 def extended(
     study: Study,
-    training: Sequence[Recording],
-    held: Sequence[Recording],
+    training: Sequence[Signals],
+    held: Sequence[Signals],
     diagnosis: Diagnosis,
     base: VehicleModel,
 ) -> Extended:
@@ -98,7 +98,7 @@ def extended(
     named = named_effects(diagnosis), diagnosis.audit
     others = *named, study.gap, base.fuzzy, gusty_floor
     extension, vehicle = refitted(training, held, *others), base.vehicle
-    by_speed = all(each.signals.rotor_speed is not None for each in (*training, *held))
+    by_speed = all(each.rotor_speed is not None for each in (*training, *held))
     lifting = thrust_put_in(extension, vehicle) if by_speed else vehicle
     if lifting != vehicle:
         moved = replace(base, vehicle=lifting)

@@ -17,7 +17,7 @@ from cpfls_cli.artifacts.model import as_inputs, joined_flights
 from cpfls_cli.config.load import parse_config, stored_study, validate
 from cpfls_cli.errors import ComputationError, InputError, visible
 from cpfls_cli.flights.models import is_found, learned_by, read_base
-from cpfls_cli.flights.recordings import FlightSplit, Recordings, read_flights, refuse_seen, seen_twice, split_flights
+from cpfls_cli.flights.recordings import FlightSet, FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
@@ -224,15 +224,15 @@ def _with_file(run: Run, found: Diagnosis, of: VehicleOf, split: FlightSplit) ->
 
 def _flights(
     run: Run, flights: Sequence[Path], held_out: Sequence[Path], base: VehicleModel, files: Sequence[InputFile]
-) -> tuple[Recordings, FlightSplit]:
+) -> tuple[FlightSet, FlightSplit]:
     """Read all flights together, so that one battery is full in all of them, and split them."""
     read = read_flights([*flights, *held_out], run.study)
-    balanced = with_known_wrench(read.recordings, base)
-    flown = tuple(of_vehicle(read.recordings, base)) if has_effects(base) else tuple(balanced)
+    balanced = with_known_wrench(read.flights, base)
+    flown = tuple(of_vehicle(read.flights, base)) if has_effects(base) else tuple(balanced)
     split = split_flights(balanced[: len(flights)], balanced[len(flights) :], run.study.gap)
     # Those held out are behind those learned from, whoever chose them.
     refuse_seen(files[: len(split.training)], files[len(split.training) :])
-    return Recordings(flown[: len(flights)], (*seen_twice(files), *read.warnings)), split
+    return FlightSet(flown[: len(flights)], (*seen_twice(files), *read.warnings)), split
 
 
 def _next(run: Run, found: Gap, flights: Sequence[Path], model: Path | None) -> Command:

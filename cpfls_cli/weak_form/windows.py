@@ -85,19 +85,6 @@ def windows(period: float, window_s: float, overlap: float) -> Windows:
     return Windows(shape / shape.sum(), slope, max(1, round(samples * (1 - overlap))), period)
 
 
-@dataclass(frozen=True)
-class Recording:
-    """A flight and its name, and the stamp of its log's own clock at time 0, s; NaN where there is none.
-
-    `slow_rotors`: what cannot be found where its log holds the rotors rarely, and the remedy; empty elsewhere.
-    """
-
-    name: str
-    signals: Signals
-    begins: float = np.nan
-    slow_rotors: str = ""
-
-
 class WindowSettings(Protocol):
     """Length of windows in s, and the share that neighbours have in common."""
 
@@ -115,29 +102,29 @@ def fitting_windows(period: float, settings: WindowSettings) -> Windows:
     return windows(period, max(settings.window_s, FEWEST_SAMPLES * period), settings.overlap)
 
 
-def common_windows(recordings: Sequence[Recording], settings: WindowSettings) -> Windows:
+def common_windows(flights: Sequence[Signals], settings: WindowSettings) -> Windows:
     """Make the windows that all flights share.
 
     Raises InputError if a flight is too short or has another sampling period than the first.
     """
-    period = recordings[0].signals.period
-    for recording in recordings:
-        other = recording.signals.period
+    period = flights[0].period
+    for flight in flights:
+        other = flight.period
         if abs(other - period) > _SAME_RATE * period:
             raise InputError(
-                f"{recording.name}: sampled at {1 / other:.6g} Hz, {recordings[0].name} at {1 / period:.6g} Hz; set "
+                f"{flight.name}: sampled at {1 / other:.6g} Hz, {flights[0].name} at {1 / period:.6g} Hz; set "
                 "import.rate_hz to one rate for all flights"
             )
-    shortest = min(recordings, key=lambda recording: len(recording.signals))
-    if settings.window_s > len(shortest.signals) * period:
+    shortest = min(flights, key=len)
+    if settings.window_s > len(shortest) * period:
         raise InputError(
-            f"gap.window_s = {settings.window_s:g}: longer than {shortest.name}, {len(shortest.signals) * period:.3g} s"
+            f"gap.window_s = {settings.window_s:g}: longer than {shortest.name}, {len(shortest) * period:.3g} s"
         )
     shared = windows(period, settings.window_s, settings.overlap)
-    for recording in recordings:
-        if shared.count(len(recording.signals)) < FEWEST_WINDOWS:
+    for flight in flights:
+        if shared.count(len(flight)) < FEWEST_WINDOWS:
             raise InputError(
-                f"{recording.name}: {len(recording.signals) * period:.3g} s are too short; "
+                f"{flight.name}: {len(flight) * period:.3g} s are too short; "
                 f"{FEWEST_WINDOWS} windows of gap.window_s = {settings.window_s:g} s are needed"
             )
     return shared

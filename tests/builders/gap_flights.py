@@ -88,5 +88,5 @@ def fly(seed, effects=(), *, gyro=0.0, rotor=0.0, **given):
     )
 
 
-def weak(signals, *, force=False, name="flight", model=None, through=THROUGH):
-    return weak_flight(name, signals, through, model, force)
+def weak(signals, *, force=False, model=None, through=THROUGH):
+    return weak_flight(signals, through, model, force)

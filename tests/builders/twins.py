@@ -50,7 +50,7 @@ def flown(seconds=12.0, seed=3, gusts=True, inertia_x=1.0):
         vehicle=CROSS,
         setpoints={"attitude": attitude, "thrust": thrust[:, None]},
     )
-    return LoggedFlight.of("flight", signals)
+    return LoggedFlight.of(replace(signals, name="flight"))
 
 
 def twin_found():

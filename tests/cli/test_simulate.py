@@ -236,8 +236,8 @@ def test_readers_of_flights_give_what_is_known_throughout(cpfls, flown, tmp_path
         cpfls.done("import", config, log, "-o", path)
     study = load_study(config)
     (played,) = flights_to_play([path], study)
-    recording = read_flights([path], study).recordings[0]
-    for setpoints in (played.parts[0].setpoints, played.playback.setpoints, recording.signals.setpoints):
+    flight = read_flights([path], study).flights[0]
+    for setpoints in (played.parts[0].setpoints, played.playback.setpoints, flight.setpoints):
         assert list(setpoints) == ["attitude"], "the thrust is not asked for throughout"
         np.testing.assert_allclose(setpoints["attitude"][:, 0], columns["roll_sp"], atol=1e-12)
     assert len(played.parts[0]) == SAMPLES

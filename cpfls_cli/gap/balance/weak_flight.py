@@ -22,7 +22,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.innovations import PER_WINDOW
-from cpfls_cli.weak_form.windows import Recording, Windows
+from cpfls_cli.weak_form.windows import Windows
 
 TURNING = 4.0  # Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth.
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
@@ -53,7 +53,6 @@ class Candidate(NamedTuple):
 class WeakFlight:
     """A flight with its inertial torque and force."""
 
-    name: str
     signals: Signals
     windows: Windows
     # Momentum and direct terms of inertial torque and force of the model, shape (time, 6); 0 where unknown.
@@ -80,6 +79,11 @@ class WeakFlight:
 
     def __len__(self) -> int:
         return self.windows.count(len(self.signals))
+
+    @property
+    def name(self) -> str:
+        """Name of the flight."""
+        return self.signals.name
 
     def residual(self, signals: Signals) -> Columns:
         """Subtract what the rotors do from the inertial side.
@@ -159,7 +163,6 @@ def _whitened(whitening: Array, rows: Array) -> Array:
 
 
 def weak_flight(
-    name: str,
     signals: Signals,
     windows: Windows,
     model: InertiaModel | None,
@@ -183,7 +186,7 @@ def weak_flight(
         known = np.array([signals.torque is not None and axis in axes for axis in "xyz"] + [with_force] * 3)
         everything = np.ones(len(nuisance().effect.coefficients))
         cut_off = channel_cut_offs(signals, model is not None)
-        flight = WeakFlight(name, signals, windows, inertial, known, everything, cut_off)
+        flight = WeakFlight(signals, windows, inertial, known, everything, cut_off)
         noise = noise_floor(flight.residual(signals), windows, cut_off) if floor is None else floor
         # Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to lose the noise
         # of the gyroscope, which is not what anybody asked.
@@ -192,7 +195,7 @@ def weak_flight(
 
     # Each stage rebuilds its model, and a flight is planned once.
     shared = model is None and floor is None
-    return signals.once((weak_flight, name, windows, force, tuple(axes)), make) if shared else make()
+    return signals.once((weak_flight, windows, force, tuple(axes)), make) if shared else make()
 
 
 @lru_cache(maxsize=64)
@@ -276,13 +279,13 @@ class Preparation:
     settings: GapSettings
     audit: Audit  # Faults that are repaired.
 
-    def logged(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
+    def logged(self, flights: Sequence[Signals]) -> list[WeakFlight]:
         """Prepare flights with the faults of their sensors, but with channels that belong together."""
-        return [self._weak(recording.name, self.audit.consistent(recording.signals)) for recording in recordings]
+        return [self._weak(self.audit.consistent(each)) for each in flights]
 
-    def repaired(self, recordings: Sequence[Recording]) -> list[WeakFlight]:
+    def repaired(self, flights: Sequence[Signals]) -> list[WeakFlight]:
         """Prepare flights with the named faults of their sensors repaired."""
-        return [self._weak(recording.name, self.audit.repaired(recording.signals)) for recording in recordings]
+        return [self._weak(self.audit.repaired(each)) for each in flights]
 
-    def _weak(self, name: str, signals: Signals) -> WeakFlight:
-        return weak_flight(name, signals, self.windows, self.model, self.settings.force, self.settings.axes)
+    def _weak(self, signals: Signals) -> WeakFlight:
+        return weak_flight(signals, self.windows, self.model, self.settings.force, self.settings.axes)

@@ -67,7 +67,9 @@ class Logging:
         """Arrange a flight for the balance."""
         settings = self.settings
         shared = windows(signals.period, settings.window_s, settings.overlap)
-        flight = weak_flight("next flight", signals, shared, self.base, settings.force, settings.axes, self.floor)
+        flight = weak_flight(
+            replace(signals, name="next flight"), shared, self.base, settings.force, settings.axes, self.floor
+        )
         return flight if self.air is None else self.air.around([flight], self.floor)[0]
 
 
@@ -91,6 +93,7 @@ def _signals(
         time=time,
         body_rate=motion["body_rate"],
         vehicle=vehicle,
+        name="next flight",
         attitude=motion["attitude"],
         position=motion["position"],
         velocity=motion["velocity"],

@@ -8,6 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.gap.balance.balance_system import System, floors, residual_along
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
@@ -33,7 +34,7 @@ from cpfls_cli.playback.instruments import (
     past_setpoints,
 )
 from cpfls_cli.weak_form.resampling import about_flight_mean
-from cpfls_cli.weak_form.windows import Recording, Windows
+from cpfls_cli.weak_form.windows import Windows
 
 _PREDICTED = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": MOST_PREDICTED}
 """Largest share of the residual, at 95 %, that instruments predict of the air. Other runs show all that is
@@ -110,21 +111,20 @@ class Air:
         return np.where(self.split, np.sqrt(alone), np.inf)
 
 
-def known_motion(recordings: Sequence[Recording]) -> Instruments:
+def known_motion(flights: Sequence[Signals]) -> Instruments:
     """Find what of flights was asked for from outside of their loops; a copy of a flight repeats none.
 
     Flights that were asked to stay where they are, and did, were asked for nothing that moves.
     """
-    key = (known_motion, *((each.name, each.signals) for each in recordings))
-    return recordings[0].signals.once(key, lambda: _known_motion(recordings))
+    return flights[0].once((known_motion, *flights), lambda: _known_motion(flights))
 
 
-def _known_motion(recordings: Sequence[Recording]) -> Instruments:
-    flights = [LoggedFlight.of(each.name, each.signals).playback for each in recordings]
+def _known_motion(recorded: Sequence[Signals]) -> Instruments:
+    flights = [LoggedFlight.of(each).playback for each in recorded]
     given = instruments(flights)
     if given.kind == "none" and all(held(flight) for flight in flights):
         given = replace(given, setpoints=tuple(np.ones((len(run), 1)) for run in given.flown), names=("position",))
-    different = set(without_copies(recordings))
+    different = set(without_copies(recorded))
     copies = {number for number, run in enumerate(given.runs) if run.flight not in different}
     known = tuple(
         {} if number in copies else {other: place for other, place in each.items() if other not in copies}

@@ -13,6 +13,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS, block_length, half_width, jackknife_error
 from cpfls_cli.dynamics import inertia_tensor
 from cpfls_cli.effects.effect import Columns
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, negligible, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.settings import COUNTS
@@ -20,7 +21,7 @@ from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, fitting_b
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.result import about, result
-from cpfls_cli.weak_form.windows import Recording, Windows
+from cpfls_cli.weak_form.windows import Windows
 
 _SURE = 1 - 0.05 / 36
 """Confidence from which on something is repeatable: of 36 numbers, chance shall pass none in 95 %."""
@@ -213,16 +214,16 @@ class RepeatedRuns:
     bands: tuple[Band, ...]
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording], unseen: int = 0) -> Self | None:
+    def of(cls, recorded: Sequence[Signals], unseen: int = 0) -> Self | None:
         """Find the runs of a path among flights.
 
-        `recordings`: of one sampling period.
+        `recorded`: of one sampling period.
         `unseen`: how many of them, the last ones, no fit has seen: only pairs with one of these are taken, where there
         are any.
         None where no flight repeats another.
         """
-        different = list(without_copies(recordings))
-        flights = [LoggedFlight.of(each.name, each.signals).playback for each in recordings]
+        different = list(without_copies(recorded))
+        flights = [LoggedFlight.of(each).playback for each in recorded]
         given = instruments(flights)
         runs = given.runs
         pairs = [
@@ -231,12 +232,12 @@ class RepeatedRuns:
             for pair in permutations(path, 2)
             if pair[1] in given.repeats.places[pair[0]] and all(runs[each].flight in different for each in pair)
         ]
-        seen = len(recordings) - unseen
+        seen = len(recorded) - unseen
         judged = [pair for pair in pairs if any(runs[each].flight >= seen for each in pair)]
-        bands = tuple(_bands(recordings[0].signals.period))
+        bands = tuple(_bands(recorded[0].period))
         if not pairs or not bands:
             return None
-        return cls(tuple(each.name for each in recordings), given, tuple(judged or pairs), bands)
+        return cls(tuple(each.name for each in recorded), given, tuple(judged or pairs), bands)
 
     def split(self, hypothesis: System, linear: Array) -> Repeatability | None:
         """Split the residual of the balance into its repeatable part and the rest.
@@ -324,10 +325,10 @@ def _with_errors(sums: Array) -> Array:
     return np.array([shares(whole), jackknife_error(shares(whole - sums))])
 
 
-def without_copies(recordings: Sequence[Recording]) -> Iterator[int]:
+def without_copies(flights: Sequence[Signals]) -> Iterator[int]:
     """Give the numbers of flights without copies: in a copy noise is repeatable, too."""
-    for number, each in enumerate(recordings):
-        if not any(np.array_equal(each.signals.body_rate, one.signals.body_rate) for one in recordings[:number]):
+    for number, each in enumerate(flights):
+        if not any(np.array_equal(each.body_rate, one.body_rate) for one in flights[:number]):
             yield number
 
 

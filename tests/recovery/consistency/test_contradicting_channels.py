@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.diagnosis import Extended
 from cpfls_cli.consistency.check import audit
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.weak_form.windows import Recording, windows
+from cpfls_cli.weak_form.windows import windows
 from tests.builders import gap_artifacts
 from tests.builders.closed_loop_flights import COARSE, PERIOD, flown, signals_of
 
@@ -342,7 +342,7 @@ def test_repairs_come_back_from_an_artifact(flights, tmp_path):
 
 
 def answer(training, held):
-    recordings = [Recording("training", training)], [Recording("held out", held)]
+    recordings = [replace(training, name="training")], [replace(held, name="held out")]
     return diagnose(*recordings, GapSettings(), np.random.default_rng(1)).diagnosis
 
 

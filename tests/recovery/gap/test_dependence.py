@@ -53,7 +53,7 @@ def wandering_flight(rng, unknown):
 def test_the_signal_that_an_unknown_torque_follows_is_named(signal):
     rng = np.random.default_rng(7)
     flights = [wandering_flight(rng, UNKNOWN[signal]) for _ in range(3)]
-    weak = [weak_flight("one", signals, WINDOWS, None, force=False) for signals in flights]
+    weak = [weak_flight(signals, WINDOWS, None, force=False) for signals in flights]
     residual = np.concatenate([w.averaged(w.residual(s)) for w, s in zip(weak, flights, strict=True)])
     flight_index = np.repeat(np.arange(3), [len(w) for w in weak])
     block = blocks_of(flight_index, np.concatenate([w.windows.centres(TIME) for w in weak]), 4.0)

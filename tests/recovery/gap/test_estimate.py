@@ -16,7 +16,6 @@ from cpfls_cli.gap.naming.open_questions import with_unnamed
 from cpfls_cli.gap.naming.ranking import best_floor, block_index, rank_effects
 from cpfls_cli.gap.naming.search import forward_selection
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.weak_form.windows import Recording
 from tests.builders.closed_loop_flights import flown, signals_of
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
@@ -162,7 +161,7 @@ def test_rotors_that_are_logged_rarely_accuse_no_log_of_reversed_yaw(slow, accus
     reversed_yaw = replace(VEHICLE, rotors=tuple(replace(rotor, spin=-rotor.spin) for rotor in VEHICLE.rotors))
     flights = [noisy(fly(seed), np.random.default_rng(seed)) for seed in (1, 2, 3)]
     recordings = [
-        Recording(f"flight {number}", replace(each, vehicle=reversed_yaw), slow_rotors=slow)
+        replace(each, vehicle=reversed_yaw, name=f"flight {number}", slow_rotors=slow)
         for number, each in enumerate(flights)
     ]
     few = GapSettings(shifts=39)

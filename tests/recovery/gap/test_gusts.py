@@ -18,7 +18,7 @@ from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.disturbance import gusts_in
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 from tests.builders.gusty_flights import CALM, GRAVITY, GUSTS, MEMORY_S, SMALL, STORM, Flight, gusty_flights, logged
 
 HEAVY = 1.15
@@ -47,7 +47,7 @@ def flown():
 def recorded(flights, vehicle, *, setpoints, commanded=False):
     known = [each if setpoints else replace(each, setpoints={}) for each in flights]
     parts = [logged(each, vehicle, commanded=commanded).parts[0] for each in known]
-    return [Recording(flight.name, signals) for flight, signals in zip(flights, parts, strict=True)]
+    return [replace(signals, name=flight.name) for flight, signals in zip(flights, parts, strict=True)]
 
 
 def heavier(vehicle):
@@ -66,7 +66,7 @@ def tells_sizes(found):
 
 def in_what_is_left(recordings):
     windows, model = common_windows(recordings, FEW), plain(None)
-    hypothesis = model.system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
+    hypothesis = model.system([weak_flight(each, windows, None, force=True) for each in recordings])
     block = block_index(hypothesis, FEW)
     found = air(hypothesis, model.linear, block, known_motion(recordings), FEW)
     assert found is not None
@@ -139,7 +139,7 @@ def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
 def test_what_instruments_identify_hangs_on_no_inertia_that_a_loop_gave_a_fit(flown):
     recordings = recorded(flown["asked"], TRUE.vehicle, setpoints=True)
     windows = common_windows(recordings, FEW)
-    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    flights = [weak_flight(each, windows, None, force=True) for each in recordings]
     found = fitted(flights, [], best_floor(system(flights)), FEW)
     # Inertia, and couplings of rates that no instrument moves.
     of_loop = found.estimates.linear + np.repeat([-0.3, 0.7, 0.0], [3, 3, 4])
@@ -158,7 +158,7 @@ def test_a_number_that_instruments_moved_has_the_error_that_it_was_moved_with(fl
     """The past predicts innovations of a residual that a wrong inertia makes, and none of what is left without it."""
     recordings = recorded(flown["asked"], heavier(TRUE.vehicle), setpoints=True)
     windows = common_windows(recordings, FEW)
-    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    flights = [weak_flight(each, windows, None, force=True) for each in recordings]
     found = fitted(flights, [], best_floor(system(flights)), FEW)
     calls = []
 
@@ -179,7 +179,7 @@ def test_blocks_of_a_run_follow_each_other_in_time(flown, kind):
     """Errors by neighbouring blocks compare blocks of one run: numbers of several runs may not alternate."""
     recordings = recorded(flown[kind], TRUE.vehicle, setpoints=kind == "asked")
     windows = common_windows(recordings, FEW)
-    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    flights = [weak_flight(each, windows, None, force=True) for each in recordings]
     found = fitted(flights, [], np.ones(6), FEW)
     of_paths, of_runs = _windows_of_runs(found, known_motion(recordings))
     for runs in (of_runs, of_paths):
@@ -206,7 +206,7 @@ def test_gusts_alone_are_no_gap(flown, setpoints, instrument_kind):
 @pytest.mark.filterwarnings("error")
 def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setpoints):
     known = recorded(flown[kind], TRUE.vehicle, setpoints=setpoints)
-    found = in_what_is_left([replace(each, signals=replace(each.signals, velocity=None)) for each in known])
+    found = in_what_is_left([replace(each, velocity=None) for each in known])
     assert found.gusts_only.tolist() == [True] * 3 + [False] * 3
     tells_sizes(found.found)
     assert np.isnan(found.found.size[3:]).all()

@@ -41,7 +41,7 @@ def found(seed, amplitude, lead=0.0):
     residual, rates = [], []
     for _ in range(3):
         signals = flight_with_periodic_torque(rng, amplitude, lead)
-        weak = weak_flight("one", signals, WINDOWS, None, force=False)
+        weak = weak_flight(signals, WINDOWS, None, force=False)
         residual.append(weak.averaged(weak.residual(signals)))
         rates.append(WINDOWS.average(signals.body_rate))
     return narrow_band(residual, rates, HOP, 99, rng)

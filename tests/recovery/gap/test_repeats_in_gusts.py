@@ -1,5 +1,7 @@
 """What of a gap comes again in gusts, on flights of known truth: drag and damping that no config states, or none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.extended import plain
 from cpfls_cli.gap.residual.repeated import RepeatedRuns
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 from tests.builders.gusty_flights import CALM, GUSTS, SMALL, STORM, Flight, gusty_flights, logged
 
 LACKS = SMALL._replace(drag=0.1, damping=6e-5)
@@ -38,9 +40,9 @@ def found():
 
 
 def split(flown):
-    recordings = [Recording(flight.name, logged(flight, SMALL.vehicle).parts[0]) for flight in flown]
+    recordings = [replace(logged(flight, SMALL.vehicle).parts[0], name=flight.name) for flight in flown]
     windows, model = common_windows(recordings, GapSettings()), plain(None)
-    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    flights = [weak_flight(each, windows, None, force=True) for each in recordings]
     return RepeatedRuns.of(recordings).split(model.system(flights), model.linear)
 
 

@@ -13,7 +13,7 @@ from cpfls_cli.gap.naming.ranking import best_floor
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.residual.rotor_loss import rotor_losses
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 from tests.builders.gusty_flights import CALM, GUSTS, SMALL, Flight, gusty_flights, logged
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
@@ -38,7 +38,7 @@ def logged_faster(signals, loss):
 def recorded(flights, loss):
     """Recordings in which rotors lose thrust, by what gives shares of the flight's number and its times."""
     return [
-        Recording(name, logged_faster(signals, loss(at, signals.time))) for at, (name, signals) in enumerate(flights)
+        replace(logged_faster(signals, loss(at, signals.time)), name=name) for at, (name, signals) in enumerate(flights)
     ]
 
 
@@ -75,7 +75,7 @@ def test_a_propeller_that_loses_a_piece_is_found(flown, air, share, flight):
 def test_what_no_single_rotor_does_at_once_is_none(flown, air, loss):
     recordings = recorded(flown[air], loss)
     windows = common_windows(recordings, FEW)
-    every = system([weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings])
+    every = system([weak_flight(each, windows, None, force=True) for each in recordings])
     floor = best_floor(every)
     assert list(rotor_losses(every, fit(every, floor), floor, FEW, np.random.default_rng(1))) == []
 
@@ -86,11 +86,11 @@ def test_rotors_that_stand_still_identify_nothing(flown, stopped, rotors):
     recordings = recorded(flown["calm"], one_rotor(0.04, 0, 0))
     still = []
     for each in recordings:
-        speed = each.signals.rotor_speed.copy()
-        speed[stopped(each.signals.time), rotors] = 0.0
-        still.append(replace(each, signals=replace(each.signals, rotor_speed=speed)))
+        speed = each.rotor_speed.copy()
+        speed[stopped(each.time), rotors] = 0.0
+        still.append(replace(each, rotor_speed=speed))
     windows = common_windows(still, FEW)
-    every = system([weak_flight(each.name, each.signals, windows, None, force=True) for each in still])
+    every = system([weak_flight(each, windows, None, force=True) for each in still])
     floor = best_floor(every)
     rng = np.random.default_rng(1)
     found = list(rotor_losses(every, fit(every, floor), floor, FEW, rng))

@@ -70,7 +70,7 @@ def simulated(model, number):
     signals = measure(path.time, planned, model.vehicle, settings, rng, model=model).signals
     names = ("body_rate", "attitude", "velocity", "position", "rotor_speed")
     logged = Signals(time=path.time, vehicle=model.vehicle, **{name: signals[name] for name in names})
-    return LoggedFlight.of(f"simulated-{number}", logged).playback
+    return LoggedFlight.of(replace(logged, name=f"simulated-{number}")).playback
 
 
 @pytest.mark.parametrize("key", [key for key in SETS if key[0] != "still"])

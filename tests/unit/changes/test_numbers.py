@@ -10,7 +10,6 @@ from cpfls_cli.changes.numbers import KINDS, flight_numbers, in_flight
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.lag import delayed
-from cpfls_cli.weak_form.windows import Recording
 from tests.builders.changed_flights import WEAK, flight_table
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
 
@@ -27,8 +26,8 @@ LOAD = {
 
 
 def recorded(vehicle=VEHICLE, seed=1, **closed_loop):
-    return Recording(
-        "flight.h5", signals_of(flown(duration=12.0, seed=seed, vehicle=vehicle, noise=NOISE, **closed_loop))
+    return replace(
+        signals_of(flown(duration=12.0, seed=seed, vehicle=vehicle, noise=NOISE, **closed_loop)), name="flight.h5"
     )
 
 
@@ -90,13 +89,13 @@ def test_a_load_on_a_cable():
 def test_an_unbalanced_rotor_above_half_of_the_rate():
     """It turns 55 times a second in a log of 100 Hz: by its speed it is known where it stands."""
     flight = recorded()
-    signals = flight.signals
+    signals = flight
     assert signals.rotor_speed.mean() / (2 * np.pi) > 0.5 / PERIOD
     speed = signals.rotor_speed * [1.0, 1.1, 0.95, 1.05]
     turns = PERIOD * (np.cumsum(speed[:, 1]) - 0.5 * speed[:, 1])
     pull = 0.5 * np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
     still, shaken = (
-        np.exp([flight_numbers(Recording("flight.h5", each)).values[f"unbalance M{index}"] for index in range(1, 5)])
+        np.exp([flight_numbers(replace(each, name="flight.h5")).values[f"unbalance M{index}"] for index in range(1, 5)])
         for each in (replace(signals, rotor_speed=speed, acceleration=signals.acceleration + x * pull) for x in (0, 1))
     )
     assert still.max() < 0.1
@@ -107,12 +106,12 @@ def test_an_unbalanced_rotor_above_half_of_the_rate():
 
 def test_rotors_that_turn_nearly_alike_are_told_apart():
     """Speeds 1.5 Hz apart, of which one shakes: alone it would be felt by the other too."""
-    signals = recorded().signals
+    signals = recorded()
     speed = 2 * np.pi * np.array([105.0, 106.5, 111.0, 118.0]) * np.ones((len(signals), 1))
     turns = PERIOD * (np.cumsum(speed[:, 1]) - 0.5 * speed[:, 1])
     pull = 0.5 * np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
     shaken = replace(signals, rotor_speed=speed, acceleration=0.01 * signals.acceleration + pull)
-    values = flight_numbers(Recording("flight.h5", shaken)).values
+    values = flight_numbers(replace(shaken, name="flight.h5")).values
     amplitudes = np.exp([values[f"unbalance M{index}"] for index in range(1, 5)])
     assert amplitudes[1] == pytest.approx(0.5 * np.sqrt(2), rel=0.1)
     assert amplitudes[[0, 2, 3]].max() < 0.15 * amplitudes[1]
@@ -120,10 +119,10 @@ def test_rotors_that_turn_nearly_alike_are_told_apart():
 
 def test_what_turns_105_times_a_second_vibrates_in_a_log_of_100_hz():
     """There it seems to swing five times a second."""
-    signals = recorded().signals
+    signals = recorded()
     turns = 2 * np.pi * (1 / PERIOD + 5.0) * signals.time
     felt = np.stack([0.5 * np.cos(turns), 0.5 * np.sin(turns), 9.81 + 0 * turns], axis=1)
-    values = flight_numbers(Recording("flight.h5", replace(signals, specific_force=felt))).values
+    values = flight_numbers(replace(signals, specific_force=felt, name="flight.h5")).values
     across = np.exp([values[f"vibration accelerometer {axis}"] for axis in "xy"])
     assert across == pytest.approx(np.full(2, 0.5 / np.sqrt(2)), rel=0.15)
 
@@ -131,17 +130,17 @@ def test_what_turns_105_times_a_second_vibrates_in_a_log_of_100_hz():
 def test_too_short_and_without_rotors():
     flight = recorded()
     few = round(3.0 / PERIOD)
-    parts = {name: getattr(flight.signals, name)[:few] for name in ("time", "body_rate", "attitude", "rotor_speed")}
-    short = replace(flight.signals, **parts, velocity=None, position=None, acceleration=None)
+    parts = {name: getattr(flight, name)[:few] for name in ("time", "body_rate", "attitude", "rotor_speed")}
+    short = replace(flight, **parts, velocity=None, position=None, acceleration=None)
     with pytest.raises(InputError, match="flies for 3 s"):
-        flight_numbers(Recording("short.csv", short))
+        flight_numbers(replace(short, name="short.csv"))
     with pytest.raises(InputError, match="has no rotor_speed or rotor_command"):
-        flight_numbers(Recording("none.csv", replace(flight.signals, rotor_speed=None)))
+        flight_numbers(replace(flight, rotor_speed=None, name="none.csv"))
 
 
 def test_the_ground_is_no_flight():
     """Five seconds of idling before: not flown, nor half a second beside it."""
-    signals = recorded().signals
+    signals = recorded()
     idle = signals.rotor_speed.copy()
     idle[:500] *= 0.2
     flies = in_flight(replace(signals, rotor_speed=idle, position=None))
@@ -151,7 +150,7 @@ def test_the_ground_is_no_flight():
 
 def test_throttle_cuts_of_acrobatic_flight_are_flight():
     """As the import has it: a second of each three with the throttle cut, in which the vehicle turns."""
-    signals = recorded().signals
+    signals = recorded()
     cut = np.mod(signals.time, 3.0) > 2.0
     speed = np.where(cut[:, None], 0.05, 1.0) * signals.rotor_speed
     turns = signals.body_rate + 3.0 * np.sin(5 * signals.time)[:, None] * [1.0, 1.0, 0.0]
@@ -168,7 +167,7 @@ def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():
         signals = Signals(
             time=time, vehicle=VEHICLE, body_rate=np.stack(columns[:3], axis=1), rotor_speed=speed, commanded=True
         )
-        result = flight_numbers(Recording("flight.csv", signals)).values
+        result = flight_numbers(replace(signals, name="flight.csv")).values
         return np.array([result["gain roll"], result["gain pitch"]])
 
     less = follows(*WEAK) - follows(1.0, 1.0, 1.0, 1.0)
@@ -177,12 +176,12 @@ def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():
 
 def test_a_lean_against_wind_is_no_fault_of_the_accelerometer():
     """It feels gravity along its own axes however it leans; what it feels beside is its own, ahead and to the left."""
-    signals = recorded().signals
+    signals = recorded()
     leans = np.array([0.1, -0.15, 2.0]) + np.zeros((len(signals), 3))
     tilted = replace(signals, attitude=leans)
     feels = np.einsum("tji,j->ti", tilted.rotation, [0.0, 0.0, 9.81])
     calm, biased = (
-        flight_numbers(Recording("flight.h5", replace(tilted, specific_force=feels + bias))).values
+        flight_numbers(replace(tilted, specific_force=feels + bias, name="flight.h5")).values
         for bias in (np.zeros(3), np.array([0.1, 0.2, 0.3]))
     )
     assert [calm[f"felt {axis}"] for axis in "xyz"] == pytest.approx(np.zeros(3), abs=1e-9)
@@ -191,22 +190,20 @@ def test_a_lean_against_wind_is_no_fault_of_the_accelerometer():
 
 def test_how_late_a_rotor_answers():
     """Speeds that are those of the flight 24 ms ago, but of one rotor 34 ms."""
-    signals = recorded().signals
+    signals = recorded()
     late = np.array([0.024, 0.024, 0.034, 0.024])
     speed = np.stack(
         [delayed(own[:, None], each / PERIOD)[:, 0] for own, each in zip(signals.speed.T, late, strict=True)], axis=1
     )
-    result = flight_numbers(
-        Recording("flight.h5", replace(signals, rotor_speed=speed, rotor_command=signals.speed))
-    ).values
+    result = flight_numbers(replace(signals, rotor_speed=speed, rotor_command=signals.speed, name="flight.h5")).values
     assert [result[f"lag M{index}"] for index in range(1, 5)] == pytest.approx(late, abs=0.002)
 
 
 def test_a_gyroscope_of_another_scale(usual):
     """Beside an attitude that is right; about one axis."""
     flight = recorded()
-    rates = flight.signals.body_rate * [1.1, 1.0, 1.0]
-    result = flight_numbers(Recording("flight.h5", replace(flight.signals, body_rate=rates)))
+    rates = flight.body_rate * [1.1, 1.0, 1.0]
+    result = flight_numbers(replace(flight, body_rate=rates, name="flight.h5"))
     more = [result.values[f"scale {axis}"] - usual.values[f"scale {axis}"] for axis in "xyz"]
     assert more == pytest.approx([np.log(1.1), 0.0, 0.0], abs=1e-3)
     assert abs(usual.values["scale x"]) < 0.02

@@ -260,7 +260,7 @@ def test_a_voltage_that_no_battery_has_is_not_used_and_said(tmp_path, unit, volt
     path = driven(tmp_path / "flight.h5", unit=unit, voltage=voltage)
     if read is recordings.read_flights:
         found = read([path], Study())
-        parts, warnings = [each.signals for each in found.recordings], found.warnings
+        parts, warnings = list(found.flights), found.warnings
     else:
         (found,) = read([path], Study())
         parts, warnings = found.parts, found.warnings

@@ -61,9 +61,7 @@ def test_of_gusts_and_noise_the_rows_before_leave_innovations_alike_and_independ
     rng, count = np.random.default_rng(5), WINDOWS.count(round(seconds / PERIOD))
     noise = rng.standard_normal((2, 4000, round(seconds / PERIOD)))
     rows = averages(seconds, 4000).T + WINDOWS.average(flat * noise[0].T) + WINDOWS.derivative(sloping * noise[1].T)
-    flight = WeakFlight(
-        "gusty", None, WINDOWS, None, np.ones(6, dtype=bool), np.ones(10), lasting=air.lasting(WINDOWS, count)
-    )
+    flight = WeakFlight(None, WINDOWS, None, np.ones(6, dtype=bool), np.ones(10), lasting=air.lasting(WINDOWS, count))
     # A channel without gusts keeps its rows.
     white = flight.innovations.of_channels(np.repeat(rows[:, None], 6, axis=1))
     np.testing.assert_array_equal(white[:, 5], rows)
@@ -89,6 +87,6 @@ def test_rows_of_long_flights_are_predicted_from_as_many_as_a_gust_lasts():
     lasting = air.lasting(WINDOWS, count)
     assert lasting.shape[1] < count / 5
     np.testing.assert_allclose(lasting[0], covariance[0, : lasting.shape[1]] / covariance[0, 0], rtol=1e-9)
-    flight = WeakFlight("gusty", None, WINDOWS, None, np.ones(6, dtype=bool), np.ones(10), lasting=lasting)
+    flight = WeakFlight(None, WINDOWS, None, np.ones(6, dtype=bool), np.ones(10), lasting=lasting)
     whitened = flight.innovations.of_channels(np.repeat(np.eye(count)[:, None], 6, axis=1))[:, 0]
     np.testing.assert_allclose(whitened @ covariance @ whitened.T / covariance[0, 0], np.eye(count), atol=1e-3)

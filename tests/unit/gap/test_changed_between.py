@@ -1,11 +1,12 @@
 """Held-out flights of another vehicle than the training flights: said to be, whatever no effect explains of both."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap import diagnose
-from cpfls_cli.weak_form.windows import Recording
 from tests.builders.closed_loop_flights import flown, signals_of
 from tests.builders.drawn_numbers import flight_of
 
@@ -27,7 +28,7 @@ def result(monkeypatch):
 
     monkeypatch.setattr(diagnose, "flight_numbers", numbers)
     return lambda *names: diagnose._changed_between(
-        [Recording(name, signals) for name in names[:-1]], [Recording(names[-1], signals)]
+        [replace(signals, name=name) for name in names[:-1]], [replace(signals, name=names[-1])]
     )
 
 
@@ -54,5 +55,5 @@ def test_nothing_is_said_without_rotors(monkeypatch):
         raise InputError("has no rotor_speed")
 
     monkeypatch.setattr(diagnose, "flight_numbers", refuse)
-    flight = Recording("flight.h5", signals_of(flown()))
+    flight = replace(signals_of(flown()), name="flight.h5")
     assert diagnose._changed_between([flight, flight], [flight]) == ()

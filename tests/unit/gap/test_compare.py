@@ -16,7 +16,6 @@ from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording
 from tests.builders.gap_artifacts import named_effect
 
 VEHICLE = VehicleSettings()
@@ -39,7 +38,7 @@ def recording_of_sines(seed, extra=None, seconds=24.0):
     missing = np.zeros_like(torque) if extra is None else extra(time, rate)
     noisy = rate + rng.normal(0, NOISE, rate.shape)
     signals = Signals(time=time, body_rate=noisy, vehicle=VEHICLE, stated_torque=torque - missing)
-    return Recording(f"flight {seed}", signals)
+    return replace(signals, name=f"flight {seed}")
 
 
 def bias(time, _rate):
@@ -112,14 +111,14 @@ def test_model_with_the_effect_leaves_the_noise():
 
 
 def test_effect_wrench_is_the_torque_by_hand():
-    signals = recording_of_sines(3).signals
+    signals = recording_of_sines(3)
     torque = effect_wrench(with_effect("linear_damping", 0.1, 0.2, 0.3), signals)
     assert torque[:, :3] == pytest.approx(-signals.body_rate * [0.1, 0.2, 0.3])
     assert not torque[:, 3:].any()
 
 
 def test_momentum_of_an_effect_is_differentiated():
-    signals = recording_of_sines(3).signals
+    signals = recording_of_sines(3)
     time = signals.time
     speed = 350 + 20 * np.sin(2 * np.pi * 0.7 * time)[:, None] * [1.0, -1.0, 1.0, -1.0]
     turning = replace(signals, rotor_speed=speed, stated_torque=None)
@@ -133,14 +132,14 @@ def test_momentum_of_an_effect_is_differentiated():
 def test_required_rotor_torque_is_that_of_the_motion_less_the_effect():
     recording = recording_of_sines(4, damping)
     model = with_effect("linear_damping", 0.12, 0.12, 0.12)
-    exact = replace(recording.signals, body_rate=_exact_rate(4))
+    exact = replace(recording, body_rate=_exact_rate(4))
     inside = slice(10, -10)
     required = rotation_balance(exact).along(exact.time) - effect_wrench(model, exact)[:, :3]
     assert required[inside] == pytest.approx(exact.stated_torque[inside], abs=2e-4)
 
 
 def test_refitted_inertia_changes_the_inertial_torque_in_proportion():
-    signals = replace(recording_of_sines(5).signals, body_rate=np.zeros((2400, 3)))
+    signals = replace(recording_of_sines(5), body_rate=np.zeros((2400, 3)))
     spun = replace(signals, body_rate=np.column_stack([0.4 * np.sin(2 * signals.time), *[0 * signals.time] * 2]))
     parameters = np.where(np.arange(len(plain(None).parameters)) == 0, 0.1, 0.0)
     model = whole_vehicle(ExtendedModel(None, parameters), VEHICLE)
@@ -185,8 +184,8 @@ def test_extension_refits_and_shrinks_the_unseen_gap():
 def rerun(draw, extra=None):
     """Fly path 1 once more: the same motion and torque, with noise of its own."""
     recording = recording_of_sines(1, extra)
-    noisy = _exact_rate(1) + np.random.default_rng([1, draw]).normal(0, NOISE, (len(recording.signals), 3))
-    return Recording(f"run {draw}", replace(recording.signals, body_rate=noisy))
+    noisy = _exact_rate(1) + np.random.default_rng([1, draw]).normal(0, NOISE, (len(recording), 3))
+    return replace(recording, body_rate=noisy, name=f"run {draw}")
 
 
 def test_what_is_repeatable_is_gone_with_the_effect():
@@ -216,7 +215,7 @@ def test_turned_gyroscope_is_repaired_before_anything_is_compared():
     """An attitude tells the audit that the gyroscope has a constant error, which no torque gets."""
 
     def seen(seed):
-        signals = recording_of_sines(seed).signals
+        signals = recording_of_sines(seed)
         exact = _exact_rate(seed)
         turns = Rotation.identity()
         angles = np.zeros((len(signals), 3))
@@ -225,7 +224,7 @@ def test_turned_gyroscope_is_repaired_before_anything_is_compared():
             angles[place] = turns.as_euler("ZYX")[::-1]
         noisy = np.unwrap(angles, axis=0) + np.random.default_rng(seed).normal(0, 0.002, angles.shape)
         biased = signals.body_rate + np.array([0.0, 0.02, 0.0])
-        return Recording("biased", replace(signals, attitude=noisy, body_rate=biased))
+        return replace(signals, attitude=noisy, body_rate=biased, name="biased")
 
     found = compared([seen(6), seen(7)])
     assert [finding.name for finding in found.audit.named] == ["gyro_bias"]

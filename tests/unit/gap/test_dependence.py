@@ -130,7 +130,7 @@ def test_shifted_residuals_keep_neighbours_together():
 def windowed_flight(**given):
     rate = np.column_stack([np.sin(TIME), np.cos(TIME), 0.1 * TIME])
     signals = Signals(time=TIME, body_rate=rate, vehicle=VEHICLE, **given)
-    return weak_flight("one", signals, windows(0.01, 0.4, 0.5), None, force=False), signals
+    return weak_flight(signals, windows(0.01, 0.4, 0.5), None, force=False), signals
 
 
 def test_a_full_flight_has_every_signal_and_a_bare_one_its_rates():

@@ -18,7 +18,6 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import made_ready, player_of
 from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.simulation.model import simulated_effects
-from cpfls_cli.weak_form.windows import Recording
 from tests.builders.closed_loop_flights import VEHICLE, flown, signals_of
 from tests.builders.playback_flights import mean_errors
 
@@ -51,7 +50,7 @@ def whole(*fitted, **numbers):
 
 
 def logged(*parts):
-    return replace(LoggedFlight.of("flight", parts[0]), parts=parts)
+    return replace(LoggedFlight.of(replace(parts[0], name="flight")), parts=parts)
 
 
 def played_back(model, signals, horizon=30):
@@ -145,7 +144,7 @@ class Repairing(NamedTuple):
 def test_before_and_after_are_those_of_each_model_alone():
     signals = signals_of(flown(effects={"linear_damping": {"d_x": 0.3, "d_y": 0.3, "d_z": 0.2}}))
     model, given = model_of({"linear_damping": {"d_x": 0.3, "d_y": 0.3, "d_z": 0.2}}), model_of({})
-    pairs = played_pairs([Recording("flight", signals)], model, given)
+    pairs = played_pairs([replace(signals, name="flight")], model, given)
     found = errors_by_horizon(pairs, 0.3)
     after, before = (played_back(each, signals)[0] for each in (model, given))
     for name in found.models[MODEL].signals:
@@ -160,11 +159,11 @@ def test_the_model_as_given_takes_the_log_with_its_faults():
     exact = signals_of(flown())
     faulty = replace(exact, body_rate=exact.body_rate + BIAS)
     model = replace(model_of({}), repairs=Repairing())
-    pairs = played_pairs([Recording("flight", faulty)], model, model_of({}))
+    pairs = played_pairs([replace(faulty, name="flight")], model, model_of({}))
     after, _, _, before = mean_errors(errors_by_horizon(pairs, 0.3), "attitude")[:, -1]
     assert before == pytest.approx(np.linalg.norm(BIAS) * 0.3, rel=0.2)
     assert after < 0.02 * before
-    stretch = worst_stretch(pairs, [Recording("flight", faulty)], 1.0, 2.0)
+    stretch = worst_stretch(pairs, [replace(faulty, name="flight")], 1.0, 2.0)
     np.testing.assert_allclose(stretch.measured, stretch.after, atol=1e-3)
     np.testing.assert_allclose((stretch.before - stretch.measured)[::100], np.tile(BIAS, (2, 1)), atol=1e-9)
     assert stretch.axis == 2
@@ -172,7 +171,7 @@ def test_the_model_as_given_takes_the_log_with_its_faults():
 
 @pytest.mark.parametrize(("horizon_s", "samples"), [(100.0, 295), (0.3, 30), (0.001, 1)])
 def test_a_horizon_is_in_seconds_and_within_the_flight(horizon_s, samples):
-    pairs = played_pairs([Recording("flight", signals_of(flown()))], *[model_of({})] * 2)
+    pairs = played_pairs([replace(signals_of(flown()), name="flight")], *[model_of({})] * 2)
     errors = mean_errors(errors_by_horizon(pairs, horizon_s), "body_rate")
     assert errors.shape == (4, samples)
     np.testing.assert_array_equal(errors[0], errors[3])
@@ -184,7 +183,7 @@ def test_the_worst_stretch_is_where_the_model_as_given_is_wrong():
     speed = exact.rotor_speed.copy()
     speed[burst, 0] *= 1.02
     signals = replace(exact, rotor_speed=speed)
-    recordings = [Recording("good", exact), Recording("wrong", signals)]
+    recordings = [replace(exact, name="good"), replace(signals, name="wrong")]
     found = worst_stretch(played_pairs(recordings, *[model_of({})] * 2), recordings, 1.0, 2.0)
     assert found.flight == "wrong"
     np.testing.assert_array_equal(found.time, signals.time[300:500])

@@ -13,7 +13,7 @@ from cpfls_cli.gap.residual.repeated import RepeatedRuns
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.balances import band_windows
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.windows import Recording, common_windows
+from cpfls_cli.weak_form.windows import common_windows
 
 VEHICLE = VehicleSettings()
 INERTIA = np.array([0.6, 0.6, 1.2])
@@ -42,12 +42,12 @@ def run(path, draw, lacks=1.0):
     noisy = rate + np.random.default_rng([path, draw]).normal(0, NOISE, rate.shape)
     stated = torque - lacks * missing(path) - own
     signals = Signals(time=TIME, body_rate=noisy, vehicle=VEHICLE, stated_torque=stated)
-    return Recording(f"path {path}, run {draw}", signals)
+    return replace(signals, name=f"path {path}, run {draw}")
 
 
 def split(recordings, unseen=0):
     windows = common_windows(recordings, GapSettings())
-    flights = [weak_flight(each.name, each.signals, windows, None, force=True) for each in recordings]
+    flights = [weak_flight(each, windows, None, force=True) for each in recordings]
     model = plain(None)
     repeated = RepeatedRuns.of(recordings, unseen)
     return repeated and repeated.split(model.system(flights), model.linear)
@@ -93,10 +93,7 @@ def test_the_noise_of_the_gyroscope_is_told_apart():
     runs = [run(0, draw) for draw in range(2)]
     still = [sines(1000 + draw, OWN)[0] + missing(0) for draw in range(2)]
     pairs = zip(runs, still, strict=True)
-    exact = [
-        replace(each, signals=replace(each.signals, stated_torque=each.signals.stated_torque + own))
-        for each, own in pairs
-    ]
+    exact = [replace(each, stated_torque=each.stated_torque + own) for each, own in pairs]
     found = split(exact)
     assert found.noise[:3, 0] == pytest.approx(found.total[:3, 0], rel=0.2)
     slope = band_windows(0.01, 0.15, None).slope
@@ -108,7 +105,7 @@ def test_what_is_explained_is_the_share_of_the_motion():
     rate, slope = sines(0, 0.3)
     lacks = 0.1 * (INERTIA * slope + np.cross(rate, INERTIA * rate))
     runs = [run(0, draw, lacks=0.0) for draw in range(4)]
-    weak = [replace(r, signals=replace(r.signals, stated_torque=r.signals.stated_torque - lacks)) for r in runs]
+    weak = [replace(r, stated_torque=r.stated_torque - lacks) for r in runs]
     found = split(weak)
     known = found.explained_error[:3] < 0.05
     assert known.sum() >= 6
@@ -130,15 +127,15 @@ def test_pairs_with_a_flight_that_no_fit_has_seen_are_preferred():
 def test_runs_within_one_flight_are_found_by_what_was_asked_for_and_kept_with_the_flight():
     """A mission of `--repeat` is one log; the artifact of a comparison keeps the setpoint for `diagnose`."""
     part = slice(0, 1300)
-    signals = [run(0, draw).signals for draw in range(3)]
+    signals = [run(0, draw) for draw in range(3)]
     rate, torque = (
         np.concatenate([getattr(each, name)[part] for each in signals]) for name in ("body_rate", "stated_torque")
     )
     asked = np.tile(sines(5, 1.0)[0][part], (3, 1))
     time = 0.01 * np.arange(len(rate))
     whole = Signals(time=time, body_rate=rate, vehicle=VEHICLE, stated_torque=torque, setpoints={"position": asked})
-    flight = Recording("mission", whole)
+    flight = replace(whole, name="mission")
     assert len(RepeatedRuns.of([flight]).pairs) == 6
-    kept = RecordedFlight.of(flight, "given").recording(VEHICLE, 0.0)
+    kept = RecordedFlight.of(flight, "given").flight(VEHICLE, 0.0)
     assert RepeatedRuns.of([kept]).pairs == RepeatedRuns.of([flight]).pairs
-    assert RepeatedRuns.of([replace(flight, signals=replace(whole, setpoints={}))]) is None
+    assert RepeatedRuns.of([replace(flight, setpoints={})]) is None

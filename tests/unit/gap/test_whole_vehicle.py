@@ -18,7 +18,6 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.player import free_runs, made_ready, player_of
-from cpfls_cli.weak_form.windows import Recording
 from tests.builders import vehicle_models
 from tests.builders.vehicle_models import QUAD
 
@@ -106,7 +105,7 @@ def test_height_of_the_mass_and_wind_are_those_of_the_effects():
     total[:, 5] += 0.05 * flown.thrust
     total[:, :3] -= np.cross(offset.coefficients, total[:, 3:])
     np.testing.assert_allclose(whole.wrench_along(flown), total, atol=1e-10)
-    flight, player = made_ready(whole, LoggedFlight.of("flight", signals()))
+    flight, player = made_ready(whole, LoggedFlight.of(signals()))
     starts = np.arange(0, 40, 8)
     runs = free_runs(player, flight, starts, 12).errors
     lower = replace(whole, effects=tuple(e for e in whole.effects if not e.is_lever))
@@ -124,13 +123,13 @@ def test_what_is_left_out_is_measured_along_flights():
     steady = np.full((60, 4), 1000.0)
     flown = replace(signals(), voltage=np.linspace(1.0, 0.8, 60), commanded=True, rotor_speed=steady)
     extended = replace(plain(None), effects=(fitted("torque_bias", 0.01, 0.0, 0.0), sag))
-    (left,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [Recording("flight", flown)], 0.5)
+    (left,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [replace(flown, name="flight")], 0.5)
     assert left.name == "battery_sag"
     lost = (1.0 - actuated(flown, extended.chosen).speed ** 2 / flown.speed**2) * flown.thrust[:, None]
     assert left.wrench[5] == pytest.approx(np.sqrt((lost[:, 0] ** 2).mean()), rel=0.02)
     assert left.ends[1] > 0.1
     still = replace(flown, velocity=None, acceleration=None, position=None)
-    (unseen,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [Recording("flight", still)], 0.5)
+    (unseen,) = left_out(whole_vehicle(extended, QUAD), ["battery_sag"], [replace(still, name="flight")], 0.5)
     np.testing.assert_array_equal(np.isfinite(unseen.ends), [False, False, True, True])
     assert Off.of(unseen.ends).sentence.endswith(" degrees")
 
@@ -148,8 +147,8 @@ def test_an_inertia_of_no_body_is_not_taken():
 
 def test_a_whole_vehicle_as_a_model_with_one_effect_has_its_torque_force_and_inertia():
     model = vehicle_models.whole(effects=vehicle_models.whole().effects[:4])
-    (recording,) = of_vehicle([Recording("flight", replace(signals(), vehicle=replace(QUAD, mass_kg=1.0)))], model)
-    flown, extended = recording.signals, with_effects(model)
+    (flown,) = of_vehicle([replace(signals(), vehicle=replace(QUAD, mass_kg=1.0), name="flight")], model)
+    extended = with_effects(model)
     assert (flown.vehicle, extended.base) == (model.vehicle, None)
     rotor = model.response.terms_at_samples(flown.rotor_speed, flown.period, "linear")
     wanted = model.wrench(flown.air_velocity, flown.body_rate, rotor)
@@ -177,9 +176,9 @@ def test_a_rigid_body_has_no_effect_and_the_place_of_a_sensor_stays_a_number():
     ],
 )
 def test_a_flight_has_to_have_what_the_model_depends_on(model, lacking, needed):
-    recording = Recording("flight", replace(signals(), **lacking))
+    recording = replace(signals(), **lacking, name="flight")
     if needed is None:
-        assert of_vehicle([recording], model)[0].signals.vehicle == model.vehicle
+        assert of_vehicle([recording], model)[0].vehicle == model.vehicle
         return
     with pytest.raises(InputError, match=f"^flight: {needed} which the model of the whole vehicle needs$"):
         of_vehicle([recording], model)
@@ -188,18 +187,18 @@ def test_a_flight_has_to_have_what_the_model_depends_on(model, lacking, needed):
 def test_flights_are_compared_with_the_numbers_of_a_vehicle_that_was_found_without_effects():
     flown = signals()
     found = replace(QUAD, rotors=tuple(replace(each, thrust_factor_n_s2=1e-5) for each in QUAD.rotors))
-    (given,) = with_known_wrench([Recording("flight", flown)], VehicleModel(vehicle=found))
+    (given,) = with_known_wrench([replace(flown, name="flight")], VehicleModel(vehicle=found))
     expected = 1e-5 * (flown.rotor_speed**2).sum(axis=1)
-    np.testing.assert_allclose(given.signals.wrench[:, 5], expected)
-    (same,) = with_known_wrench([Recording("flight", flown)], VehicleModel(vehicle=QUAD))
-    assert same.signals is flown
+    np.testing.assert_allclose(given.wrench[:, 5], expected)
+    (same,) = with_known_wrench([flown], VehicleModel(vehicle=QUAD))
+    assert same is flown
 
 
 def test_what_one_model_knew_is_no_part_of_what_the_next_one_does():
     drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
     model = VehicleModel(vehicle=QUAD, effects=(drag,))
     stronger = replace(model, vehicle=_lifting(QUAD, 1.2, 1.1))
-    once = with_known_wrench([Recording("flight", signals())], stronger)
-    again = with_known_wrench(with_known_wrench([Recording("flight", signals())], model), stronger)
-    np.testing.assert_allclose(again[0].signals.wrench, once[0].signals.wrench, rtol=1e-12)
-    np.testing.assert_allclose(once[0].signals.thrust, 1.2 * signals().thrust, rtol=1e-12)
+    once = with_known_wrench([replace(signals(), name="flight")], stronger)
+    again = with_known_wrench(with_known_wrench([replace(signals(), name="flight")], model), stronger)
+    np.testing.assert_allclose(again[0].wrench, once[0].wrench, rtol=1e-12)
+    np.testing.assert_allclose(once[0].thrust, 1.2 * signals().thrust, rtol=1e-12)

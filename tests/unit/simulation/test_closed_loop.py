@@ -46,7 +46,7 @@ SEEN_BY_BALANCE = [name for name, effect in CATALOGUE.items() if effect.columns 
 
 
 def balance(signals):
-    weak = weak_flight("flight", signals, windows(PERIOD, 0.4, 0.75), None, True)
+    weak = weak_flight(signals, windows(PERIOD, 0.4, 0.75), None, True)
     return weak, weak.averaged(weak.residual(signals))
 
 

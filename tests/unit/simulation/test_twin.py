@@ -84,7 +84,7 @@ def test_slow_rotors_part_roll_and_pitch_alike(flight):
 def test_without_gusts_the_same_flight_comes_back():
     (part,) = flown(3.0, gusts=False).parts
     # The rotors begin where the thrust that is asked for has them, as they did.
-    flight = LoggedFlight.of("flight", replace(part, rotor_speed=None))
+    flight = LoggedFlight.of(replace(part, name="flight", rotor_speed=None))
     asked = asked_of(flight, LOOP, CROSS, share=True)
     measured = measured_channels(flight)
     twin = fly_twin(flight, asked, CROSS, LOOP, None, SimulatedEffects())
@@ -112,7 +112,7 @@ def test_a_vehicle_that_is_lost_is_known_up_to_there():
 
 def changed(flight, **setpoints):
     (part,) = flight.parts
-    return LoggedFlight.of("other", replace(part, setpoints=setpoints))
+    return LoggedFlight.of(replace(part, name="other", setpoints=setpoints))
 
 
 def test_rates_are_flown_where_no_attitude_is_asked_for(flight):

@@ -31,7 +31,6 @@ from cpfls_cli.simulators import in_pybullet, inside
 from cpfls_cli.simulators.formats import read_model
 from cpfls_cli.simulators.results import Corrected, InSimulator
 from cpfls_cli.simulators.study import of_log, played, vehicle_of
-from cpfls_cli.weak_form.windows import Recording
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.gusty_flights import GUSTS, SMALL, SPINS, Flight, gusty_flights, logged
 from tests.builders.simulator_files import mjcf_of, rotorpy_of, sdf_of
@@ -261,7 +260,7 @@ MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n
 @pytest.fixture(scope="module")
 def held():
     (signals,) = logged(flight_of(2.0), TRUE.vehicle).parts
-    return [Recording("held.csv", signals)]
+    return [replace(signals, name="held.csv")]
 
 
 def both(of, held, texts, horizon_s=0.3):
