@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil, cos, isfinite
 from typing import TYPE_CHECKING, Protocol
 
@@ -121,7 +121,7 @@ class Pilot(Protocol):
 
 
 @dataclass
-class Loop:
+class Integration:
     """The midpoint rule with one evaluation a step.
 
     The middle of a step is reached with the derivative of the step before, so that the rule is of second order. All of
@@ -212,13 +212,24 @@ class SimulatedMotion:
     demand: Array
 
 
+@dataclass(frozen=True)
+class ClosedLoop:
+    """What flies, and by which settings.
+
+    `vehicle`: as the autopilot knows it; `model`: in its place, as far as its table of weights gives it; `effects`:
+    that the autopilot does not know. `with_effects` gives both.
+    """
+
+    vehicle: VehicleSettings
+    settings: ClosedLoopSettings
+    model: VehicleModel | None = None
+    effects: SimulatedEffects = field(default_factory=SimulatedEffects)
+
+
 def fly(
+    loop: ClosedLoop,
     time: Array,
     planned: Mapping[str, Array],
-    vehicle: VehicleSettings,
-    settings: ClosedLoopSettings,
-    model: VehicleModel | None,
-    effects: SimulatedEffects,
     progress: Callable[[float, int], None],
     push: Array | None = None,
     noise: GyroscopeNoise | None = None,
@@ -226,11 +237,11 @@ def fly(
     """Integrate a closed-loop flight along a planned motion, sampled uniformly.
 
     `planned`: `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
-    (time, 3) each; `model`: in place of the vehicle, as far as its table of weights gives it; `effects`: that the
-    autopilot does not know; `progress`: called with steps done and steps in all; `push`: torque and force of gusts in
-    the middle of each step of `clock_of`, N m and N, body frame; `noise`: in the loop of an autopilot of
-    `settings.autopilot` that is not `cpfls`. `ComputationError` where the vehicle leaves the path or overturns.
+    (time, 3) each; `progress`: called with steps done and steps in all; `push`: torque and force of gusts in the middle
+    of each step of `clock_of`, N m and N, body frame; `noise`: in the loop of an autopilot of `settings.autopilot` that
+    is not `cpfls`. `ComputationError` where the vehicle leaves the path or overturns.
     """
+    vehicle, settings = loop.vehicle, loop.settings
     clock = clock_of(time, settings)
     autopilot, mix = Autopilot(vehicle, settings), mixer(vehicle)
     planned_pilot = PlanPilot(autopilot, mix, plan_of(planned, time, clock.instants))
@@ -244,7 +255,7 @@ def fly(
         motors = Motors.of(settings.law.mixer, settings.law.curve, vehicle)
         asked = along_path(planned_pilot, motors, vehicle)
         pilot = law_pilot(settings.law, motors, asked, clock.step, speed, noise)
-    flight = _loop(pilot, state, speed, vehicle, settings, model, effects, clock, push)
+    flight = _integration(loop, pilot, state, speed, clock, push)
 
     def check(sample: int, state: Flat) -> None:
         _refuse_lost(state, time, sample)
@@ -267,13 +278,10 @@ class Setpoints:
 
 
 def fly_setpoints(
+    loop: ClosedLoop,
     time: Array,
     setpoints: Setpoints,
     start: Array,
-    vehicle: VehicleSettings,
-    settings: ClosedLoopSettings,
-    model: VehicleModel | None,
-    effects: SimulatedEffects,
     push: Array | None = None,
     noise: GyroscopeNoise | None = None,
     speed: Array | None = None,
@@ -287,15 +295,15 @@ def fly_setpoints(
     each step of `clock_of`, shares of the full ones; the rest as `fly` takes it. `ComputationError` where time is not
     sampled uniformly, or the vehicle overturns.
     """
-    law = settings.law
+    law = loop.settings.law
     if law is None:
         raise ValueError("setpoints are flown by the law of an autopilot; name one in settings.autopilot")
-    clock = clock_of(time, settings)
-    motors = Motors.of(law.mixer, law.curve, vehicle)
+    clock = clock_of(time, loop.settings)
+    motors = Motors.of(law.mixer, law.curve, loop.vehicle)
     if speed is None:
         speed = motors.speeds(float(setpoints.thrust[0]), np.zeros(3)).speed
     pilot = law_pilot(law, motors, _as_asked(setpoints, clock.parts), clock.step, speed, noise, injected)
-    flight = _loop(pilot, np.array(start, dtype=float), speed, vehicle, settings, model, effects, clock, push)
+    flight = _integration(loop, pilot, np.array(start, dtype=float), speed, clock, push)
     flight.lacking = lacking
     return flown(flight, lambda sample, state: _refuse_lost(state, time, sample), lambda _done, _all: None)
 
@@ -310,7 +318,9 @@ def _as_asked(setpoints: Setpoints, parts: int) -> Callable[[int, Flat], Asked]:
     return lambda number, _state: samples[min(number // parts, count - 1)]
 
 
-def flown(flight: Loop, check: Callable[[int, Flat], None], progress: Callable[[float, int], None]) -> SimulatedMotion:
+def flown(
+    flight: Integration, check: Callable[[int, Flat], None], progress: Callable[[float, int], None]
+) -> SimulatedMotion:
     """Take all steps, and check the state at each sample."""
     clock, size = flight.clock, len(flight.state)
     machine, given = flight.machine()
@@ -335,24 +345,16 @@ def flown(flight: Loop, check: Callable[[int, Flat], None], progress: Callable[[
     return SimulatedMotion(np.array(states), change, command, lagged, speed, voltage[:, 0], demand)
 
 
-def _loop(
-    pilot: Pilot,
-    state: Array,
-    speed: Array,
-    vehicle: VehicleSettings,
-    settings: ClosedLoopSettings,
-    model: VehicleModel | None,
-    effects: SimulatedEffects,
-    clock: Clock,
-    push: Array | None,
-) -> Loop:
-    """Set up the loop at a state, shape (12,), with the rotors at a speed that they were commanded to."""
-    flown = flown_vehicle(vehicle, model, effects)
+def _integration(
+    loop: ClosedLoop, pilot: Pilot, state: Array, speed: Array, clock: Clock, push: Array | None
+) -> Integration:
+    """Set up the integration at a state, shape (12,), with the rotors at a speed that they were commanded to."""
+    flown = flown_vehicle(loop.vehicle, loop.model, loop.effects)
     state = np.concatenate([state, flown.start])
-    change = Plant(flown, model).settled(state, speed, None if push is None else push[0])
-    response = RotorResponse() if model is None else model.response
-    chain = actuators(effects, response, vehicle, settings, speed, clock.step * clock.steps)
-    return Loop(pilot, chain, flown, model, state, change, clock, push)
+    change = Plant(flown, loop.model).settled(state, speed, None if push is None else push[0])
+    response = RotorResponse() if loop.model is None else loop.model.response
+    chain = actuators(loop.effects, response, loop.vehicle, loop.settings, speed, clock.step * clock.steps)
+    return Integration(pilot, chain, flown, loop.model, state, change, clock, push)
 
 
 class LostVehicleError(ComputationError):

@@ -12,7 +12,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import TrueMotion
 from cpfls_cli.simulation.autopilot import GyroscopeNoise, asked
-from cpfls_cli.simulation.closed_loop import SimulatedMotion, clock_of, fly
+from cpfls_cli.simulation.closed_loop import ClosedLoop, SimulatedMotion, clock_of, fly
 from cpfls_cli.simulation.model import SimulatedEffects, in_table, played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, POSITION, VELOCITY
@@ -105,7 +105,8 @@ def measure(
     felt = {str(name): std for name, std in settings.noise.items()}.get("body_rate", 0.0)
     # The gyroscope of the loop and that of the log are two, so that a log's noise is the same whoever flies.
     noise = None if settings.closed_loop.law is None or not felt else GyroscopeNoise(felt, rng.spawn(1)[0])
-    motion = fly(time, planned, vehicle, settings.closed_loop, held, effects, progress, push, noise)
+    loop = ClosedLoop(vehicle, settings.closed_loop, held, effects)
+    motion = fly(loop, time, planned, progress, push, noise)
     signals, noise_std = _logged(time, motion, vehicle, settings, effects, rng)
     setpoints = asked(time, planned, vehicle, settings.closed_loop, motion.state)
     signals |= {f"setpoint_{name}": values for name, values in setpoints.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,8 +17,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.lack import DrawnLack, Lack
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.simulation.closed_loop import Clock, LostVehicleError, Setpoints, clock_of, fly_setpoints
-from cpfls_cli.simulation.model import SimulatedEffects, with_effects
+from cpfls_cli.simulation.closed_loop import Clock, ClosedLoop, LostVehicleError, Setpoints, clock_of, fly_setpoints
+from cpfls_cli.simulation.model import with_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, POSITION, VELOCITY
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -182,12 +182,9 @@ def baselines(flight: LoggedFlight, measured: Array) -> tuple[Array, Array]:
 
 
 def fly_twin(
+    loop: ClosedLoop,
     flight: LoggedFlight,
     asked: Asked,
-    vehicle: VehicleSettings,
-    settings: ClosedLoopSettings,
-    model: VehicleModel | None,
-    effects: SimulatedEffects,
     progress: Callable[[int], None] = lambda _done: None,
     air: Air | None = None,
 ) -> TwinFlight:
@@ -195,8 +192,6 @@ def fly_twin(
 
     Parameters
     ----------
-    model, effects
-        As `with_effects` gives them.
     progress : callable
         Takes samples done.
     air : Air or None
@@ -204,7 +199,7 @@ def fly_twin(
     """
     parts, positions, lost = [], [], np.nan
     for part, setpoints in zip(flight.parts, asked.setpoints, strict=True):
-        values, places, where = _flown(part, setpoints, vehicle, settings, model, effects, air)
+        values, places, where = _flown(loop, part, setpoints, air)
         parts.append(values)
         positions.append(places)
         lost = where if np.isnan(lost) else lost
@@ -212,15 +207,7 @@ def fly_twin(
     return TwinFlight(np.concatenate(parts), np.concatenate(positions), lost)
 
 
-def _flown(
-    part: Signals,
-    setpoints: Setpoints,
-    vehicle: VehicleSettings,
-    settings: ClosedLoopSettings,
-    model: VehicleModel | None,
-    effects: SimulatedEffects,
-    air: Air | None,
-) -> tuple[Array, Array, float]:
+def _flown(loop: ClosedLoop, part: Signals, setpoints: Setpoints, air: Air | None) -> tuple[Array, Array, float]:
     start = np.zeros(12)
     for place, values in (
         (POSITION, part.position),
@@ -231,19 +218,17 @@ def _flown(
         start[place] = 0.0 if values is None else values[0]
     speed = None if part.rotor_speed is None else part.rotor_speed[0]
     values, places = np.full((len(part), len(CHANNELS)), np.nan), np.full((len(part), 3), np.nan)
-    push, lacking = (None, None) if air is None else air.drawn(clock_of(part.time, settings))
+    push, lacking = (None, None) if air is None else air.drawn(clock_of(part.time, loop.settings))
     count, lost = len(part), np.nan
     while count > 1:
         time = part.time[:count]
         try:
-            motion = fly_setpoints(
-                time, setpoints, start, vehicle, settings, model, effects, push, speed=speed, lacking=lacking
-            )
+            motion = fly_setpoints(loop, time, setpoints, start, push, speed=speed, lacking=lacking)
         except LostVehicleError as error:
             lost, count = float(part.time[error.sample]), error.sample
             continue
         state = motion.state
-        angles, gravity = state[:, ATTITUDE], vehicle.gravity_m_s2
+        angles, gravity = state[:, ATTITUDE], loop.vehicle.gravity_m_s2
         lift = _lift(motion.change[:, VELOCITY], angles, gravity)
         if part.attitude is not None:
             # A full turn from the flight's own is the same.
@@ -255,12 +240,10 @@ def _flown(
 
 
 def fly_in_gusts(
+    loop: ClosedLoop,
     flight: LoggedFlight,
     asked: Asked,
-    vehicle: VehicleSettings,
-    settings: ClosedLoopSettings,
     models: Sequence[VehicleModel],
-    effects: SimulatedEffects,
     lack: Lack | None,
     rng: np.random.Generator,
     progress: Callable[[int], None] = lambda _done: None,
@@ -268,7 +251,8 @@ def fly_in_gusts(
     """Fly the setpoints of a flight by vehicles that may differ, each in gusts of its own and with what is lacking."""
     found = []
     for number, (model, own) in enumerate(zip(models, rng.spawn(len(models)), strict=True)):
-        given = with_effects(model, effects)
-        found.append(fly_twin(flight, asked, vehicle, settings, *given, air=Air(model, lack, own)))
+        held, effects = with_effects(model, loop.effects)
+        flown = replace(loop, model=held, effects=effects)
+        found.append(fly_twin(flown, flight, asked, air=Air(model, lack, own)))
         progress((number + 1) * len(flight.time))
     return found

@@ -40,7 +40,8 @@ from cpfls_cli.report.canvas import (
     style_of,
 )
 from cpfls_cli.response.spectra import decibels, degrees
-from cpfls_cli.simulation.model import SimulatedEffects, played_gusts, simulated_effects, with_effects
+from cpfls_cli.simulation.closed_loop import ClosedLoop
+from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.simulation.twin import DRAWS, InGusts, Twin, TwinChannel, TwinGains, in_gusts, known_axes, twin_of
 from cpfls_cli.simulation.twin_flight import (
@@ -222,14 +223,13 @@ def twin(run: Run, path: Path, model: Path | None = None) -> Twin | None:
     for number, (name, own) in enumerate(vehicles.items()):
         before = number * len(flight.time)
         flown[name] = fly_twin(
+            ClosedLoop(study.vehicle, settings, *with_effects(own, effects)),
             flight,
             asked,
-            study.vehicle,
-            settings,
-            *with_effects(own, effects),
             lambda done, before=before: run.progress(before + done, total),  # type: ignore[misc]
         )
-    air = None if possible is None else _in_gusts(run, settings, flight, asked, effects, possible, flown)
+    loop = ClosedLoop(study.vehicle, settings, None, effects)
+    air = None if possible is None else _in_gusts(run, loop, flight, asked, possible, flown)
     warnings = [
         *seen_warnings(VEHICLE if model is None else model.name, learned_by(model), known_by({"flight": path}, inputs)),
         *flight.warnings,
@@ -255,27 +255,20 @@ def _possible(path: Path, model: VehicleModel | None, study: Study) -> tuple[Seq
 
 def _in_gusts(
     run: Run,
-    settings: ClosedLoopSettings,
+    loop: ClosedLoop,
     flight: LoggedFlight,
     asked: Asked,
-    effects: SimulatedEffects,
     possible: tuple[Sequence[VehicleModel], Lack | None],
     flown: Mapping[str, TwinFlight],
 ) -> InGusts:
     """Fly possible vehicles in gusts, with what the model lacks, and compare the flight with them."""
     (models, lack), rng, count = possible, generator(run.study, "simulate"), len(flight.time)
     before = len(flown) * count
-    gusty = fly_in_gusts(
-        flight,
-        asked,
-        run.study.vehicle,
-        settings,
-        models,
-        effects,
-        lack,
-        rng,
-        lambda done: run.progress(before + done, before + DRAWS * count),
-    )
+
+    def progress(done: int) -> None:
+        run.progress(before + done, before + DRAWS * count)
+
+    gusty = fly_in_gusts(loop, flight, asked, models, lack, rng, progress)
     name, still = list(flown.items())[-1]
     return in_gusts(measured_channels(flight), still.values, gusty, known_axes(models[0].gusts, lack), rng, name)
 

@@ -11,8 +11,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.vehicle import FoundNumber
 from cpfls_cli.simulation.autopilot import GyroscopeNoise
-from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
-from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.closed_loop import ClosedLoop, Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.tuning.margins import StepAnswer
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
@@ -98,18 +97,8 @@ def _flown(autopilot, values, vehicle, lag, time, attitude, gusts, noise, seed, 
     lift = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors)
     share = motors.share_of(float(np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / lift)))
     setpoints = Setpoints(attitude, None, np.full(len(time), share))
-    return fly_setpoints(
-        time,
-        setpoints,
-        np.zeros(12),
-        vehicle,
-        settings,
-        None,
-        SimulatedEffects(),
-        push,
-        GyroscopeNoise(noise, rng),
-        injected=added,
-    )
+    loop, heard = ClosedLoop(vehicle, settings), GyroscopeNoise(noise, rng)
+    return fly_setpoints(loop, time, setpoints, np.zeros(12), push, heard, injected=added)
 
 
 STUDY = """

@@ -11,8 +11,7 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.simulation.autopilot import GyroscopeNoise
-from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
-from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.closed_loop import ClosedLoop, Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from tests.builders.autopilots import CROSS
 from tests.builders.ulogs import ulog
@@ -142,13 +141,10 @@ class Flown:
 
         with patch.object(Motors, "speeds", recorded):
             motion = fly_setpoints(
+                ClosedLoop(vehicle, settings),
                 time,
                 Setpoints(asked[:, :3], None, hover * (1 + asked[:, 3])),
                 np.zeros(12),
-                vehicle,
-                settings,
-                None,
-                SimulatedEffects(),
                 push,
                 GyroscopeNoise(noise, rng.spawn(1)[0]),
             )

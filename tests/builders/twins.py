@@ -10,8 +10,7 @@ from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.simulation.autopilot import GyroscopeNoise
-from cpfls_cli.simulation.closed_loop import Setpoints, clock_of, fly_setpoints
-from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.closed_loop import ClosedLoop, Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.simulation.twin import ChannelInGusts, InGusts, TwinGains, twin_of
 from cpfls_cli.simulation.twin_flight import CHANNELS, asked_of, fly_twin
@@ -37,7 +36,7 @@ def flown(seconds=12.0, seed=3, gusts=True, inertia_x=1.0):
     x, *others = CROSS.inertia_kg_m2
     body = VehicleModel(vehicle=replace(CROSS, inertia_kg_m2=(inertia_x * x, *others)))
     model = None if inertia_x == 1.0 else body
-    motion = fly_setpoints(time, asked, np.zeros(12), CROSS, LOOP, model, SimulatedEffects(), push, noise)
+    motion = fly_setpoints(ClosedLoop(CROSS, LOOP, model), time, asked, np.zeros(12), push, noise)
     scatter = NOISE * rng.standard_normal((2, len(time), 3)) * gusts
     signals = Signals(
         time=time,
@@ -58,7 +57,7 @@ def twin_found():
     flight = flown(6.0)
     asked = asked_of(flight, LOOP, CROSS, share=True)
     loops = {VEHICLE: replace(LOOP, rotor_time_constant_s=0.1), "found.h5": LOOP}
-    twins = {name: fly_twin(flight, asked, CROSS, loop, None, SimulatedEffects()) for name, loop in loops.items()}
+    twins = {name: fly_twin(ClosedLoop(CROSS, loop), flight, asked) for name, loop in loops.items()}
     gains = TwinGains(source="defaults", name=("MC_ROLLRATE_P",), value=np.array([0.15]))
     return twin_of(flight, asked, twins, LOOP, gains, ["the gains are guessed"], blown(twins["found.h5"]))
 

@@ -17,10 +17,9 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.simulation import model
-from cpfls_cli.simulation.closed_loop import Setpoints, fly_setpoints
+from cpfls_cli.simulation.closed_loop import ClosedLoop, Setpoints, fly_setpoints
 from cpfls_cli.simulation.inverse import ROTOR_SHARE, hover_squared, room_left, rotor_load, squared_speeds, tilt_of
 from cpfls_cli.simulation.measured import measure
-from cpfls_cli.simulation.model import SimulatedEffects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import plan
@@ -267,14 +266,14 @@ def test_noise_of_the_gyroscope_is_in_its_loop_and_drawn_again():
 
 def test_along_setpoints_the_law_reaches_what_it_is_asked_for():
     time = 0.01 * np.arange(101)
-    settings = ClosedLoopSettings(autopilot="px4", rotor_time_constant_s=0.02)
+    loop = ClosedLoop(CROSS, ClosedLoopSettings(autopilot="px4", rotor_time_constant_s=0.02))
     thrust = np.full(len(time), 0.6)
     step = np.where(time >= 0.2, 0.2, 0.0)[:, None] * [1.0, 0.0, 0.0]
     start = np.zeros(12)
-    tilted = fly_setpoints(time, Setpoints(step, None, thrust), start, CROSS, settings, None, SimulatedEffects())
+    tilted = fly_setpoints(loop, time, Setpoints(step, None, thrust), start)
     assert tilted.state[-1, 6:9] == pytest.approx([0.2, 0.0, 0.0], abs=0.02)
     assert np.abs(tilted.state[:20, 6:12]).max() < 1e-9
-    turned = fly_setpoints(time, Setpoints(None, step, thrust), start, CROSS, settings, None, SimulatedEffects())
+    turned = fly_setpoints(loop, time, Setpoints(None, step, thrust), start)
     assert turned.state[-1, 9:12] == pytest.approx([0.2, 0.0, 0.0], abs=0.03)
 
 

@@ -14,7 +14,7 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.autopilot import upright
-from cpfls_cli.simulation.closed_loop import Loop, clock_of, flown
+from cpfls_cli.simulation.closed_loop import Integration, clock_of, flown
 from cpfls_cli.simulation.model import in_the_loop, simulated_effects, with_effects
 from cpfls_cli.simulation.plant import Plant, actuators, flown_vehicle, mixer
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
@@ -59,7 +59,7 @@ def simulated(rate, effects):
     state, push = np.concatenate([START, vehicle.start]), np.tile(PUSH, (clock.steps, 1))
     chain = actuators(chosen, RotorResponse(), VEHICLE, settings, SPEED, TIME[-1])
     change = Plant(vehicle, None).settled(state, SPEED, PUSH)
-    loop = Loop(Given(), chain, vehicle, None, state, change, clock, push)
+    loop = Integration(Given(), chain, vehicle, None, state, change, clock, push)
     return flown(loop, lambda _sample, _state: None, lambda _done, _all: None)
 
 

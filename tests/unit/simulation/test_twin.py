@@ -9,7 +9,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.simulation.model import SimulatedEffects
+from cpfls_cli.simulation.closed_loop import ClosedLoop
 from cpfls_cli.simulation.twin import DRAWS, compared, in_gusts, known_axes, windows
 from cpfls_cli.simulation.twin_flight import (
     CHANNELS,
@@ -34,7 +34,7 @@ def flight():
 
 def comparison(flight, vehicle=CROSS, loop=LOOP):
     asked = asked_of(flight, loop, CROSS, share=True)
-    twin = fly_twin(flight, asked, CROSS, loop, VehicleModel(vehicle=vehicle), SimulatedEffects())
+    twin = fly_twin(ClosedLoop(CROSS, loop, VehicleModel(vehicle=vehicle)), flight, asked)
     return compared(flight, asked, measured_channels(flight), twin.values, lambda _given: None)
 
 
@@ -87,7 +87,7 @@ def test_without_gusts_the_same_flight_comes_back():
     flight = LoggedFlight.of(replace(part, name="flight", rotor_speed=None))
     asked = asked_of(flight, LOOP, CROSS, share=True)
     measured = measured_channels(flight)
-    twin = fly_twin(flight, asked, CROSS, LOOP, None, SimulatedEffects())
+    twin = fly_twin(ClosedLoop(CROSS, LOOP), flight, asked)
     np.testing.assert_allclose(twin.values, measured, atol=1e-9)
     assert np.isnan(twin.lost_s)
     setpoint, still = baselines(flight, measured)
@@ -103,7 +103,7 @@ def test_a_vehicle_that_is_lost_is_known_up_to_there():
     rotors = tuple(replace(r, position_m=(r.position_m[0], -r.position_m[1], 0.0)) for r in CROSS.rotors)
     other = VehicleModel(vehicle=replace(CROSS, rotors=rotors))
     asked = asked_of(flight, LOOP, CROSS, share=True)
-    twin = fly_twin(flight, asked, CROSS, LOOP, other, SimulatedEffects())
+    twin = fly_twin(ClosedLoop(CROSS, LOOP, other), flight, asked)
     assert 0 < twin.lost_s < 1.5
     known = np.isfinite(twin.values).all(axis=1)
     assert known[: round(twin.lost_s / PERIOD)].all()
@@ -141,8 +141,8 @@ def test_a_flight_in_the_same_gusts_is_one_of_those_in_gusts_and_that_of_a_heavi
     model = VehicleModel(vehicle=CROSS, gusts=GUSTS)
     flights = {ratio: flown(3.0, inertia_x=ratio) for ratio in (1.0, 2.5)}
     asked = asked_of(flights[1.0], loop, CROSS, share=True)
-    still = fly_twin(flights[1.0], asked, CROSS, loop, model, SimulatedEffects())
-    gusty = fly_in_gusts(flights[1.0], asked, CROSS, loop, [model] * 7, SimulatedEffects(), None, drawing(1))
+    still = fly_twin(ClosedLoop(CROSS, loop, model), flights[1.0], asked)
+    gusty = fly_in_gusts(ClosedLoop(CROSS, loop), flights[1.0], asked, [model] * 7, None, drawing(1))
     blown = known_axes(GUSTS, None)
     found = {
         ratio: in_gusts(measured_channels(own), still.values, gusty, blown, drawing(2))
