@@ -27,7 +27,7 @@ from cpfls_cli.export.mcap_form import (
     Track,
     View,
 )
-from cpfls_cli.flights.flight import Flight, Imported
+from cpfls_cli.flightlog.results import Flight, Imported
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.recorded import HELD_OUT, RecordedFlight
 from cpfls_cli.playback.replay import Playback

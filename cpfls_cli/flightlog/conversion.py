@@ -153,7 +153,7 @@ def columns_in_words(columns: Collection[str]) -> str:
 
 
 def to_program_frames(signals: Mapping[str, Array], settings: ImportSettings) -> dict[str, Array]:
-    """Convert signals, shape (time, column), SI, in the log's frames, to those of `ImportedFlight`, by its names.
+    """Convert signals, shape (time, column), SI, in the log's frames, to those of `Flight`, by its names.
 
     Those are roll, pitch, yaw, body vectors in FLU and world vectors in ENU.
     """

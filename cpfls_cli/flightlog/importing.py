@@ -14,7 +14,7 @@ from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.flightlog import bandwidth, conversion, repair, stretches
 from cpfls_cli.flightlog.flown import flown_crop, warn_of_end
 from cpfls_cli.flightlog.repair import SignalTable
-from cpfls_cli.flightlog.results import DelayEstimate, ImportedFlight, ImportReport
+from cpfls_cli.flightlog.results import DelayEstimate, Imported
 from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
 from cpfls_cli.flightlog.topics import hold_asked, previous_rows
@@ -39,10 +39,10 @@ def import_log(
     columns: Mapping[str, Array],
     settings: ImportSettings,
     *,
-    rotor_torque: Callable[[ImportedFlight], Array] | None = None,
+    rotor_torque: Callable[[Imported], Array] | None = None,
     delay_share: float = 1.0,
     stamped_hz: Mapping[str, float] | None = None,
-) -> ImportedFlight:
+) -> Imported:
     """Turn the columns of a log into a flight.
 
     Where `torque_source` names the rotors, `rotor_torque` gives the body torque, shape (time, 3), N m, FLU, from their
@@ -58,7 +58,7 @@ def import_log(
 
 def read_signals(
     columns: Mapping[str, Array], settings: ImportSettings, stamped_hz: Mapping[str, float] | None = None
-) -> ImportedFlight:
+) -> Imported:
     """Read the mapped columns of a log, drop bad rows, repair bad values, and resample to one uniform clock.
 
     The result has the log's median rate, time from 0, neither shifted nor filtered. A torque that the rotors are to
@@ -90,7 +90,8 @@ def read_signals(
     clock, rate_hz, hurried = _uniform_clock(table.time, settings.time_unit)
     on_clock = {name: repair.fill(table.time, values, clock) for name, values in repaired.signals.items()}
     stretches.refuse_steep_pitch(on_clock)
-    setpoints, unknown = _setpoints(asked, clock, mapped)
+    converted: dict[str, Any] = {**conversion.to_program_frames(on_clock, settings)}
+    setpoints, unknown = _setpoints(asked, clock, mapped, converted.get("attitude"))
     slow = bandwidth.slow_signals(table, stamped_hz)
     filtered = bandwidth.cut_offs(on_clock, rate_hz, slow)
     dead = stretches.warn_of_dead(table, counts["saturated"], settings)
@@ -101,7 +102,9 @@ def read_signals(
         *(*hurried, *stretches.warn_of_angles(read.signals), *unknown),
     )
     dropped |= {"incomplete_ends": incomplete_ends, "gap": beyond_gap}
-    report = ImportReport(
+    return Imported(
+        time=clock - clock[0],
+        **converted | setpoints,
         samples_read=len(read.time),
         samples=len(clock),
         dropped={reason: rows for reason, rows in dropped.items() if rows},
@@ -119,14 +122,11 @@ def read_signals(
         parameters={},
         stated={},
     )
-    converted = conversion.to_program_frames(on_clock, settings)
-    if "attitude" in setpoints and "attitude" in converted:
-        # A full turn away from the vehicle's own is the same.
-        setpoints["attitude"] = converted["attitude"] + rotations.wrapped(setpoints["attitude"] - converted["attitude"])
-    return ImportedFlight(time=clock - clock[0], setpoints=setpoints, report=report, **converted)
 
 
-def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tuple[dict[str, Array], list[str]]:
+def _setpoints(
+    asked: SignalTable, clock: Array, settings: ImportSettings, attitude: Array | None
+) -> tuple[dict[str, Array], list[str]]:
     """Put what was asked for on a clock; what is nowhere known is left out, with a sentence."""
     held = {
         name: np.column_stack([hold_asked(asked.time, column, clock, settings.gap_s) for column in values.T])
@@ -134,7 +134,12 @@ def _setpoints(asked: SignalTable, clock: Array, settings: ImportSettings) -> tu
     }
     known = {name: values for name, values in held.items() if np.isfinite(values).all(axis=1).any()}
     left = [f"signal {name} is left out: it holds no setpoint in the part that is kept" for name in held.keys() - known]
-    return conversion.setpoints_to_program_frames(known, settings), left
+    own = conversion.setpoints_to_program_frames(known, settings)
+    if "attitude" in own and attitude is not None:
+        # A full turn away from the vehicle's own is the same.
+        own["attitude"] = attitude + rotations.wrapped(own["attitude"] - attitude)
+    found: dict[str, Array] = {name: own[short] for name, short in SETPOINTS.items() if short in own}
+    return found | {name: found[name][:, 0] for name in ("setpoint_thrust",) if name in found}, left
 
 
 def _uniform_clock(time: Array, unit: str) -> tuple[Array, float, list[str]]:
@@ -151,32 +156,30 @@ def _uniform_clock(time: Array, unit: str) -> tuple[Array, float, list[str]]:
     return time[0] + period * np.arange(samples), rate_hz, [words] if rate_hz >= _FASTEST_HZ else []
 
 
-def derive_flight(signals: ImportedFlight, settings: ImportSettings) -> ImportedFlight:
+def derive_flight(signals: Imported, settings: ImportSettings) -> Imported:
     """Filter all signals alike, derive rates, accelerations and torques, and interpolate to `rate_hz` last.
 
     One filter for every signal keeps the torque equation: its linear part holds between filtered signals as it did
     between the raw ones (section 1 of the method's description). Setpoints stay as they were asked for.
     """
     filtered: dict[str, Any] = {
-        name: low_pass(values, signals.report.log_rate_hz, settings.lowpass_hz, settings.lowpass_order)
-        for name, values in signals.arrays.items()
+        name: low_pass(values, signals.log_rate_hz, settings.lowpass_hz, settings.lowpass_order)
+        for name, values in signals.measured.items()
     }
-    smooth = replace(signals, **filtered)
-    arrays = smooth.arrays | _derived(smooth)
-    time, setpoints = smooth.time, dict(smooth.setpoints)
-    report = replace(signals.report, lowpass_hz=settings.lowpass_hz)
-    if settings.rate_hz is not None:
-        from scipy.interpolate import CubicSpline
+    smooth = replace(signals, **filtered, lowpass_hz=settings.lowpass_hz)
+    arrays: dict[str, Any] = smooth.measured | _derived(smooth)
+    if settings.rate_hz is None:
+        return replace(smooth, **arrays)
+    from scipy.interpolate import CubicSpline
 
-        time = _clock(time, settings.rate_hz, report.log_rate_hz)
-        arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
-        previous = previous_rows(smooth.time, time)
-        setpoints = {name: values[previous] for name, values in setpoints.items()}
-        warnings, cutoff = report.warnings, settings.lowpass_hz
-        if settings.rate_hz < report.log_rate_hz * 0.99 and (cutoff is None or cutoff >= settings.rate_hz / 2):
-            warnings += (_ALIASING,)
-        report = replace(report, rate_hz=settings.rate_hz, samples=len(time), warnings=warnings)
-    return replace(signals, time=time, setpoints=setpoints, report=report, **arrays)
+    time = _clock(smooth.time, settings.rate_hz, smooth.log_rate_hz)
+    arrays = {name: CubicSpline(smooth.time, values)(time) for name, values in arrays.items()}
+    previous = previous_rows(smooth.time, time)
+    arrays |= {name: values[previous] for name, values in smooth.asked.items()}
+    warnings, cutoff = smooth.warnings, settings.lowpass_hz
+    if settings.rate_hz < smooth.log_rate_hz * 0.99 and (cutoff is None or cutoff >= settings.rate_hz / 2):
+        warnings += (_ALIASING,)
+    return replace(smooth, time=time, rate_hz=settings.rate_hz, samples=len(time), warnings=warnings, **arrays)
 
 
 def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
@@ -190,7 +193,7 @@ def _clock(time: Array, rate_hz: float, log_rate_hz: float) -> Array:
     return np.arange(samples) / rate_hz
 
 
-def _derived(signals: ImportedFlight) -> dict[str, Array]:
+def _derived(signals: Imported) -> dict[str, Array]:
     body_rate = body_rate_of(signals.time, signals.attitude, signals.body_rate)
     derived = {} if body_rate is None else {"body_rate": body_rate}
     if signals.attitude is None or body_rate is None:
@@ -211,7 +214,7 @@ def _derived(signals: ImportedFlight) -> dict[str, Array]:
 # Commands aligned with the motion: the lag of the rotors, and the delay between torque command and motion.
 
 
-def align_commands(signals: ImportedFlight, settings: ImportSettings, delay_share: float = 1.0) -> ImportedFlight:
+def align_commands(signals: Imported, settings: ImportSettings, delay_share: float = 1.0) -> Imported:
     """Shift torque, thrust and rotor commands by the delay, given or estimated, and drop the samples before it.
 
     Measured rotor speeds are motion and stay, unless the torque is computed from them. The signals are not yet
@@ -225,9 +228,9 @@ def align_commands(signals: ImportedFlight, settings: ImportSettings, delay_shar
         filtered = (settings.delay_max_s, settings.lowpass_hz, settings.lowpass_order)
         estimate = estimate_delay(signals.time, body_rate, signals.body_torque, *filtered, share=delay_share)
     delay = estimate.delay_s if estimate else float(settings.delay_s)
-    warnings = signals.report.warnings + (_warnings(estimate) if estimate else ())
-    report = replace(signals.report, delay_s=delay, delay=estimate, warnings=warnings)
-    return _shifted(replace(signals, report=report), delay, settings.torque_source == "rotor-speed")
+    warnings = signals.warnings + (_warnings(estimate) if estimate else ())
+    aligned = replace(signals, delay_s=delay, delay=estimate, warnings=warnings)
+    return _shifted(aligned, delay, settings.torque_source == "rotor-speed")
 
 
 def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
@@ -243,7 +246,7 @@ def _warnings(estimate: DelayEstimate) -> tuple[str, ...]:
     return tuple(sentence for sentence, so in holds.items() if so)
 
 
-def _shifted(signals: ImportedFlight, delay: float, speeds_command: bool) -> ImportedFlight:
+def _shifted(signals: Imported, delay: float, speeds_command: bool) -> Imported:
     if delay == 0:
         return signals
     period = signals.time[1] - signals.time[0]
@@ -251,17 +254,16 @@ def _shifted(signals: ImportedFlight, delay: float, speeds_command: bool) -> Imp
     if first > len(signals.time) - 2:
         raise SettingError("delay_s", f"longer than the flight, {signals.time[-1]:.4g} s")
     time = signals.time[first:]
-    cut = {name: values[first:] for name, values in signals.arrays.items()}
+    cut: dict[str, Any] = {name: values[first:] for name, values in signals.signals.items()}
     for name in (*_COMMANDS, "rotor_speed") if speeds_command else _COMMANDS:
         if name in cut:
             # A cubic overshoots the steps of a command; it stays within what was commanded.
-            values = signals.arrays[name]
+            values = signals.measured[name]
             moved = np.clip(delayed(values, delay / period), values.min(axis=0), values.max(axis=0))
             cut[name] = moved[first:]
-    begin, end = signals.report.span_s
-    report = replace(signals.report, samples=len(time), span_s=(begin + float(time[0]), end))
-    setpoints = {name: values[first:] for name, values in signals.setpoints.items()}
-    return replace(signals, time=time - time[0], report=report, setpoints=setpoints, **cut)
+    begin, end = signals.span_s
+    cut["time"] = time - time[0]
+    return replace(signals, samples=len(time), span_s=(begin + float(time[0]), end), **cut)
 
 
 def estimate_delay(
@@ -339,7 +341,7 @@ def _window(time: Array, longest_s: float, lowpass_hz: float | None) -> slice:
     return slice(first, last)
 
 
-def apply_rotor_lag(signals: ImportedFlight, time_constant: float) -> ImportedFlight:
+def apply_rotor_lag(signals: Imported, time_constant: float) -> Imported:
     """Replace rotor commands by their first-order response in tau s, ``tau w' + w = u``, u held between samples."""
     command = signals.rotor_command
     if command is None or time_constant == 0:

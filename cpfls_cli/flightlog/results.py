@@ -1,12 +1,14 @@
-"""Results of an import: the signals on one clock, the flight derived from them, and the report."""
+"""A flight as its file holds it, a source that lacks a signal leaves it out; and what an import did to make it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import Any, ClassVar, Final
+
+import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.result import about, part, result
+from cpfls_cli.flightlog.settings import SETPOINTS
+from cpfls_cli.result import BODY, EULER, WORLD, About, about, described_fields, part, result
 
 _DROPPED: Final = MappingProxyType(
     {
@@ -86,38 +88,128 @@ class ImportReport:
         return {what: count for what, count in counts.items() if count}
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ImportedFlight:
-    """Signals of a log on a uniform clock, in SI, body frame FLU, world frame ENU; None where the log lacks one.
+def _signal(text: str, *axes: str, **more: Any) -> Any:
+    return about(text, "time", *axes, default=None, brief=False, **more)
 
-    Shapes are (time, 3), of thrust and voltage (time,), of rotors (time, rotor); the flight's file describes each
-    (`flights.flight.Flight`). What is derived with an attitude is None until then.
-    """
 
-    time: Array  # Shape (time,), s, from 0.
-    attitude: Array | None = None  # Roll, pitch, yaw, rad; roll and yaw without jumps of a full turn.
-    body_rate: Array | None = None
-    body_torque: Array | None = None
-    thrust: Array | None = None
-    position: Array | None = None
-    velocity: Array | None = None
-    acceleration: Array | None = None  # Over ground.
-    specific_force: Array | None = None  # What an accelerometer senses, R^T (a + g e_z).
-    rotor_speed: Array | None = None
-    rotor_command: Array | None = None  # In the SI unit of the signal's `unit`.
-    voltage: Array | None = None  # V, or 1 as a share of the full battery's.
-    # What was asked for, by the names of `SETPOINTS`, shape (time, column), neither shifted nor filtered; NaN where
-    # nothing was.
-    setpoints: Mapping[str, Array]
-    report: ImportReport
-    # Derived: Euler rates W^-1 omega, rad/s, their derivatives, and the generalised torque on the Euler coordinates,
-    # W^T tau_body, N m.
-    attitude_rate: Array | None = None
-    attitude_acceleration: Array | None = None
-    torque: Array | None = None
+@result
+class Flight:
+    """A flight: its signals on one clock."""
+
+    FORMAT: ClassVar = "cpfls/flight"
+    STREAMED: ClassVar = "time"
+    MADE_BY: ClassVar = "simulate or import"
+
+    time: Array = about("time from the first sample", "time", unit="s", ascends=True, brief=False)
+    attitude: Array | None = _signal("roll, pitch, yaw q", "axis", unit="rad", frame=EULER)
+    attitude_rate: Array | None = _signal("Euler rates qd", "axis", unit="rad/s", frame=EULER)
+    attitude_acceleration: Array | None = _signal("Euler accelerations qdd", "axis", unit="rad/s^2", frame=EULER)
+    body_rate: Array | None = _signal("body rates p, q, r", "axis", unit="rad/s", frame=BODY)
+    torque: Array | None = _signal("generalised torque, W^T body_torque", "axis", unit="N m", frame=EULER)
+    body_torque: Array | None = _signal("torque about the body axes", "axis", unit="N m", frame=BODY)
+    thrust: Array | None = _signal("total thrust along body z", unit="N", frame=BODY)
+    position: Array | None = _signal("position", "axis", unit="m", frame=WORLD)
+    velocity: Array | None = _signal("velocity", "axis", unit="m/s", frame=WORLD)
+    acceleration: Array | None = _signal("acceleration", "axis", unit="m/s^2", frame=WORLD)
+    specific_force: Array | None = _signal(
+        "what an accelerometer senses: +g along z in hover", "axis", unit="m/s^2", frame=BODY
+    )
+    rotor_speed: Array | None = _signal("rotor speeds", "rotor", unit="rad/s", frame=BODY, gaps=True)
+    rotor_command: Array | None = _signal(
+        "commands to the rotors; rad/s if simulated, else aligned, filtered, in import.signals.rotor_command.unit",
+        "rotor",
+        unit="SI",
+        frame=BODY,
+    )
+    voltage: Array | None = _signal(
+        "of the battery: V; share of the full one if simulated or where import.signals.voltage.unit is 1", unit="SI"
+    )
+    setpoint_position: Array | None = _signal(
+        "position setpoint; not finite where there is none", "axis", unit="m", frame=WORLD, gaps=True
+    )
+    setpoint_velocity: Array | None = _signal("velocity setpoint", "axis", unit="m/s", frame=WORLD, gaps=True)
+    setpoint_attitude: Array | None = _signal("roll, pitch, yaw setpoints", "axis", unit="rad", frame=EULER, gaps=True)
+    setpoint_body_rate: Array | None = _signal("body rate setpoints", "axis", unit="rad/s", frame=BODY, gaps=True)
+    setpoint_thrust: Array | None = _signal(
+        "thrust setpoint: N, or share of the largest where import.signals.setpoint_thrust.unit is 1",
+        unit="SI",
+        frame=BODY,
+        gaps=True,
+    )
+    sticks: Array | None = _signal(
+        "roll, pitch, yaw and, where it counts alike, throttle of the pilot, shares of full deflection as logged",
+        "stick",
+        gaps=True,
+    )
+    begins: float = about("stamp of the log's own clock at time 0", unit="s", gaps=True, default=np.nan)
+
+    @classmethod
+    def about_signals(cls) -> dict[str, About]:
+        """Describe time and the signals that a flight can hold, by name."""
+        known = ((own.name, own.about) for own in described_fields(Flight) if own.name != "begins")
+        return {name: described for name, described in known if described}
 
     @property
-    def arrays(self) -> dict[str, Array]:
-        """Signals that there are, by name, without the setpoints."""
-        held = {name: own for name, own in vars(self).items() if name not in ("time", "setpoints", "report")}
-        return {name: held[name] for name in sorted(held) if held[name] is not None}
+    def signals(self) -> dict[str, Array]:
+        """Time and the signals that it holds, by the names of the fields."""
+        return {name: values for name in self.about_signals() if (values := getattr(self, name)) is not None}
+
+    @property
+    def setpoints(self) -> dict[str, int]:
+        """Samples at which each setpoint that it holds is known, by the names of `SETPOINTS`."""
+        held = {short: values for name, short in SETPOINTS.items() if (values := getattr(self, name)) is not None}
+        known = {name: np.isfinite(values.reshape(len(values), -1)).all(axis=1) for name, values in held.items()}
+        return {name: int(np.sum(own)) for name, own in known.items()}
+
+    @property
+    def max_torque(self) -> list[float]:
+        """Largest generalised torque on roll, pitch and yaw, N m; empty where it holds no torque."""
+        return [] if self.torque is None else np.max(np.abs(self.torque), axis=0).tolist()
+
+    @property
+    def turns(self) -> bool:
+        """Whether roll or pitch goes round the circle."""
+        if self.attitude is None or self.attitude_rate is None:
+            return False
+        return bool(np.ptp(self.attitude[:, :2], axis=0).max() > 2 * np.pi)
+
+    @property
+    def has_rotors(self) -> bool:
+        """Whether speeds of rotors, or commands to them, are known."""
+        return self.rotor_speed is not None or self.rotor_command is not None
+
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """What later commands will miss: ``attitude``, ``rotation`` (of any kind), ``torque``."""
+        missing = {
+            "attitude": self.attitude is None,
+            "rotation": self.attitude is None and self.body_rate is None,
+            "torque": self.torque is None and self.body_torque is None,
+        }
+        return tuple(name for name, lacking in missing.items() if lacking)
+
+
+@result
+class Imported(Flight, ImportReport):
+    """A flight imported from a log, and what the import did."""
+
+    SHOWN: ClassVar = ("max_torque", "setpoints", "delay_r2")
+
+    contradictions: tuple[str, ...] = about(
+        "what contradicts itself, or the vehicle of the config", "contradiction", default=()
+    )
+
+    @property
+    def measured(self) -> dict[str, Array]:
+        """What was measured or commanded, in the order of the alphabet."""
+        return {name: own for name, own in sorted(self.signals.items()) if name not in ("time", *SETPOINTS)}
+
+    @property
+    def asked(self) -> dict[str, Array]:
+        """What was asked for."""
+        return {name: own for name, own in self.signals.items() if name in SETPOINTS}
+
+    @property
+    def delay_r2(self) -> Array | None:
+        """Share of the torque explained about each body axis at the delay; None where the config states the delay."""
+        return None if self.delay is None else self.delay.r2

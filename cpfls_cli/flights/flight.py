@@ -1,4 +1,4 @@
-"""A flight as its file holds it, simulated or imported from a log; a source that lacks a signal leaves it out."""
+"""Flights as their files hold them: simulated ones with what is known of their truth, and which kind a file is."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import Origin, read_origin
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.results import ImportedFlight, ImportReport
-from cpfls_cli.flightlog.settings import SETPOINTS
-from cpfls_cli.regressor.regressor import Motion
-from cpfls_cli.result import BODY, EULER, WORLD, About, about, described_fields, part, result
+from cpfls_cli.flightlog.results import Flight, Imported
+from cpfls_cli.result import about, part, result
 from cpfls_cli.store import read
 
 if TYPE_CHECKING:
@@ -24,142 +22,6 @@ if TYPE_CHECKING:
 
 MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
 """Fields of trajectories and flights that hold Euler angles and their derivatives."""
-
-
-def _signal(text: str, *axes: str, **more: Any) -> Any:
-    return about(text, "time", *axes, default=None, brief=False, **more)
-
-
-@result
-class Flight:
-    """A flight: its signals on one clock."""
-
-    FORMAT: ClassVar = "cpfls/flight"
-    STREAMED: ClassVar = "time"
-    MADE_BY: ClassVar = "simulate or import"
-
-    time: Array = about("time from the first sample", "time", unit="s", ascends=True, brief=False)
-    attitude: Array | None = _signal("roll, pitch, yaw q", "axis", unit="rad", frame=EULER)
-    attitude_rate: Array | None = _signal("Euler rates qd", "axis", unit="rad/s", frame=EULER)
-    attitude_acceleration: Array | None = _signal("Euler accelerations qdd", "axis", unit="rad/s^2", frame=EULER)
-    body_rate: Array | None = _signal("body rates p, q, r", "axis", unit="rad/s", frame=BODY)
-    torque: Array | None = _signal("generalised torque, W^T body_torque", "axis", unit="N m", frame=EULER)
-    body_torque: Array | None = _signal("torque about the body axes", "axis", unit="N m", frame=BODY)
-    thrust: Array | None = _signal("total thrust along body z", unit="N", frame=BODY)
-    position: Array | None = _signal("position", "axis", unit="m", frame=WORLD)
-    velocity: Array | None = _signal("velocity", "axis", unit="m/s", frame=WORLD)
-    acceleration: Array | None = _signal("acceleration", "axis", unit="m/s^2", frame=WORLD)
-    specific_force: Array | None = _signal(
-        "what an accelerometer senses: +g along z in hover", "axis", unit="m/s^2", frame=BODY
-    )
-    rotor_speed: Array | None = _signal("rotor speeds", "rotor", unit="rad/s", frame=BODY, gaps=True)
-    rotor_command: Array | None = _signal(
-        "commands to the rotors; rad/s if simulated, else aligned, filtered, in import.signals.rotor_command.unit",
-        "rotor",
-        unit="SI",
-        frame=BODY,
-    )
-    voltage: Array | None = _signal(
-        "of the battery: V; share of the full one if simulated or where import.signals.voltage.unit is 1", unit="SI"
-    )
-    setpoint_position: Array | None = _signal(
-        "position setpoint; not finite where there is none", "axis", unit="m", frame=WORLD, gaps=True
-    )
-    setpoint_velocity: Array | None = _signal("velocity setpoint", "axis", unit="m/s", frame=WORLD, gaps=True)
-    setpoint_attitude: Array | None = _signal("roll, pitch, yaw setpoints", "axis", unit="rad", frame=EULER, gaps=True)
-    setpoint_body_rate: Array | None = _signal("body rate setpoints", "axis", unit="rad/s", frame=BODY, gaps=True)
-    setpoint_thrust: Array | None = _signal(
-        "thrust setpoint: N, or share of the largest where import.signals.setpoint_thrust.unit is 1",
-        unit="SI",
-        frame=BODY,
-        gaps=True,
-    )
-    sticks: Array | None = _signal(
-        "roll, pitch, yaw and, where it counts alike, throttle of the pilot, shares of full deflection as logged",
-        "stick",
-        gaps=True,
-    )
-    begins: float = about("stamp of the log's own clock at time 0", unit="s", gaps=True, default=np.nan)
-
-    @classmethod
-    def about_signals(cls) -> dict[str, About]:
-        """Describe time and the signals that a flight can hold, by name."""
-        known = ((own.name, own.about) for own in described_fields(Flight) if own.name != "begins")
-        return {name: described for name, described in known if described}
-
-    @property
-    def signals(self) -> dict[str, Array]:
-        """Time and the signals that it holds, by the names of the fields."""
-        return {name: values for name in self.about_signals() if (values := getattr(self, name)) is not None}
-
-    @property
-    def setpoints(self) -> dict[str, int]:
-        """Samples at which each setpoint that it holds is known, by the names of `SETPOINTS`."""
-        held = {short: values for name, short in SETPOINTS.items() if (values := getattr(self, name)) is not None}
-        known = {name: np.isfinite(values.reshape(len(values), -1)).all(axis=1) for name, values in held.items()}
-        return {name: int(np.sum(own)) for name, own in known.items()}
-
-    @property
-    def motion(self) -> Motion:
-        """Euler angles and their derivatives, of a flight that holds all of `MOTION`."""
-        assert self.attitude is not None, "the flight has no attitude"
-        assert self.attitude_rate is not None, "the flight has no Euler rates"
-        assert self.attitude_acceleration is not None, "the flight has no Euler accelerations"
-        return Motion(self.attitude, self.attitude_rate, self.attitude_acceleration)
-
-    @property
-    def max_torque(self) -> list[float]:
-        """Largest generalised torque on roll, pitch and yaw, N m; empty where it holds no torque."""
-        return [] if self.torque is None else np.max(np.abs(self.torque), axis=0).tolist()
-
-    @property
-    def turns(self) -> bool:
-        """Whether roll or pitch goes round the circle."""
-        if self.attitude is None or self.attitude_rate is None:
-            return False
-        return bool(np.ptp(self.attitude[:, :2], axis=0).max() > 2 * np.pi)
-
-    @property
-    def has_rotors(self) -> bool:
-        """Whether speeds of rotors, or commands to them, are known."""
-        return self.rotor_speed is not None or self.rotor_command is not None
-
-    @property
-    def lacks(self) -> tuple[str, ...]:
-        """What later commands will miss: ``attitude``, ``rotation`` (of any kind), ``torque``."""
-        missing = {
-            "attitude": self.attitude is None,
-            "rotation": self.attitude is None and self.body_rate is None,
-            "torque": self.torque is None and self.body_torque is None,
-        }
-        return tuple(name for name, lacking in missing.items() if lacking)
-
-
-@result
-class Imported(Flight, ImportReport):
-    """A flight imported from a log, and what the import did."""
-
-    SHOWN: ClassVar = ("max_torque", "setpoints", "delay_r2")
-
-    contradictions: tuple[str, ...] = about(
-        "what contradicts itself, or the vehicle of the config", "contradiction", default=()
-    )
-
-    @classmethod
-    def of(cls, flight: ImportedFlight) -> Self:
-        """Put signals and report of an import together."""
-        report = flight.report
-        names = [name for name in cls.about_signals() if name not in SETPOINTS]
-        asked = {name: flight.setpoints[short] for name, short in SETPOINTS.items() if short in flight.setpoints}
-        if "setpoint_thrust" in asked:
-            asked["setpoint_thrust"] = asked["setpoint_thrust"][:, 0]
-        given: dict[str, Any] = {name: getattr(flight, name) for name in names} | asked | vars(report)
-        return cls(**given, begins=report.first_stamp_s + report.span_s[0])
-
-    @property
-    def delay_r2(self) -> Array | None:
-        """Share of the torque explained about each body axis at the delay; None where the config states the delay."""
-        return None if self.delay is None else self.delay.r2
 
 
 @result

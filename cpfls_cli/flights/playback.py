@@ -17,7 +17,7 @@ from cpfls_cli.consistency.rotors import beyond_belief
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.repair import common_rate, same_rate
-from cpfls_cli.flightlog.results import ImportedFlight
+from cpfls_cli.flightlog.results import Imported
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flights.recordings import (
     FEWEST,
@@ -67,13 +67,13 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
     return (replace(first, warnings=(*stated, *first.warnings)), *flights[1:])
 
 
-def _parts(path: Path, study: Study) -> list[ImportedFlight]:
+def _parts(path: Path, study: Study) -> list[Imported]:
     """Import all parts of a log between its long gaps, in time."""
     longest = _importing(study, gap_rule="longest-part")
     first = imported(path, longest)
     # A delay that is estimated is estimated once, on the longest part.
-    others = _importing(longest, delay_s=first.report.delay_s)
-    parts, left = [first], _around(first, first.report.crop_s or (0.0, np.inf))
+    others = _importing(longest, delay_s=first.delay_s)
+    parts, left = [first], _around(first, first.crop_s or (0.0, np.inf))
     while left and len(parts) < _MOST_PARTS:
         begin, end = left.pop(0)
         try:
@@ -83,19 +83,19 @@ def _parts(path: Path, study: Study) -> list[ImportedFlight]:
             continue
         parts.append(part)
         left += _around(part, (begin, end))
-    return sorted(parts, key=lambda part: part.report.span_s[0])
+    return sorted(parts, key=lambda part: part.span_s[0])
 
 
 def _importing(study: Study, **changes: Any) -> Study:
     return study.model_copy(update={"import_": replace(study.import_, **changes)})
 
 
-def _around(part: ImportedFlight, crop: tuple[float, float]) -> list[tuple[float, float]]:
+def _around(part: Imported, crop: tuple[float, float]) -> list[tuple[float, float]]:
     """List what a part leaves of a log before and behind itself, where it has a gap there."""
-    if not part.report.dropped.get("gap"):
+    if not part.dropped.get("gap"):
         return []
-    begin, end = part.report.span_s
-    apart = 0.5 / part.report.log_rate_hz
+    begin, end = part.span_s
+    apart = 0.5 / part.log_rate_hz
     return [(a, b) for a, b in ((crop[0], begin - apart), (end + apart, crop[1])) if b - a > FEWEST * apart]
 
 

@@ -24,7 +24,8 @@ from cpfls_cli.dynamics import (
 )
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.flight import MOTION, Flight, require_signals
+from cpfls_cli.flightlog.results import Flight
+from cpfls_cli.flights.flight import MOTION, require_signals
 from cpfls_cli.flights.models import any_model, is_found, read_model
 from cpfls_cli.flights.recordings import read_alone
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles

@@ -22,11 +22,11 @@ from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.importing import import_log
-from cpfls_cli.flightlog.results import ImportedFlight
+from cpfls_cli.flightlog.results import Imported
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster, shown_slowly, stated_vehicle
-from cpfls_cli.flights.flight import Imported, read_whole
+from cpfls_cli.flights.flight import read_whole
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import LogColumns, is_log, read_log
@@ -36,7 +36,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import common_windows
 
 
-def imported(log: Path, study: Study) -> ImportedFlight:
+def imported(log: Path, study: Study) -> Imported:
     """Import a log in memory."""
     read = read_log(log, study.import_)
     study = study.model_copy(update={"import_": read.settings})
@@ -49,16 +49,17 @@ def imported(log: Path, study: Study) -> ImportedFlight:
             delay_share=study.identification.training_share,
             stamped_hz=read.stamped_hz,
         )
-    report = replace(
-        flight.report,
-        warnings=(*flight.report.warnings, *read.warnings),
+    stamp = read.begins + flight.first_stamp_s
+    return replace(
+        flight,
+        warnings=(*flight.warnings, *read.warnings),
         flown_at=read.flown_at,
-        first_stamp_s=read.begins + flight.report.first_stamp_s,
+        first_stamp_s=stamp,
+        begins=stamp + flight.span_s[0],
         system=read.system,
         parameters=_parameters(read),
         stated=stated_vehicle(read.system, read.parameters),
     )
-    return replace(flight, report=report)
 
 
 def _parameters(read: LogColumns) -> dict[str, float]:
@@ -75,10 +76,10 @@ def _naming(log: Path) -> Iterator[None]:
         raise type(error)("\n".join(f"{log}: {line}" for line in str(error).splitlines())) from None
 
 
-def _rotor_torque(study: Study) -> Callable[[ImportedFlight], Array]:
+def _rotor_torque(study: Study) -> Callable[[Imported], Array]:
     """Make the body torque of the rotors from their speeds, or from commands taken for speeds."""
 
-    def torque(signals: ImportedFlight) -> Array:
+    def torque(signals: Imported) -> Array:
         if study.import_.torque_source == "rotor-speed":
             speed = signals.rotor_speed
         else:
@@ -190,27 +191,27 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     return own
 
 
-def read_import(name: str, parts: Sequence[ImportedFlight], study: Study) -> ReadFlight:
+def read_import(name: str, parts: Sequence[Imported], study: Study) -> ReadFlight:
     """Join the parts of a log that were imported: several are on the clock of the log, one on a clock of its own."""
     for part in parts:
         _require_speeds(name, part, study)
     first = parts[0]
-    updated = min((part.report.updated_hz for part in parts), key=lambda each: min(each.values(), default=np.inf))
-    signals, begins = [Imported.of(part).signals for part in parts], first.report.first_stamp_s
+    updated = min((part.updated_hz for part in parts), key=lambda each: min(each.values(), default=np.inf))
+    signals, begins = [part.signals for part in parts], first.first_stamp_s
     notes: tuple[str, ...] = ()
     if len(parts) == 1:
-        done = (f"{what} ({count})" for what, count in first.report.findings.items())
-        joined, begins, notes = signals[0], begins + first.report.span_s[0], (*done, *first.report.warnings)
+        done = (f"{what} ({count})" for what, count in first.findings.items())
+        joined, begins, notes = signals[0], first.begins, (*done, *first.warnings)
     else:
         shared = [each for each in signals[0] if all(each in own for own in signals)]
         for own, part in zip(signals, parts, strict=True):
-            own["time"] = own["time"] + part.report.span_s[0]
+            own["time"] = own["time"] + part.span_s[0]
         joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
-    known = (first.report.stated, first.report.system)
-    return ReadFlight(name, joined, _units(study), notes, first.report.flown_at, updated, begins, *known)
+    known = (first.stated, first.system)
+    return ReadFlight(name, joined, _units(study), notes, first.flown_at, updated, begins, *known)
 
 
-def _require_speeds(log: str, part: ImportedFlight, study: Study) -> None:
+def _require_speeds(log: str, part: Imported, study: Study) -> None:
     """Refuse speeds of rotors in a unit in which no vehicle flies, where another one carries it."""
     for name in ("rotor_speed", "rotor_command"):
         columns, speed = study.import_.signals.get(name), getattr(part, name)

@@ -18,8 +18,9 @@ from cpfls_cli.consistency.check import ENOUGH
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.files import read_content
+from cpfls_cli.flightlog.results import Flight
 from cpfls_cli.flightlog.settings import SETPOINTS
-from cpfls_cli.flights.flight import MOTION, Flight, require_signals
+from cpfls_cli.flights.flight import MOTION, require_signals
 from cpfls_cli.flights.recordings import (
     ReadFlight,
     check_flight,

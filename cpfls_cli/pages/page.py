@@ -14,7 +14,7 @@ from markupsafe import Markup
 from cpfls_cli import page
 from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement, Extended
 from cpfls_cli.artifacts.identified import IdentifiedModel
-from cpfls_cli.flights.flight import Flight, Imported
+from cpfls_cli.flightlog.results import Flight, Imported
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.comparison import BEYOND, compared_constants

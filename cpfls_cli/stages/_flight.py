@@ -8,7 +8,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.law import AXES
-from cpfls_cli.flights.flight import Flight, Infeasible
+from cpfls_cli.flightlog.results import Flight
+from cpfls_cli.flights.flight import Infeasible
 from cpfls_cli.report.canvas import Drawn, legend_above, line, stacked, style_of
 from cpfls_cli.report.content import plain
 from cpfls_cli.simulation.inverse import Flyability, TooMuch

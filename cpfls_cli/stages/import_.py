@@ -7,7 +7,7 @@ from dataclasses import replace
 from cpfls_cli.arguments import LogArgument
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.rotors import beyond_belief
-from cpfls_cli.flights.flight import Imported
+from cpfls_cli.flightlog.results import Imported
 from cpfls_cli.flights.recordings import check_flight, doubts_on_voltage, imported, read_import
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import FIGURES, WORDS
@@ -17,12 +17,11 @@ from cpfls_cli.stages._flight import FIGURES, WORDS
 def import_(run: Run, log: LogArgument) -> Imported | None:
     """Import a log, and check it against itself and the vehicle of the config."""
     run.take({"log": log})
-    flight = imported(log, run.study)
+    made = imported(log, run.study)
     # An import is quick, and only the whole of it shows that every key suits the log.
     if run.dry_run:
         return None
-    made = Imported.of(flight)
-    read = read_import(log.name, [flight], run.study)
+    read = read_import(log.name, [made], run.study)
     findings = (*beyond_belief(run.study.vehicle), *check_flight(read, run.study))
     never = contradictions(findings)
     doubted = [each.sentence for each in findings if each.sentence not in never]

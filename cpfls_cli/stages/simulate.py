@@ -18,7 +18,8 @@ from cpfls_cli.artifacts.job import require_numbers
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flights.flight import MOTION, Flight, Infeasible, Simulated, Tracking, values_of
+from cpfls_cli.flightlog.results import Flight
+from cpfls_cli.flights.flight import MOTION, Infeasible, Simulated, Tracking, values_of
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.report.content import Outcome

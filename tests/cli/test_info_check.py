@@ -16,7 +16,7 @@ import pytest
 
 import cpfls_cli
 from cpfls_cli.artifacts.gate import stage_module
-from cpfls_cli.flights.flight import Flight
+from cpfls_cli.flightlog.results import Flight
 from cpfls_cli.result import datasets
 from cpfls_cli.stage import loaded
 from tests.builders.artifacts import edited

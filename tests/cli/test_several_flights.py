@@ -171,8 +171,8 @@ def commands(path, config):
 
 def test_a_config_of_init_imports_rebuilt_motors(flown, log, config):
     flight = commands(log, config)
-    assert flight.report.updated_hz["rotor_command"] == pytest.approx(50, rel=0.02)
-    at = np.searchsorted(flown.time, flight.report.span_s[0] + flight.time + 1e-6, side="right") - 1
+    assert flight.updated_hz["rotor_command"] == pytest.approx(50, rel=0.02)
+    at = np.searchsorted(flown.time, flight.span_s[0] + flight.time + 1e-6, side="right") - 1
     truth = flown.command[at]
     differing = truth - truth.mean(axis=1, keepdims=True)
     own = flight.rotor_command - flight.rotor_command.mean(axis=1, keepdims=True)

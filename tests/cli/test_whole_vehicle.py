@@ -12,7 +12,8 @@ import cpfls_cli
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.flight import Flight, Simulated
+from cpfls_cli.flightlog.results import Flight
+from cpfls_cli.flights.flight import Simulated
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import ModelEffect

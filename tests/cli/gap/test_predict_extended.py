@@ -6,7 +6,7 @@ import pytest
 import cpfls_cli
 from cpfls_cli.config.load import load_study
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.flight import Flight
+from cpfls_cli.flightlog.results import Flight
 from cpfls_cli.store import read
 from cpfls_cli.vehicle.rotors import body_wrench
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.config.study import parse_yaml, to_yaml
-from cpfls_cli.flights.flight import Flight
+from cpfls_cli.flightlog.results import Flight
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.pages.gap_words import WHAT_TO_FLY
 from cpfls_cli.store import read

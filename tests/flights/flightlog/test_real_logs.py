@@ -276,7 +276,7 @@ def rotorpy_flight(source, **changes):
 
 @pytest.mark.parametrize("source", ["rotor-speed", "rotor-command"])
 def test_a_smooth_flight_without_noise_gives_nothing_to_warn_of(source):
-    report = rotorpy_flight(source).report
+    report = rotorpy_flight(source)
     assert (report.warnings, report.gaps, report.suspected_spikes) == ((), 0, {})
 
 
@@ -291,7 +291,7 @@ def test_the_torque_of_the_rotors_is_that_of_the_motion():
 @pytest.mark.parametrize(("source", "delay_s"), [("rotor-speed", 0.0), ("rotor-command", 0.006)])
 def test_the_delay_is_the_motors_lag_and_nothing_for_measured_speeds(source, delay_s):
     """The motors' time constant is 5 ms; the figure of 6 ms is measured, and not below what the lag alone gives."""
-    estimate = rotorpy_flight(source, delay_s="estimate", lowpass_hz=10.0).report.delay
+    estimate = rotorpy_flight(source, delay_s="estimate", lowpass_hz=10.0).delay
     assert estimate.delay_s == pytest.approx(delay_s, abs=1e-3)
     np.testing.assert_allclose(estimate.inertia[:3], INERTIA, rtol=1e-3)
 
@@ -336,11 +336,11 @@ def test_the_estimated_delay_makes_a_rigid_body_explain_the_torque(name, roll, p
     tried = np.arange(0.05, 0.111, 0.005)
     scanned = [swarm_flight(name, delay_s=float(delay)) for delay in tried]
     alone = [tried[np.argmax([explained(candidate, axis) for candidate in scanned])] for axis in (0, 1)]
-    assert min(alone) - 0.005 <= flight.report.delay_s <= max(alone) + 0.005
-    assert not flight.report.delay.at_bound
+    assert min(alone) - 0.005 <= flight.delay_s <= max(alone) + 0.005
+    assert not flight.delay.at_bound
     assert explained(flight, 0) > roll
     assert explained(flight, 1) > pitch
-    assert flight.report.warnings == ()
+    assert flight.warnings == ()
 
 
 @pytest.mark.parametrize("name", ["log119", "log149"])
@@ -362,11 +362,11 @@ def test_attitude_and_gyroscope_of_the_log_agree_about_the_motion(name):
 @pytest.mark.parametrize("lowpass_hz", [None, 3.0, 8.0, 30.0])
 def test_gyroscope_and_attitude_of_a_real_flight_are_not_warned_of(name, lowpass_hz):
     flight = swarm_flight(name, lowpass_hz=lowpass_hz)
-    assert flight.report.warnings == ()
+    assert flight.warnings == ()
     assert wrong_with(flight) == []
     # One pause of the logger in each flight, 24 to 68 ms long.
-    assert flight.report.gaps == 1
-    assert 0.02 < flight.report.longest_gap_s < 0.07
+    assert flight.gaps == 1
+    assert 0.02 < flight.longest_gap_s < 0.07
 
 
 @pytest.mark.parametrize("name", ["log119", "log149", "log45"])
@@ -391,24 +391,24 @@ def test_a_wrong_sign_in_a_real_flight_is_warned_of_by_axis(axis, word):
 def test_a_spike_in_the_gyroscope_of_a_real_flight_is_counted_and_can_be_repaired(row):
     columns, clean = columns_of("log119"), swarm_flight("log119")
     columns["ctrlLee_omegax"][row] += 50
-    seen = taken(columns).report
+    seen = taken(columns)
     assert (seen.suspected_spikes, seen.spikes) == ({"ctrlLee_omegax": 1}, {})
     assert any("1 suspected spike in column ctrlLee_omegax" in text for text in seen.warnings)
     repaired = taken(columns, spike_deviations=10.0)
     # Nothing is there to interpolate from beyond an end, so the row goes.
     at_end = row in (0, 1438)
-    assert (repaired.report.spikes, repaired.report.dropped.get("incomplete_ends", 0)) == (
+    assert (repaired.spikes, repaired.dropped.get("incomplete_ends", 0)) == (
         ({}, 1) if at_end else ({"ctrlLee_omegax": 1}, 0)
     )
-    assert (repaired.report.suspected_spikes, repaired.report.warnings) == ({}, ())
-    at = clean.report.span_s[0] + clean.time
-    rate = np.interp(at, repaired.report.span_s[0] + repaired.time, repaired.body_rate[:, 0])
+    assert (repaired.suspected_spikes, repaired.warnings) == ({}, ())
+    at = clean.span_s[0] + clean.time
+    rate = np.interp(at, repaired.span_s[0] + repaired.time, repaired.body_rate[:, 0])
     assert np.abs(rate - clean.body_rate[:, 0])[20:-20].max() < 0.05
 
 
 def test_rows_lost_from_a_real_flight_are_counted_as_a_gap():
     columns = {name: np.delete(values, slice(400, 412)) for name, values in columns_of("log119").items()}
-    assert taken(columns).report.gaps == swarm_flight("log119").report.gaps + 1
+    assert taken(columns).gaps == swarm_flight("log119").gaps + 1
 
 
 ARPL_SIGNALS = {
@@ -433,7 +433,7 @@ EXACT = {
 
 
 def report(folder, name, signals):
-    return read_signals(columns_of_log(folder, name), ImportSettings(signals=signals, torque_source=None)).report
+    return read_signals(columns_of_log(folder, name), ImportSettings(signals=signals, torque_source=None))
 
 
 @pytest.mark.parametrize(

@@ -54,8 +54,8 @@ def test_derivatives_of_a_known_motion_come_back(gyro):
 
 def test_an_estimated_delay_puts_command_and_motion_in_step():
     flight = import_log(log(delay=0.0613), ImportSettings(signals=mapped(), delay_s="estimate", lowpass_hz=20.0))
-    assert flight.report.delay_s == pytest.approx(0.0613, abs=1e-4)
-    start = flight.report.span_s[0]
+    assert flight.delay_s == pytest.approx(0.0613, abs=1e-4)
+    start = flight.span_s[0]
     assert start == pytest.approx(PERIOD * np.ceil(0.0613 / PERIOD))
     inner = slice(100, -100)
     expected = torque_at(flight.time + start)[inner]
@@ -91,11 +91,11 @@ def test_the_generalised_torque_of_a_log_is_the_same_flight():
 
 def test_another_rate_is_interpolated_and_thinning_without_a_filter_is_warned_of():
     flight = import_log(log(), ImportSettings(signals=mapped(), rate_hz=100.0))
-    assert flight.report.rate_hz == 100
+    assert flight.rate_hz == 100
     np.testing.assert_allclose(flight.attitude, motion(flight.time)[0], atol=1e-8)
-    assert any("aliases" in sentence for sentence in flight.report.warnings)
+    assert any("aliases" in sentence for sentence in flight.warnings)
     filtered = import_log(log(), ImportSettings(signals=mapped(), rate_hz=100.0, lowpass_hz=20.0))
-    assert filtered.report.warnings == ()
+    assert filtered.warnings == ()
 
 
 def test_rotors_give_the_torque_through_the_function_of_the_caller():

@@ -44,7 +44,7 @@ def test_a_crop_that_is_offered_keeps_what_it_says(time, rows):
     message = refusal(time)
     offer = re.search(r"keep one part of (\d+) rows with import.crop_s = \[(.*), (.*)\]", message)
     assert int(offer[1]) == pytest.approx(rows, abs=2)
-    kept = read(time, crop_s=(float(offer[2]), float(offer[3]))).report
+    kept = read(time, crop_s=(float(offer[2]), float(offer[3])))
     assert kept.samples_read - sum(kept.dropped.values()) == pytest.approx(int(offer[1]), abs=1)
     assert "backward_time" not in kept.dropped
 
@@ -52,13 +52,13 @@ def test_a_crop_that_is_offered_keeps_what_it_says(time, rows):
 def test_late_packets_are_dropped_and_counted_however_many():
     time = STAMPS.copy()
     time[10::10] -= 0.015
-    assert read(time).report.dropped["backward_time"] == 299
+    assert read(time).dropped["backward_time"] == 299
 
 
 def test_bursts_of_late_packets_up_to_five_per_cent_are_dropped():
     time = STAMPS.copy()
     time[1000:1150] -= 5
-    assert read(time).report.dropped["backward_time"] == 150
+    assert read(time).dropped["backward_time"] == 150
     time[1000:1160] = STAMPS[1000:1160] - 5
     assert "at row 1001 (from 9.99 s to 5 s" in refusal(time)
 

@@ -95,13 +95,13 @@ def test_a_gap_and_a_spike_in_new_signals_are_mended():
     flight = imported(columns, spike_deviations=10.0)
     np.testing.assert_allclose(flight.voltage, log()["volt"], rtol=1e-6)
     np.testing.assert_allclose(flight.thrust, log()["thrust"], atol=0.02)
-    assert (flight.report.missing, flight.report.spikes) == ({"volt": 3}, {"thrust": 1})
+    assert (flight.missing, flight.spikes) == ({"volt": 3}, {"thrust": 1})
 
 
 def test_a_coarse_voltage_is_not_taken_for_saturated():
     columns = log()
     columns["volt"] = np.round(columns["volt"], 0)
-    assert "volt" not in imported(columns).report.saturated
+    assert "volt" not in imported(columns).saturated
 
 
 @pytest.mark.parametrize(

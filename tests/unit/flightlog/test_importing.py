@@ -1,9 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.importing import apply_rotor_lag, read_signals
-from cpfls_cli.flightlog.results import ImportedFlight
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
 RATE = {"body_rate": SignalMap(columns=("p", "q", "r"), unit="rad/s")}
@@ -25,9 +26,9 @@ def without(columns, rows):
 def test_a_clean_log_comes_back_as_it_is():
     signals = read_signals(log(), settings())
     np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time), atol=1e-12)
-    assert signals.report.samples_read == signals.report.samples == 201
-    assert signals.report.log_rate_hz == pytest.approx(100)
-    assert not any(signals.report.dropped.values())
+    assert signals.samples_read == signals.samples == 201
+    assert signals.log_rate_hz == pytest.approx(100)
+    assert not any(signals.dropped.values())
 
 
 def test_time_stamps_in_microseconds_from_any_start_give_time_from_zero():
@@ -53,7 +54,7 @@ def test_of_repeated_time_stamps_the_first_counts():
     columns = {name: np.insert(values, 100, values[100]) for name, values in log().items()}
     columns["p"][101] = 99.0
     signals = read_signals(columns, settings())
-    assert signals.report.dropped["repeated_time"] == 1
+    assert signals.dropped["repeated_time"] == 1
     assert signals.body_rate[:, 0].max() <= 1
 
 
@@ -62,25 +63,25 @@ def test_samples_that_go_backward_are_dropped():
     columns["t"][50:53] = 0.1
     columns["p"][50:53] = 99.0
     signals = read_signals(columns, settings())
-    assert signals.report.dropped["backward_time"] == 3
+    assert signals.dropped["backward_time"] == 3
     np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time), atol=1e-4)
 
 
 def test_a_time_stamp_that_is_not_a_number_drops_its_row():
     columns = log()
     columns["t"][50] = np.nan
-    assert read_signals(columns, settings()).report.dropped["time_not_finite"] == 1
+    assert read_signals(columns, settings()).dropped["time_not_finite"] == 1
 
 
 def test_a_short_gap_is_interpolated_and_counted():
     signals = read_signals(without(log(), slice(100, 105)), settings())
-    assert signals.report.gaps == 1
-    assert signals.report.longest_gap_s == pytest.approx(0.06)
+    assert signals.gaps == 1
+    assert signals.longest_gap_s == pytest.approx(0.06)
     np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time), atol=1e-3)
 
 
 def test_a_gap_of_exactly_the_allowed_length_passes():
-    assert read_signals(without(log(), slice(100, 105)), settings(gap_s=0.06)).report.gaps == 1
+    assert read_signals(without(log(), slice(100, 105)), settings(gap_s=0.06)).gaps == 1
 
 
 def test_a_long_gap_stops_and_says_where():
@@ -90,9 +91,9 @@ def test_a_long_gap_stops_and_says_where():
 
 def test_or_the_longest_part_is_kept():
     signals = read_signals(without(log(), slice(120, 150)), settings(gap_rule="longest-part"))
-    assert signals.report.dropped["gap"] == 51
+    assert signals.dropped["gap"] == 51
     assert signals.time[-1] == pytest.approx(1.19)
-    assert any("gap" in sentence for sentence in signals.report.warnings)
+    assert any("gap" in sentence for sentence in signals.warnings)
 
 
 def test_absent_values_are_interpolated_and_counted_by_column():
@@ -100,7 +101,7 @@ def test_absent_values_are_interpolated_and_counted_by_column():
     columns["q"][[40, 41, 42]] = np.nan
     columns["r"][7] = np.inf
     signals = read_signals(columns, settings())
-    assert signals.report.missing == {"q": 3, "r": 1}
+    assert signals.missing == {"q": 3, "r": 1}
     np.testing.assert_allclose(signals.body_rate[:, 1], np.cos(2 * signals.time), atol=2e-3)
 
 
@@ -116,8 +117,8 @@ def test_a_column_that_begins_late_and_ends_early_sets_the_span():
     columns["r"][:20] = np.nan
     columns["r"][-5:] = np.nan
     signals = read_signals(columns, settings())
-    assert signals.report.dropped["incomplete_ends"] == 25
-    assert signals.report.span_s == pytest.approx((0.2, 1.95))
+    assert signals.dropped["incomplete_ends"] == 25
+    assert signals.span_s == pytest.approx((0.2, 1.95))
     np.testing.assert_allclose(signals.body_rate[:, 2], 0.3 * (signals.time + 0.2), atol=1e-12)
 
 
@@ -132,21 +133,21 @@ def test_spikes_are_found_counted_and_interpolated():
     columns["p"] = columns["p"] + 1e-3 * np.random.default_rng(1).standard_normal(201)
     columns["p"][[60, 150]] += [5.0, -4.0]
     signals = read_signals(columns, settings(spike_deviations=8.0))
-    assert signals.report.spikes == {"p": 2}
+    assert signals.spikes == {"p": 2}
     np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time), atol=6e-3)
 
 
 def test_a_spike_in_a_signal_without_noise_is_found_and_nothing_else():
     columns = log()
     columns["r"][80] += 1.0
-    assert read_signals(columns, settings(spike_deviations=6.0)).report.spikes == {"r": 1}
+    assert read_signals(columns, settings(spike_deviations=6.0)).spikes == {"r": 1}
 
 
 def test_jumps_of_a_rotor_command_are_no_spikes():
     columns = log() | {"u": np.where(np.arange(201) == 90, 1.0, 0.2)}
     mapped = RATE | {"rotor_command": SignalMap(columns=("u",), unit="1")}
     signals = read_signals(columns, settings(signals=mapped, spike_deviations=6.0))
-    assert signals.report.spikes == {}
+    assert signals.spikes == {}
     assert signals.rotor_command[90, 0] == pytest.approx(1)
 
 
@@ -154,8 +155,8 @@ def test_without_a_threshold_spikes_are_counted_and_warned_of_and_stay():
     columns = log()
     columns["p"][[60, 61, 150]] += 5.0
     signals = read_signals(columns, settings())
-    assert (signals.report.spikes, signals.report.suspected_spikes) == ({}, {"p": 3})
-    (warning,) = signals.report.warnings
+    assert (signals.spikes, signals.suspected_spikes) == ({}, {"p": 3})
+    (warning,) = signals.warnings
     assert warning.startswith("3 suspected spikes in column p, used as logged: set import.spike_deviations")
     np.testing.assert_allclose(signals.body_rate[:, 0], columns["p"], atol=1e-12)
 
@@ -165,29 +166,29 @@ def test_values_outside_the_part_that_is_kept_are_not_counted():
     columns["q"][[60, 140]] = np.nan
     columns["p"][[30, 155]] += 5.0
     signals = read_signals(columns, settings(gap_rule="longest-part"))
-    assert (signals.report.missing, signals.report.suspected_spikes) == ({"q": 1}, {"p": 1})
+    assert (signals.missing, signals.suspected_spikes) == ({"q": 1}, {"p": 1})
 
 
 def test_saturated_values_are_counted_and_left_alone():
     columns = log()
     columns["q"] = np.clip(columns["q"], -0.5, 0.5)
     signals = read_signals(columns, settings())
-    assert signals.report.saturated == {"q": int((np.abs(columns["q"]) == 0.5).sum())}
-    assert any(sentence.startswith("column q stays at its extreme") for sentence in signals.report.warnings)
+    assert signals.saturated == {"q": int((np.abs(columns["q"]) == 0.5).sum())}
+    assert any(sentence.startswith("column q stays at its extreme") for sentence in signals.warnings)
     np.testing.assert_allclose(signals.body_rate[:, 1], columns["q"], atol=1e-12)
 
 
 def test_a_constant_column_is_not_called_saturated():
     columns = log()
     columns["q"] = np.zeros(201)
-    assert read_signals(columns, settings()).report.saturated == {}
+    assert read_signals(columns, settings()).saturated == {}
 
 
 def test_the_crop_counts_from_the_first_time_stamp():
     columns = log()
     columns["t"] = columns["t"] + 100
     signals = read_signals(columns, settings(crop_s=(0.5, 1.5)))
-    assert signals.report.dropped["crop"] == 100
+    assert signals.dropped["crop"] == 100
     np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time + 0.5), atol=1e-12)
 
 
@@ -221,7 +222,7 @@ def test_degrees_taken_for_radians_stop_at_the_pitch():
 
 def test_a_nose_straight_up_is_no_degrees():
     columns, mapped = attitude(log(), pitch=np.pi / 2 + 0.01 + 1e-3 * log()["p"])
-    assert read_signals(columns, settings(signals=mapped)).report.warnings == ()
+    assert read_signals(columns, settings(signals=mapped)).warnings == ()
 
 
 def test_a_spike_of_the_pitch_that_is_interpolated_is_no_degrees():
@@ -236,9 +237,9 @@ def test_a_spike_of_the_pitch_that_is_interpolated_is_no_degrees():
 @pytest.mark.parametrize("angle", ["roll", "yaw"])
 def test_roll_and_yaw_beyond_a_full_turn_are_doubted_where_no_gyroscope_can_tell(angle):
     columns, mapped = attitude(log(), **{angle: 30 * log()["p"]})
-    (warning,) = read_signals(columns, settings(signals=mapped)).report.warnings
+    (warning,) = read_signals(columns, settings(signals=mapped)).warnings
     assert warning.startswith(f"attitude reaches 30 rad of {angle}: is import.signals.attitude.unit deg?")
-    assert read_signals(columns, settings(signals=mapped | RATE)).report.warnings == ()
+    assert read_signals(columns, settings(signals=mapped | RATE)).warnings == ()
 
 
 @pytest.mark.parametrize(("name", "signal"), [("quaternion", "1"), ("rotor_speed", "rad/s"), ("rotor_command", "1")])
@@ -248,13 +249,13 @@ def test_a_quaternion_near_one_and_rotors_at_rest_are_not_saturated(name, signal
     if name == "quaternion":
         columns |= {"u0": np.minimum(1.0, 1.2 - 0.2 * log()["t"]), "u1": 0 * value, "u2": 0 * value, "u3": 0.1 * value}
     mapped = RATE | {name: SignalMap(columns=("u0", "u1", "u2", "u3"), unit=signal)}
-    assert read_signals(columns, settings(signals=mapped)).report.saturated == {}
+    assert read_signals(columns, settings(signals=mapped)).saturated == {}
 
 
 def test_rotors_at_their_largest_speed_are_saturated():
     columns = log() | {"u": np.minimum(np.where(np.arange(201) < 50, 0.0, 900 * log()["t"]), 1000.0)}
     mapped = RATE | {"rotor_speed": SignalMap(columns=("u",), unit="rad/s")}
-    saturated = read_signals(columns, settings(signals=mapped)).report.saturated
+    saturated = read_signals(columns, settings(signals=mapped)).saturated
     assert saturated == {"u": int((columns["u"] == 1000).sum())}
     assert saturated["u"] > 80
 
@@ -271,7 +272,7 @@ def test_a_step_longer_than_the_gap_asks_for_the_unit_of_time(rule):
 
 @pytest.mark.parametrize(("factor", "said"), [(1.0, False), (1 / 320, False), (1e-3, True)])
 def test_a_clock_that_no_sensor_has_asks_for_the_unit_of_time(factor, said):
-    report = read_signals(log() | {"t": factor * log()["t"]}, settings()).report
+    report = read_signals(log() | {"t": factor * log()["t"]}, settings())
     asked = [each for each in report.warnings if "is import.time_unit = s right" in each]
     assert asked == (["1e+05 rows a second, which no sensor of a vehicle gives: is import.time_unit = s right"] * said)
 
@@ -289,7 +290,7 @@ TAU, PERIOD = 0.07, 0.004
 def stepped(command=True):
     time = PERIOD * np.arange(200)
     steps = np.where(time[:, None] < 0.2 - 1e-9, 0.5, 0.8) * np.ones(4)
-    return ImportedFlight(time=time, rotor_command=steps if command else None, setpoints={}, report=None)
+    return replace(read_signals(log(), settings()), time=time, rotor_command=steps if command else None)
 
 
 def test_rotors_follow_a_step_as_an_exponential():

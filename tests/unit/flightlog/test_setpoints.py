@@ -10,7 +10,6 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.importing import import_log, read_signals
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 from cpfls_cli.flightlog.topics import hold_asked, on_one_clock
-from cpfls_cli.flights.flight import Imported
 
 PERIOD, SAMPLES = 0.01, 401
 TIME = PERIOD * np.arange(SAMPLES)
@@ -45,7 +44,7 @@ def settings(signals, **changes):
 
 
 def asked(signals, values, **changes):
-    return read_signals(log(**values), settings(signals, **changes)).setpoints
+    return read_signals(log(**values), settings(signals, **changes)).asked
 
 
 def test_vectors_are_turned_as_those_that_are_measured():
@@ -57,9 +56,9 @@ def test_vectors_are_turned_as_those_that_are_measured():
     }
     values = {"x": 1000 * wished, "v": wished, "w": np.degrees(wished)}
     found = asked(signals, values, body_frame="FRD", world_frame="NED")
-    np.testing.assert_allclose(found["position"], wished @ NED.T, atol=1e-12)
-    np.testing.assert_allclose(found["velocity"], wished @ NED.T, atol=1e-12)
-    np.testing.assert_allclose(found["body_rate"], wished @ FLIP, atol=1e-12)
+    np.testing.assert_allclose(found["setpoint_position"], wished @ NED.T, atol=1e-12)
+    np.testing.assert_allclose(found["setpoint_velocity"], wished @ NED.T, atol=1e-12)
+    np.testing.assert_allclose(found["setpoint_body_rate"], wished @ FLIP, atol=1e-12)
 
 
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
@@ -72,7 +71,9 @@ def test_an_attitude_is_the_same_rotation_in_the_axes_of_the_program(as_quaterni
         logged, unit = wished.as_quat(), "1"
         logged = np.roll(logged, 1, axis=1) if order == "wxyz" else logged
     signals = {"setpoint_attitude": mapped(unit, *columns_of("q", logged.shape[1]))}
-    found = asked(signals, {"q": logged}, body_frame="FRD", world_frame="NED", quaternion_order=order)["attitude"]
+    found = asked(signals, {"q": logged}, body_frame="FRD", world_frame="NED", quaternion_order=order)[
+        "setpoint_attitude"
+    ]
     turned = Rotation.from_euler("ZYX", found[:, ::-1]).as_matrix()
     np.testing.assert_allclose(turned, NED @ wished.as_matrix() @ FLIP, atol=1e-9)
     assert np.abs(np.diff(found, axis=0)).max() < 0.1, "a full turn is no jump"
@@ -88,12 +89,12 @@ def test_what_is_nowhere_asked_for_drops_no_sample():
         ),
     )
     assert len(flight.time) == SAMPLES
-    assert not any(flight.report.dropped.values())
+    assert not any(flight.dropped.values())
     assert list(flight.setpoints) == ["position"]
-    known = np.isfinite(flight.setpoints["position"]).all(axis=1)
+    known = np.isfinite(flight.setpoint_position).all(axis=1)
     # Held for import.gap_s beyond the last one, and not one sample before the next.
     np.testing.assert_array_equal(np.flatnonzero(~known), np.arange(60, 300))
-    assert any("setpoint_thrust is left out" in warning for warning in flight.report.warnings)
+    assert any("setpoint_thrust is left out" in warning for warning in flight.warnings)
 
 
 def test_setpoints_are_neither_filtered_nor_shifted_and_keep_the_previous_value_at_another_rate():
@@ -101,9 +102,9 @@ def test_setpoints_are_neither_filtered_nor_shifted_and_keep_the_previous_value_
     signals = {"sticks": mapped("1", "s0", "s1", "s2", scale=0.01)}
     own = settings(signals, lowpass_hz=5.0, rate_hz=250.0)
     flight = import_log(log(s=np.hstack([steps, -steps, 0 * steps])), own)
-    np.testing.assert_allclose(flight.setpoints["sticks"][:, 0], 0.01 * np.floor(flight.time / 0.2 + 1e-6), atol=1e-12)
+    np.testing.assert_allclose(flight.sticks[:, 0], 0.01 * np.floor(flight.time / 0.2 + 1e-6), atol=1e-12)
     delayed = import_log(log(s=np.hstack([steps, -steps, 0 * steps])), replace(own, delay_s=0.05, rate_hz=None))
-    np.testing.assert_allclose(delayed.setpoints["sticks"][:, 0], 0.01 * steps[5:, 0], atol=1e-12)
+    np.testing.assert_allclose(delayed.sticks[:, 0], 0.01 * steps[5:, 0], atol=1e-12)
 
 
 def test_a_setpoint_is_held_for_three_of_its_steps():
@@ -156,7 +157,7 @@ def test_a_flight_holds_its_setpoints_and_counts_where_they_are_known():
     thrust = np.linspace(0.2, 0.6, SAMPLES)[:, None].copy()
     thrust[:21] = np.nan
     signals = {"setpoint_position": mapped("m", *columns_of("x")), "setpoint_thrust": mapped("1", "f0")}
-    record = Imported.of(import_log(log(x=wished, f=thrust), settings(signals)))
+    record = import_log(log(x=wished, f=thrust), settings(signals))
     assert record.setpoint_thrust is not None
     assert record.setpoint_thrust.shape == (SAMPLES,)
     # The first value goes back by import.gap_s, and no further.
@@ -175,5 +176,5 @@ def test_an_attitude_that_is_asked_for_is_within_half_a_turn_of_the_one_that_is_
     wished = angles + np.array([0.0, 0.0, 0.4 - 2 * np.pi])
     signals = {"attitude": mapped("rad", *columns_of("a")), "setpoint_attitude": mapped("rad", *columns_of("q"))}
     flight = read_signals(log(a=angles, q=(wished + np.pi) % (2 * np.pi) - np.pi), settings(signals))
-    away = flight.setpoints["attitude"] - flight.attitude
+    away = flight.setpoint_attitude - flight.attitude
     np.testing.assert_allclose(away, np.tile([0.0, 0.0, 0.4], (SAMPLES, 1)), atol=1e-9)

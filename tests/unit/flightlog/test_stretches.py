@@ -23,7 +23,7 @@ def warnings(columns, **changes):
         "body_rate": SignalMap(columns=("w0", "w1", "w2"), unit="rad/s"),
         "rotor_command": SignalMap(columns=ROTORS, unit="rad/s"),
     }
-    return list(read_signals(columns, ImportSettings(signals=signals, torque_source=None, **changes)).report.warnings)
+    return list(read_signals(columns, ImportSettings(signals=signals, torque_source=None, **changes)).warnings)
 
 
 @pytest.mark.parametrize(("rest", "level"), [(0.0, "0 rad/s"), (150.0, "150 rad/s")])

@@ -14,9 +14,10 @@ from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
+from cpfls_cli.flightlog.results import Flight, Imported
 from cpfls_cli.flights import playback, recordings
 from cpfls_cli.flights import training as sources
-from cpfls_cli.flights.flight import MOTION, Flight, Imported, Simulated
+from cpfls_cli.flights.flight import MOTION, Simulated
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.flights.recordings import ReadFlight, signals_of
 from cpfls_cli.simulation.inverse import flyability
