@@ -21,9 +21,9 @@ from benchmarks.shared.measure import count, program, table
 from benchmarks.shared.playback_scores import SYMBOLS, free_runs, score
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.playback.evaluation import Group
 from cpfls_cli.playback.fit import Fitted, fit, uncertainty, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import Group
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import MASS
 from cpfls_cli.playback.settings import PlaybackSettings

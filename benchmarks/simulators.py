@@ -21,9 +21,8 @@ from cpfls_cli.config.load import load_study
 from cpfls_cli.export.registry import FORMS, exported
 from cpfls_cli.export.source import c_source
 from cpfls_cli.flights.playback import flights_to_play
-from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import player_of
+from cpfls_cli.playback.player import Course, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.flown_exports import FLYING, text_of

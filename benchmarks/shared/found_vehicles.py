@@ -9,10 +9,10 @@ from time import perf_counter
 from cpfls_cli.config.load import validate
 from cpfls_cli.playback.fit import fit, parts_of
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.history_fit import fit_observer
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import INERTIA
+from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import BASELINES, Judged, Structure, fitted_to_all
 from cpfls_cli.playback.vehicle import find_vehicle

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.playback import player
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.player import Observer
 
 HORIZON = 50
 SHOWN = (1, 10, 50)

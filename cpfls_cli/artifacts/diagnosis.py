@@ -12,12 +12,11 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
 from cpfls_cli.consistency.check import Audit
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import HELD_OUT, TRAINING, RecordedFlight, Signals, in_roles, names_of, recorded
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, LeftOut, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import Comparison
 from cpfls_cli.gap.naming.results import BODY, Conclusion, Estimate, GapChange, GapSize, NamedEffect
-from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, RecordedFlight, in_roles, names_of, recorded
 from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.gap.settings import CLEAR

@@ -1,13 +1,15 @@
 """Hooks of an effect other than its columns: its place in the closed loop, and its test by the sensor audit."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.filters import SecondOrder
+from cpfls_cli.lag import delayed
 from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.stepping import Memory, RotorMotion
@@ -124,3 +126,47 @@ class SensorTest:
     smallest_samples: float = 0.0  # The same in sampling periods, for a time.
     signal: str = "body_rate"  # Field of `Signals`, shape (time, 3).
     integrated: bool = False  # Whether an attitude that is integrated from the gyroscope would not show the fault.
+
+
+_HIGHEST = 0.45  # Frequency of a filter over that of the sampling, above which it is taken to be there.
+
+
+def second_order(frequency: float, damping: float, period: float, upper: tuple[float, float, float]) -> SecondOrder:
+    """Make a filter of its natural frequency in Hz, zeta, the sampling period in s, and (a, b, c)."""
+    return SecondOrder.of(min(frequency * period, _HIGHEST), damping, upper)
+
+
+def with_actuation(signals: Signals, change: Callable[[Array], Array]) -> Signals:
+    """Change the rotor speeds, or the stated torque and thrust of a flight without rotor speeds.
+
+    `change`: from a signal to the changed one, time first.
+    """
+    if signals.rotor_speed is not None:
+        return signals.with_rotor_speed(change(signals.rotor_speed))
+    torque = None if signals.stated_torque is None else change(signals.stated_torque)
+    thrust = None if signals.stated_thrust is None else change(signals.stated_thrust)
+    return replace(signals, stated_torque=torque, stated_thrust=thrust)
+
+
+def shifted(signals: Signals, shape: Mapping[str, float]) -> Signals:
+    """Shift what drives the rotors by a delay of ``delay_s``."""
+    return with_actuation(signals, lambda values: delayed(values, shape["delay_s"] / signals.period))
+
+
+@dataclass(frozen=True)
+class CommandFilter:
+    """A second-order filter between command and rotors, with the functions that an effect is made of."""
+
+    damping: str  # Name of the shape that is zeta; the other one is ``frequency_hz``.
+    upper: tuple[float, float, float]  # (a, b, c) of `SecondOrder`.
+
+    def _passing(self, shape: Mapping[str, float], period: float) -> SecondOrder:
+        return second_order(shape["frequency_hz"], shape[self.damping], period, self.upper)
+
+    def apply(self, signals: Signals, shape: Mapping[str, float]) -> Signals:
+        """Filter what drives the rotors of a flight."""
+        return with_actuation(signals, self._passing(shape, signals.period).along)
+
+    def link(self, rotors: RotorMotion, values: Mapping[str, float], memory: Memory) -> RotorMotion:
+        """Filter speeds and accelerations of the rotors."""
+        return memory.filtered(self._passing(values, memory.step), rotors)

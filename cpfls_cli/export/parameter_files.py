@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.export.text import number
-from cpfls_cli.tuning.vehicle import ParameterRow
+from cpfls_cli.tuning.gains import ParameterRow
 
 Rows = Mapping[str, ParameterRow]
 """Parameters by name."""

@@ -23,9 +23,9 @@ from cpfls_cli.export.simulators.sdf import sdf_held, sdf_text
 from cpfls_cli.export.simulators.urdf import OTHERWISE, fly_urdf, urdf_held, urdf_text
 from cpfls_cli.export.simulators.webots import webots_held, webots_text
 from cpfls_cli.export.source import c_source, python_source
-from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.player import Course
 
 Write = Callable[[Sheet, Held, Sequence[str], str], str]
 """Takes a model, what the target holds of it, what it does not, in words, and the name of the file."""

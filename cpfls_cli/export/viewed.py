@@ -12,6 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study
+from cpfls_cli.effects.signals import HELD_OUT, RecordedFlight
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.mcap_form import (
     ANGLES,
@@ -29,12 +30,10 @@ from cpfls_cli.export.mcap_form import (
 )
 from cpfls_cli.flightlog.results import Flight, Imported
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
-from cpfls_cli.gap.recorded import HELD_OUT, RecordedFlight
 from cpfls_cli.playback.replay import Playback
 from cpfls_cli.response.flown import Responses
 from cpfls_cli.result import BODY, EULER, WORLD, About, described_fields
-from cpfls_cli.simulation.twin import Twin
-from cpfls_cli.simulation.twin_flight import FRAMES, UNITS
+from cpfls_cli.simulation.twin import FRAMES, UNITS, Twin
 from cpfls_cli.units import known_unit
 
 _ASKED = "setpoint_"

@@ -16,8 +16,8 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import InputError, SettingError, about
 from cpfls_cli.flights.same_vehicle import require_vehicle_of, with_numbers_of
-from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import VEHICLE
 
 

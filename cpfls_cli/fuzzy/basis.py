@@ -8,7 +8,7 @@ Another formula is written here, and in the copies that stand where this one can
 
 - `cpfls_cli.regressor.kernels`, `_z_function`: the compiled loops of the search. numba caches compiled code by its
   file, and would not notice that a function which it compiled in from another file has changed.
-- `cpfls_cli.playback.remainder`, `_blended`: the vehicle in any kind of numbers, which simulation and exports trace.
+- `cpfls_cli.playback.model`, `_blended`: the vehicle in any kind of numbers, which simulation and exports trace.
 - `cpfls_cli/export/templates/model.c.j2`, `rules_of`, and `model.py.j2`, `_firing`, this in NumPy, CasADi and JAX: over
   the attitude. They run without this package; `tests/unit/export/test_simulators.py` flies them.
 - `Z_FUNCTION` here, the words that the JSON of a model carries, and docs/method.md section 4.

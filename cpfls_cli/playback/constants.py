@@ -21,12 +21,12 @@ from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, o
 from cpfls_cli.estimation.first_stage import FOLDS
 from cpfls_cli.inertia import EXPLAINED, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, PastBalances, Sums, fitting_bands
+from cpfls_cli.playback.evaluation import JointNumbers
 from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.playback.model import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
-from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 

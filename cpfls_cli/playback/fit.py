@@ -15,9 +15,8 @@ from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.gauss_newton import damped_step, minimised
-from cpfls_cli.playback.evaluation import VehicleAt
+from cpfls_cli.playback.evaluation import JointNumbers, VehicleAt
 from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight, motion_at
-from cpfls_cli.playback.groups import JointNumbers
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import SLOW
 from cpfls_cli.playback.player import still_runs

@@ -17,7 +17,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.gauss_newton import minimised
-from cpfls_cli.playback.evaluation import VehicleAt
+from cpfls_cli.playback.evaluation import PRIOR, VehicleAt
 from cpfls_cli.playback.fit import (
     FitPoint,
     Fitted,
@@ -31,8 +31,7 @@ from cpfls_cli.playback.fit import (
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import PRIOR
-from cpfls_cli.playback.history import Observer, missed_before
+from cpfls_cli.playback.player import Observer, missed_before
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Judged
 from cpfls_cli.playback.windows import Leg, Runs, Steps, errors_of_runs, legs, losses_of, sums_of

@@ -14,7 +14,7 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.playback.remainder import Airflow, Remainder
+from cpfls_cli.playback.model import Airflow, Remainder
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 INERTIA = "inertia"

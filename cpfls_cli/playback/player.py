@@ -1,9 +1,13 @@
-"""A model made ready to be played back along a flight, and its free runs from many samples."""
+"""What is played back along a flight: a model made ready with its free runs and what they know of the past; courses.
+
+A course is what a simulator flies along: where runs start, and the commands of rotors between samples.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +15,100 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.playback.flight import LoggedFlight, MeasuredMotion, PlaybackFlight, State, playback_flight
-from cpfls_cli.playback.history import Observer, missed_before
+from cpfls_cli.playback.flight import (
+    FASTEST,
+    Body,
+    LoggedFlight,
+    MeasuredMotion,
+    PlaybackFlight,
+    State,
+    playback_flight,
+)
 from cpfls_cli.playback.model import VehicleModel, wrench_along
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.windows import MOST_RUNS, Flown, Steps, errors_of_runs, rotation_errors
 from cpfls_cli.playback.windows import Runs as FlownRuns
+from cpfls_cli.result import about, result
+
+
+@result
+class Observer:
+    """Observes torque and force that a model misses, about and along the body axes.
+
+    The model takes one step from each measured sample. What it misses of a step is the torque and force e that must
+    have acted over it beside its own. They are taken for a disturbance d, which is followed from 0 on over the steps h
+    of the past, about and along each axis with a rate r and a memory T,
+
+        d' = exp(-h / T) (d + (1 - exp(-r h)) (e - d)).
+
+    It is an observer whose rate and velocity are corrected to what was measured at each sample, and whose second gain
+    integrates the disturbance. From the start on nothing is observed: ``d' = exp(-h / T) d`` acts on the body.
+    """
+
+    rate: Array = about(
+        "at which what the model misses is taken up: torque x y z, force x y z", "6", unit="1/s", frame="body (FLU)"
+    )
+    memory_s: Array = about(
+        "time constant with which the disturbance fades", "6", unit="s", frame="body (FLU)", least=0.0
+    )
+    past_s: float = about("how much of the flight before a start is used", unit="s")
+
+    def samples(self, period: float) -> int:
+        """Count the steps of the past."""
+        return round(self.past_s / period)
+
+    def weights(self, period: float) -> Array:
+        """Weigh the steps of the past, the latest last: the disturbance is their sum, shape (step, 6)."""
+        gain, keep = 1.0 - np.exp(-period * self.rate), np.exp(-period / self.memory_s)
+        later = np.arange(self.samples(period))[::-1, None]
+        return np.asarray(keep * gain * (keep * (1.0 - gain)) ** later)
+
+    def fading(self, period: float, horizon: int) -> Array:
+        """Tell what is left of the disturbance over each step of a run, shape (horizon, 6)."""
+        return np.asarray(np.exp(-period * np.arange(horizon)[:, None] / self.memory_s))
+
+
+def past_of(flight: PlaybackFlight, starts: IntArray, samples: int) -> tuple[IntArray, Array]:
+    """List the steps before each start, and which of them are in its stretch: earlier ones hold nothing of it.
+
+    Parameters
+    ----------
+    starts : array of int, shape (run,)
+    samples : int
+        Steps of the past.
+
+    Returns
+    -------
+    steps : array of int, shape (run, samples)
+        Samples at which they begin, the latest last; the first of the stretch where there is none.
+    known : array, shape (run, samples)
+        1, or 0.
+    """
+    begins = np.zeros(len(starts), dtype=np.int64)
+    for stretch in flight.stretches:
+        begins[(starts >= stretch.start) & (starts < stretch.stop)] = stretch.start
+    steps = starts[:, None] + np.arange(-samples, 0)
+    return np.maximum(steps, begins[:, None]), (steps >= begins[:, None]).astype(float)
+
+
+def missed_before(
+    flight: PlaybackFlight, starts: IntArray, samples: int, single_steps: Callable[[IntArray], Array], body: Body
+) -> Array:
+    """Give what a model misses of the steps before each start, shape (run, samples, 6), N m and N, body frame.
+
+    0 where there is none. `single_steps` gives the errors of steps that begin at samples, shape (step, 4, 3), see
+    `errors_of_runs`.
+    """
+    steps, known = past_of(flight, starts, samples)
+    first = int(steps.min(initial=int(starts.min())))
+    taken = np.arange(first, int(starts.max()))
+    missed = np.zeros((len(taken) + 1, 6))
+    if len(taken):
+        errors, period, rotation = single_steps(taken), flight.motion.period, flight.motion.rotation[taken]
+        missed[:-1, :3] = -errors[:, 3] @ body.inertia / period
+        if flight.translates:
+            missed[:-1, 3:] = -body.mass / period * np.einsum("tji,tj->ti", rotation, errors[:, 1])
+    return np.asarray(missed[steps - first] * known[:, :, None])
 
 
 @dataclass(frozen=True)
@@ -251,3 +344,138 @@ def rotation_vectors(measured: Array, predicted: Array) -> Array:
     """
     by_entry = (np.ascontiguousarray(np.moveaxis(each.reshape(-1, 3, 3), 0, -1)) for each in (measured, predicted))
     return np.asarray(rotation_errors(*by_entry).T.reshape(measured.shape[:-1]))
+
+
+_CLOCKS = 1e-3
+"""Share of a sampling period by which the clock of a log is off at most."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """Runs along the logged rotor speeds of a flight, from states that were measured.
+
+    Attributes
+    ----------
+    starts : array of int, shape (run,)
+        Ascending samples of the flight.
+    horizon : int
+        Samples that each run goes.
+    finer : int
+        Steps of a simulator between two samples.
+    gravity : float, m/s^2
+        Of the world, where no file of the vehicle says it.
+    """
+
+    flight: PlaybackFlight
+    starts: IntArray
+    horizon: int
+    finer: int = 1
+    gravity: float = 9.81
+
+    @property
+    def period(self) -> float:
+        """Length of a step of a simulator, s."""
+        return self.flight.motion.period / self.finer
+
+    @property
+    def start(self) -> State:
+        """Measured states that the runs start from."""
+        return State(*(part[self.starts] for part in self.flight.motion[:4]))
+
+    @property
+    def commands(self) -> Array:
+        """Mean of the logged speeds over each step of a simulator, shape (run, horizon * finer, rotor), rad/s."""
+        along = _finer_speed(self.flight, self.finer)
+        after = np.concatenate([along[1:], along[-1:]])
+        mean = 0.5 * (along + after) if self.flight.hold == "linear" else along
+        steps = self.finer * self.starts[:, None] + np.arange(self.horizon * self.finer)
+        return np.asarray(mean[steps])
+
+    def lagged(self, response: RotorResponse) -> Array:
+        """Give the speeds at which rotors that lag turn at the starts, shape (run, rotor)."""
+        flight = self.finer_flight
+        parts = [
+            response.terms_at_samples(flight.speed[part], flight.motion.period, flight.hold)
+            for part in flight.stretches
+        ]
+        return np.concatenate(parts)[self.finer * self.starts, 1 : 1 + flight.speed.shape[1]]
+
+    @property
+    def finer_flight(self) -> PlaybackFlight:
+        """The flight at the steps of a simulator; between samples its motion is that of the sample before."""
+        motion, finer = self.flight.motion, self.finer
+        position, velocity, rotation, rate = (np.repeat(part, finer, axis=0) for part in motion[:4])
+        own = MeasuredMotion(position, velocity, rotation, rate, self.period)
+        stretches = tuple(slice(finer * part.start, finer * part.stop) for part in self.flight.stretches)
+        return replace(self.flight, motion=own, speed=_finer_speed(self.flight, finer), stretches=stretches)
+
+    def steps(self, longest_s: float) -> int:
+        """Count the equal steps in a step of the course, none of them longer than this but by errors of clocks."""
+        return max(1, ceil((1.0 - _CLOCKS) * self.period / longest_s))
+
+    def collected(self, runs: Iterable[Iterable[State]]) -> State:
+        """Collect what runs pass through after each step; see `Flies`."""
+        vector = len(self.starts), self.horizon, 3
+        states = State(*(np.full(shape, np.nan) for shape in (vector, vector, (*vector, 3), vector)))
+        for run, path in enumerate(runs):
+            for step, now in enumerate(path, 1):
+                if not (np.abs(now.rate) < FASTEST).all():
+                    break
+                if step % self.finer == 0:
+                    for part, own in zip(states, now, strict=True):
+                        part[run, step // self.finer - 1] = own
+        return states
+
+    def errors(self, states: State) -> Array:
+        """Compare runs with what was measured, shape (run, horizon, 4, 3), as `cpfls_cli.playback.player.Runs` does."""
+        return less_measured(states, self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon))
+
+
+Flies = Callable[[Course, bool], State]
+"""From a course whose rotors are in the order of a file, and whether they lag behind its speeds, which are kept from
+step to step, to states of the centre of mass at the samples behind each start, shape (run, horizon, ...); NaN from
+where a run ran away."""
+
+Wrench = Callable[[Array, Array, Array, Array], tuple[Array, Array]]
+"""From rotor speeds, velocity through the air, body rate and attitude (body to world) of each run to torque and force,
+body frame, (run, 3)."""
+
+
+def fly_body(course: Course, mass: float, inertia: Array, wrench: Wrench, lag: float) -> State:
+    """Fly a rigid body by the published equations of a target, semi-implicit; see `Otherwise.fly`.
+
+    Parameters
+    ----------
+    inertia : array, shape (3, 3), kg m^2
+    lag : float, s
+        Of the rotors behind their commands; 0 for none.
+    """
+    period, gravity = course.period, np.array([0.0, 0.0, -course.gravity])
+    speed, state = course.lagged(RotorResponse(lag_s=lag)), course.start
+    rows, keep = [], np.exp(-period / lag) if lag else 0.0
+    for step, command in enumerate(course.commands.swapaxes(0, 1), 1):
+        speed = speed if lag else command
+        air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
+        torque, force = wrench(speed, air, state.rate, state.rotation)
+        linear = np.einsum("nij,nj->ni", state.rotation, force) / mass + gravity
+        moment = torque - rotations.cross(state.rate, state.rate @ inertia)
+        velocity, rate = state.velocity + period * linear, state.rate + period * np.linalg.solve(inertia, moment.T).T
+        turned = state.rotation @ rotations.turns(period * rate)
+        state = State(state.position + period * velocity, velocity, turned, rate)
+        speed = keep * speed + (1.0 - keep) * command
+        if step % course.finer == 0:
+            rows.append(state)
+    return State(*(np.stack(parts, axis=1) for parts in zip(*rows, strict=True)))
+
+
+def _finer_speed(flight: PlaybackFlight, finer: int) -> Array:
+    """Give the logged speeds at the steps of a simulator: on straight lines, or what they were."""
+    if flight.hold == "previous":
+        return np.repeat(flight.speed, finer, axis=0)
+    parts = []
+    for part in flight.stretches:
+        speed = flight.speed[part]
+        after = np.concatenate([speed[1:], speed[-1:]])
+        share = (np.arange(finer) / finer)[:, None]
+        parts.append((speed[:, None] + share * (after - speed)[:, None]).reshape(-1, speed.shape[1]))
+    return np.concatenate(parts)

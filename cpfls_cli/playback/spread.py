@@ -22,9 +22,8 @@ from cpfls_cli.inertia import (
 )
 from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
 from cpfls_cli.playback.lack import Lack
-from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
-from cpfls_cli.playback.remainder import Remainder
 from cpfls_cli.playback.vehicle import FoundNumber, FoundVehicle, bodily
 from cpfls_cli.vehicle.rotors import figures_of_vehicle
 from cpfls_cli.vehicle_limits import broken_limits

@@ -13,6 +13,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.evolution.archive import comparable
+from cpfls_cli.playback.evaluation import Group, JointNumbers
 from cpfls_cli.playback.fit import (
     Fits,
     Fitted,
@@ -28,9 +29,8 @@ from cpfls_cli.playback.fit import (
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import Group, JointNumbers
+from cpfls_cli.playback.model import Airflow
 from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, blocks_of, needs_velocity
-from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending, at_most, less, smallest

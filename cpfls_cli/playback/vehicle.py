@@ -16,15 +16,15 @@ from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
 from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others
 from cpfls_cli.playback.constants import UsedInstruments, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
+from cpfls_cli.playback.evaluation import OF_A_WEIGHT, Group, JointNumbers
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.groups import OF_A_WEIGHT, Group, JointNumbers
-from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import LoopBounds, loop_beside_plain
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import LAW, ROOM, Physical, needs_velocity
+from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Choice, Kept, Progress, TriedStructure, choose, fitted_to_all
 from cpfls_cli.result import About, about, part, result

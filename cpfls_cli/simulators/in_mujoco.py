@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.flight import State
+from cpfls_cli.playback.player import Course
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.model import Rotor, SimulatorModel
 
@@ -44,7 +44,7 @@ def compiled(file: Path, folder: Path) -> Any:
 
 
 def fly_mujoco(model: Any, course: Course, controls: Controls, *, lags: bool) -> State:
-    """Fly the body with a free joint of a compiled MJCF (`mujoco.MjModel`); see `cpfls_cli.playback.course.Flies`.
+    """Fly the body with a free joint of a compiled MJCF (`mujoco.MjModel`); see `cpfls_cli.playback.player.Flies`.
 
     Where rotors do not lag, filters of actuators are at their controls at once.
     """

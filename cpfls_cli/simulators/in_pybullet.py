@@ -19,8 +19,8 @@ import numpy as np
 from defusedxml.ElementTree import fromstring
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.flight import State
+from cpfls_cli.playback.player import Course
 from cpfls_cli.rotations import euler_angles
 from cpfls_cli.simulators.model import SimulatorModel
 from cpfls_cli.simulators.urdf import GRAVITY
@@ -39,7 +39,7 @@ def without_shapes(text: bytes) -> bytes:
 
 
 def fly_pybullet(text: bytes, model: SimulatorModel, course: Course, damping: float | None = None) -> State:
-    """Fly URDF without shapes in PyBullet, of rotors without lag; see `cpfls_cli.playback.course.Flies`.
+    """Fly URDF without shapes in PyBullet, of rotors without lag; see `cpfls_cli.playback.player.Flies`.
 
     Parameters
     ----------

@@ -18,10 +18,9 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import install_command, visible
 from cpfls_cli.gap.before_after import PlaybackChange, PlayedPair, errors_by_horizon
-from cpfls_cli.playback.course import Course, Flies
 from cpfls_cli.playback.errors import MODEL, STATED
 from cpfls_cli.playback.flight import State
-from cpfls_cli.playback.player import Runs
+from cpfls_cli.playback.player import Course, Flies, Runs
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.formats import as_stated
 from cpfls_cli.simulators.in_mujoco import compiled, controls_of, fly_mujoco
@@ -48,7 +47,7 @@ def _nested(numbers: Numbers, *key: str | int) -> Any:
 
 
 def fly_rotorpy(parameters: dict[str, Any], course: Course, *, lags: bool, **integrator: Any) -> State:
-    """Fly RotorPy's `Multirotor`; see `cpfls_cli.playback.course.Flies`.
+    """Fly RotorPy's `Multirotor`; see `cpfls_cli.playback.player.Flies`.
 
     Parameters
     ----------

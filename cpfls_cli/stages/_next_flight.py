@@ -13,6 +13,7 @@ from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
+from cpfls_cli.effects.signals import TRAINING, in_roles
 from cpfls_cli.errors import ComputationError, InputError, SettingError, about
 from cpfls_cli.flights.path import PathQuestion, PlannedPath
 from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
@@ -33,7 +34,6 @@ from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, qu
 from cpfls_cli.gap.next_flight.room import Room, room_of
 from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
 from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
-from cpfls_cli.gap.recorded import TRAINING, in_roles
 from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.pages.gap import unit_words
 from cpfls_cli.report.content import number

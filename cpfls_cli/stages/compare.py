@@ -18,14 +18,13 @@ from cpfls_cli.artifacts.model import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import GIVEN, Signals, recorded
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.flights.models import is_found, is_identified, learned_by, read_model
 from cpfls_cli.flights.recordings import FlightSet, read_flights
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import compare as compare_flights
-from cpfls_cli.gap.recorded import GIVEN, recorded
 from cpfls_cli.gap.residual.views import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.gap import channel_unit, channel_words

@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.diagnosis import Diagnosis, Extended
 from cpfls_cli.artifacts.model import as_inputs, joined_flights
 from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import effect
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import HELD_OUT, TRAINING, Signals, in_roles
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.flights.models import learned_by, read_base
 from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
@@ -23,7 +23,6 @@ from cpfls_cli.gap.extended import extend as refitted
 from cpfls_cli.gap.extended import plain
 from cpfls_cli.gap.naming.causes import all_numbers
 from cpfls_cli.gap.naming.results import GapChange, GapVerdict, NamedEffect
-from cpfls_cli.gap.recorded import HELD_OUT, TRAINING, in_roles
 from cpfls_cli.gap.whole_vehicle import (
     above_thrust,
     on_top_of,

@@ -20,7 +20,7 @@ from cpfls_cli.pages.playback import ERRORS, WORDS, draw_errors, errors_height
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.errors import NOTHING_MOVES, STATED
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.history import Observer, past_of
+from cpfls_cli.playback.player import Observer, past_of
 from cpfls_cli.playback.replay import USUAL, Playback, Played, ReplayWindows, playback
 from cpfls_cli.playback.replay import replay as played_back
 from cpfls_cli.playback.settings import VEHICLE

@@ -50,9 +50,8 @@ from cpfls_cli.report.canvas import (
 from cpfls_cli.report.content import UNKNOWN, command_line
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, with_numbers
-from cpfls_cli.tuning.gains import AskedMargins
+from cpfls_cli.tuning.gains import PROPOSED, AskedMargins, Gains, ParameterRow, gains_for_vehicle
 from cpfls_cli.tuning.plant import LEAST, Noise, Spread, noise_of, spread_of
-from cpfls_cli.tuning.vehicle import PROPOSED, Gains, ParameterRow, gains_for_vehicle
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
 

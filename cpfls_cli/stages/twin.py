@@ -44,15 +44,22 @@ from cpfls_cli.response.spectra import decibels, degrees
 from cpfls_cli.simulation.closed_loop import ClosedLoop
 from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.simulation.twin import DRAWS, InGusts, Twin, TwinChannel, TwinGains, in_gusts, known_axes, twin_of
-from cpfls_cli.simulation.twin_flight import (
+from cpfls_cli.simulation.twin import (
+    DRAWS,
     UNITS,
     Asked,
+    InGusts,
+    Twin,
+    TwinChannel,
     TwinFlight,
+    TwinGains,
     asked_of,
     fly_in_gusts,
     fly_twin,
+    in_gusts,
+    known_axes,
     measured_channels,
+    twin_of,
 )
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import STILL_AIR

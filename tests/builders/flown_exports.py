@@ -23,8 +23,8 @@ from cpfls_cli.export.simulators.ardupilot import STEP_S, fly_ardupilot
 from cpfls_cli.export.simulators.sdf import ENTRIES, SHORTEST_S, apart
 from cpfls_cli.export.simulators.urdf import fly_urdf
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.flight import State
+from cpfls_cli.playback.player import Course, fly_body
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators import inside
 from cpfls_cli.simulators.in_mujoco import Controls, fly_mujoco

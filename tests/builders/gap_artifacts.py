@@ -8,6 +8,7 @@ from cpfls_cli import page
 from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement, Extended
 from cpfls_cli.consistency.check import Audit
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
+from cpfls_cli.effects.signals import RecordedFlight
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import ChannelGaps, ResidualWindows
 from cpfls_cli.gap.naming.results import (
@@ -20,7 +21,6 @@ from cpfls_cli.gap.naming.results import (
     NotExcited,
     Unexplained,
 )
-from cpfls_cli.gap.recorded import RecordedFlight
 from cpfls_cli.gap.residual.dependence import Dependence
 from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.gap.residual.views import GapStretch, HeatMap

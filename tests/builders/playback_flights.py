@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.config.unknown import with_guesses
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
-from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.playback.remainder import Remainder
+from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.windows import Rotors
 from cpfls_cli.rotations import rotation_matrix

@@ -12,8 +12,7 @@ from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.simulation.autopilot import GyroscopeNoise
 from cpfls_cli.simulation.closed_loop import ClosedLoop, Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.settings import ClosedLoopSettings
-from cpfls_cli.simulation.twin import ChannelInGusts, InGusts, TwinGains, twin_of
-from cpfls_cli.simulation.twin_flight import CHANNELS, asked_of, fly_twin
+from cpfls_cli.simulation.twin import CHANNELS, ChannelInGusts, InGusts, TwinGains, asked_of, fly_twin, twin_of
 from tests.builders.autopilots import CROSS
 
 LOOP = ClosedLoopSettings(autopilot="px4", rotor_time_constant_s=0.03, integration_rate_hz=400.0)

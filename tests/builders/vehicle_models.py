@@ -11,8 +11,7 @@ from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.export.numbers import weights_of
 from cpfls_cli.playback.loop import LoopBounds
-from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.playback.remainder import Remainder
+from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.structure import TriedStructure
 from cpfls_cli.playback.vehicle import FoundNumber, Share

@@ -12,9 +12,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.export.holding import Held
 from cpfls_cli.export.registry import FORMS, Exported
-from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.flight import PlaybackFlight, State
-from cpfls_cli.playback.player import Player, free_runs, in_the_air
+from cpfls_cli.playback.player import Course, Player, free_runs, in_the_air
 from cpfls_cli.rounding import less
 from tests.builders.flown_exports import FLYING, text_of
 

@@ -12,7 +12,7 @@ from cpfls_cli import page, store
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.vibration import Change
 from cpfls_cli.stage import loaded
-from cpfls_cli.tuning.vehicle import Gains
+from cpfls_cli.tuning.gains import Gains
 from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import save
 from tests.builders.dataflash_logs import dataflash

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.effects.actuation import shifted
 from cpfls_cli.effects.effect import Effect, Shape
-from cpfls_cli.effects.hooks import ReadingError, SensorLog, SensorTest, TrueMotion
+from cpfls_cli.effects.hooks import ReadingError, SensorLog, SensorTest, TrueMotion, shifted
 from cpfls_cli.lag import delayed
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from cpfls_cli.effects.actuation import shifted
 from cpfls_cli.effects.effect import Effect, Shape
-from cpfls_cli.effects.hooks import Actuation
+from cpfls_cli.effects.hooks import Actuation, shifted
 
 EFFECT = Effect(
     name="command_delay",

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cpfls_cli.effects.actuation import second_order
 from cpfls_cli.effects.effect import Columns, Effect, Shape, of_axes
-from cpfls_cli.effects.hooks import Body
+from cpfls_cli.effects.hooks import Body, second_order
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.filters import SecondOrder
 from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull

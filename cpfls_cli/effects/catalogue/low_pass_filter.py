@@ -1,8 +1,7 @@
 """Second-order low-pass between the autopilot's command and the rotors: a filter, or a drive that swings."""
 
-from cpfls_cli.effects.actuation import CommandFilter
 from cpfls_cli.effects.effect import Effect, Shape
-from cpfls_cli.effects.hooks import Actuation
+from cpfls_cli.effects.hooks import Actuation, CommandFilter
 
 _FILTER = CommandFilter("damping", (0.0, 0.0, 1.0))
 EFFECT = Effect(

@@ -1,8 +1,7 @@
 """Motor lag: rotors reach the commanded speed late."""
 
-from cpfls_cli.effects.actuation import with_actuation
 from cpfls_cli.effects.effect import Effect, Shape
-from cpfls_cli.effects.hooks import Actuation
+from cpfls_cli.effects.hooks import Actuation, with_actuation
 from cpfls_cli.lag import lagged
 
 _TIMES = (0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.065, 0.08, 0.1, 0.125, 0.15)

@@ -1,8 +1,7 @@
 """Notch filter of an autopilot between its command and the rotors."""
 
-from cpfls_cli.effects.actuation import CommandFilter
 from cpfls_cli.effects.effect import Effect, Shape
-from cpfls_cli.effects.hooks import Actuation
+from cpfls_cli.effects.hooks import Actuation, CommandFilter
 
 _FILTER = CommandFilter("width", (1.0, 0.0, 1.0))
 EFFECT = Effect(

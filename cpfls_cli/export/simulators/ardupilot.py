@@ -27,9 +27,9 @@ from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import Numbers, cross_order, numbers_of, places, spins, weights_of_model
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines, in_json
-from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.player import Course, fly_body
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.values import scaled, times
 

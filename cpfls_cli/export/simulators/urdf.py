@@ -21,9 +21,9 @@ from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.text import number, xml_text
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
-from cpfls_cli.playback.course import Course, fly_body
 from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.player import Course, fly_body
 from cpfls_cli.simulators.model import ENTRIES
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings

@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.shared.playback_scores import free_runs, rate_stays, score
-from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.remainder import Remainder
+from cpfls_cli.playback.model import Remainder, VehicleModel
 from tests.builders.playback_flights import KINDS, MIDDLING, STATED, flown, truth
 
 RATE = 3

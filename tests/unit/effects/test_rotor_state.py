@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.interpolate import interp1d
 
-from cpfls_cli.effects.actuation import second_order
 from cpfls_cli.effects.catalogue.rotor_mismatch import gains
 from cpfls_cli.effects.catalogue.vertical_descent import (
     descent_state,
     induced_velocity,
 )
+from cpfls_cli.effects.hooks import second_order
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.lag import delayed, lagged
 from cpfls_cli.vehicle.rotors import body_wrench, gain_modes, opposite_pairs

@@ -19,8 +19,7 @@ from cpfls_cli.export.points import wrench_along
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.fuzzy.basis import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback.flight import MeasuredMotion
-from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.remainder import Remainder, learned_wrench
+from cpfls_cli.playback.model import Remainder, VehicleModel, learned_wrench
 from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.regressor import Motion, Regressor

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import RecordedFlight, Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.extended import plain
-from cpfls_cli.gap.recorded import RecordedFlight
 from cpfls_cli.gap.residual.repeated import RepeatedRuns
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.balances import band_windows

@@ -16,9 +16,8 @@ from cpfls_cli.pages.gap import BEFORE, MEASURED, effect_title, keep_in_view, le
 from cpfls_cli.pages.gap_words import NOT_SPLIT, WHAT_TO_FLY, repeatability_drawn
 from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.playback.errors import PREDICTIONS, WITH_PAST
-from cpfls_cli.playback.history import Observer
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import free_runs, player_of
+from cpfls_cli.playback.player import Observer, free_runs, player_of
 from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.report.canvas import HELD, picture_of
 from cpfls_cli.report.content import Box, Facts, Folded, Table, Text, unfolded

@@ -9,8 +9,8 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.balances import Balances, PastBalances, averaged
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.instruments import instruments
+from cpfls_cli.playback.model import Airflow
 from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, blocks_of
-from cpfls_cli.playback.remainder import Airflow
 from tests.builders.playback_flights import STATED, flown, truth
 
 FREE = FreeNumbers(STATED, blocks_of(STATED), Airflow(np.array([0.0, 1.0]), 0))

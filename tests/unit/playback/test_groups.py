@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.playback.evaluation import Group, JointNumbers
 from cpfls_cli.playback.fit import fit, uncertainty, windows_of
-from cpfls_cli.playback.groups import Group, JointNumbers
+from cpfls_cli.playback.model import Airflow
 from cpfls_cli.playback.parameters import FreeNumbers
-from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.playback.vehicle import Difference, differences
 from tests.builders.playback_flights import (
     ADDED_AT,

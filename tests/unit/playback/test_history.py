@@ -7,10 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.playback.fit import Fitted, fit, side_by_side, windows_of
-from cpfls_cli.playback.history import Observer, past_of
 from cpfls_cli.playback.history_fit import _Begun, _point, _vehicle, errors_with_past, find_history, fit_observer
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import free_runs, observed, player_of
+from cpfls_cli.playback.player import Observer, free_runs, observed, past_of, player_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure
 from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights

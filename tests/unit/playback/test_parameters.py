@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli.playback import vehicle
+from cpfls_cli.playback.evaluation import JointNumbers
 from cpfls_cli.playback.fit import FitWindows, WindowSet, fit, loss_of, rate_stays, uncertainty, windows_of
-from cpfls_cli.playback.groups import JointNumbers
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import Airflow, VehicleModel
 from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
 from cpfls_cli.playback.player import free_runs, player_of
-from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 

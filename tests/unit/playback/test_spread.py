@@ -8,9 +8,8 @@ import pytest
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.evaluation import VehicleAt
-from cpfls_cli.playback.model import ModelEffect
+from cpfls_cli.playback.model import Airflow, ModelEffect
 from cpfls_cli.playback.parameters import FreeNumbers
-from cpfls_cli.playback.remainder import Airflow
 from cpfls_cli.playback.spread import POSITIVE, drawn, model_at
 from cpfls_cli.playback.vehicle import FoundNumber
 from tests.builders.playback_flights import STATED, pushed, truth

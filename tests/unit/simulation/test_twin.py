@@ -10,16 +10,20 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.simulation.closed_loop import ClosedLoop
-from cpfls_cli.simulation.twin import DRAWS, compared, in_gusts, known_axes, windows
-from cpfls_cli.simulation.twin_flight import (
+from cpfls_cli.simulation.twin import (
     CHANNELS,
+    DRAWS,
     RATE_LAW,
     TwinFlight,
     asked_of,
     baselines,
+    compared,
     fly_in_gusts,
     fly_twin,
+    in_gusts,
+    known_axes,
     measured_channels,
+    windows,
 )
 from tests.builders.autopilots import CROSS
 from tests.builders.twins import GUSTS, HOVER, LOOP, PERIOD, flown

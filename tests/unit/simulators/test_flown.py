@@ -7,9 +7,8 @@ import pytest
 
 from cpfls_cli.export.holding import probe_flight
 from cpfls_cli.export.registry import exported
-from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.model import ModelEffect
-from cpfls_cli.playback.player import free_runs, player_of
+from cpfls_cli.playback.player import Course, free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators.formats import read_model
 from cpfls_cli.simulators.study import as_corrected, of_log, vehicle_of

@@ -22,10 +22,9 @@ from cpfls_cli.export.simulators.urdf import order_of
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.page import TEMPLATES, environment
-from cpfls_cli.playback.course import Course
 from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.playback.player import free_runs, player_of
+from cpfls_cli.playback.player import Course, free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulators import in_pybullet, inside
 from cpfls_cli.simulators.formats import read_model
