@@ -26,11 +26,12 @@ from cpfls_cli.flights.recordings import (
     doubts_on_voltage,
     imported,
     known_stretches,
+    largest_volts,
+    of_full_battery,
     read_flight,
     read_import,
     require_rotors,
     signals_of,
-    with_voltage,
 )
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.playback.flight import LoggedFlight
@@ -53,7 +54,12 @@ def flights_to_play(paths: Sequence[Path], study: Study, hold: Hold | None = Non
         read_import(path.name, _parts(path, study), study) if is_log(path) else read_flight(path, study)
         for path in paths
     ]
-    flights = _of_full_battery([_flight(flight, study, hold) for flight in read], read)
+    pairs = [(_flight(flight, study, hold), flight.units) for flight in read]
+    full = max(largest_volts(part, units) for flight, units in pairs for part in flight.parts)
+    flights = [
+        replace(flight, parts=tuple(of_full_battery(part, units, full) for part in flight.parts))
+        for flight, units in pairs
+    ]
     first = flights[0]
     rates = [1 / flight.parts[0].period for flight in flights]
     for flight, rate in zip(flights[1:], rates[1:], strict=True):
@@ -132,13 +138,11 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     updated = flight.updated_hz.get(actuation)
     about = (words[actuation], named, wrong)
     return LoggedFlight(
-        flight.name,
         parts,
         hold or usual,
         *about,
         shares=shares,
         updated_hz=updated,
-        begins=flight.begins,
         system=flight.system,
     )
 
@@ -164,14 +168,6 @@ def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) 
     if lacks:
         warnings.append(f"lacks {' and '.join(lacks)}, so only rotation is played back")
     return warnings
-
-
-def _of_full_battery(flights: Sequence[LoggedFlight], read: Sequence[ReadFlight]) -> list[LoggedFlight]:
-    """Take a voltage in V as a share of the largest of all flights."""
-    owners = [index for index, flight in enumerate(flights) for _ in flight.parts]
-    scaled, _ = with_voltage([part for flight in flights for part in flight.parts], [read[at] for at in owners])
-    parts = [[part for part, owner in zip(scaled, owners, strict=True) if owner == at] for at in range(len(flights))]
-    return [replace(flight, parts=tuple(own)) for flight, own in zip(flights, parts, strict=True)]
 
 
 def played(model: VehicleModel, flight: LoggedFlight, stated: VehicleSettings) -> Played:

@@ -164,20 +164,22 @@ def read_flights(paths: Sequence[Path], study: Study) -> FlightSet:
     """Read flights, and import those that are logs."""
     read = [read_flight(path, study) for path in paths]
     made = [_longest_stretch(flight, study) for flight in read]
-    flights, notes = with_voltage([flight for flight, _ in made], read)
+    full = max((largest_volts(flight, own.units) for own, (flight, _) in zip(read, made, strict=True)), default=0.0)
+    flights = tuple(of_full_battery(flight, own.units, full) for own, (flight, _) in zip(read, made, strict=True))
     warnings = [f"{flight.name}: {w}" for flight, about in made for w in about]
-    return FlightSet(tuple(flights), (*warnings, *notes))
+    note = f"voltage: the largest of these flights, {full:.3g} V, is taken as that of a full battery"
+    return FlightSet(flights, (*warnings, *([note] if full else [])))
 
 
 def read_alone(path: Path, study: Study) -> ReadAlone:
     """Read one flight, and hold it against itself and its vehicle."""
     flight = read_flight(path, study)
     signals, about = _longest_stretch(flight, study)
-    volts = _largest_volts(signals, flight)
+    volts = largest_volts(signals, flight.units)
     found = [each for each in check_flight(flight, study) if each.contradiction]
     wrong = contradictions(each for each in found if not each.of_constants)
     about = (*about, *(each.sentence for each in found if each.of_constants))
-    return ReadAlone(flight, _share(signals, volts) if volts else signals, volts or 1.0, about, wrong)
+    return ReadAlone(flight, of_full_battery(signals, flight.units, volts), volts or 1.0, about, wrong)
 
 
 def read_flight(path: Path, study: Study) -> ReadFlight:
@@ -391,16 +393,6 @@ def longest_known(name: str, known: BoolArray, time: Array) -> tuple[slice, tupl
     return best, (note,)
 
 
-def with_voltage(flights: Sequence[Signals], read: Sequence[ReadFlight]) -> tuple[list[Signals], tuple[str, ...]]:
-    """Take a voltage in V as a share of the largest of all flights."""
-    full = [_largest_volts(*pair) for pair in zip(flights, read, strict=True)]
-    if not any(full):
-        return list(flights), ()
-    scaled = [_share(flight, max(full)) if volts else flight for flight, volts in zip(flights, full, strict=True)]
-    note = f"voltage: the largest of these flights, {max(full):.3g} V, is taken as that of a full battery"
-    return scaled, (note,)
-
-
 def doubts_on_voltage(signals: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, ...]:
     """Say why a voltage is that of no battery in flight, and is not used; nothing where it may be or is not known."""
     known = signals.get("voltage", np.zeros(0))
@@ -437,13 +429,15 @@ def in_volts(units: Mapping[str, str]) -> bool:
     return units.get("voltage", "1") != "1"
 
 
-def _largest_volts(signals: Signals, flight: ReadFlight) -> float:
-    return float(signals.voltage.max()) if in_volts(flight.units) and signals.voltage is not None else 0.0
+def largest_volts(signals: Signals, units: Mapping[str, str]) -> float:
+    """Give the largest voltage of a flight, V; 0 where it states none in V."""
+    return float(signals.voltage.max()) if in_volts(units) and signals.voltage is not None else 0.0
 
 
-def _share(flight: Signals, full: float) -> Signals:
-    assert flight.voltage is not None, "its largest value was taken"
-    return replace(flight, voltage=flight.voltage / full)
+def of_full_battery(signals: Signals, units: Mapping[str, str], full: float) -> Signals:
+    """Take a voltage in V as a share of that of a full battery."""
+    volts = largest_volts(signals, units)
+    return replace(signals, voltage=np.asarray(signals.voltage) / full) if volts else signals
 
 
 @dataclass(frozen=True)

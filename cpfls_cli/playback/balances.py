@@ -53,7 +53,7 @@ class Column(NamedTuple):
     by: str
 
 
-class Signals(NamedTuple):
+class Balanced(NamedTuple):
     """What is balanced along a flight: what changes, whose derivative is taken, and what acts; (time, column) each."""
 
     changing: Array
@@ -112,7 +112,7 @@ class Equations:
         """Multiply `known` numbers; those that are not there are what they are in a model without them."""
         return prod((self.known.get(name, float(name in (THRUST, DRAG))) for name in factors), start=1.0)
 
-    def along(self, flight: PlaybackFlight, translates: bool) -> tuple[list[Form], list[Signals]]:
+    def along(self, flight: PlaybackFlight, translates: bool) -> tuple[list[Form], list[Balanced]]:
         """Evaluate the balance of torque, and of force if asked for, along a flight."""
         forms, signals = [], []
         for balance in self._balances(flight, translates):
@@ -130,7 +130,7 @@ class Equations:
                 for row, values in zip(out.T, part.values(), strict=True):
                     row[:] = values
             forms.append(Form(tuple(columns), *(np.array([columns.index(each) for each in part]) for part in parts)))
-            signals.append(Signals(*filled))
+            signals.append(Balanced(*filled))
         return forms, signals
 
     def weights(self, columns: Sequence[Column]) -> Array:
@@ -358,7 +358,7 @@ class Balances:
     def _lay(self, equations: Equations) -> _Laid:
         """Evaluate the vehicle along all flights, and reduce what is balanced to what is kept."""
         forms: list[Form] = []
-        along: dict[int, list[Signals]] = {}
+        along: dict[int, list[Balanced]] = {}
         for number in self.path:
             forms, along[number] = equations.along(self.flights[number], self.translates)
         turning = len(self.bands_hz)
@@ -368,7 +368,7 @@ class Balances:
         ]
         return _Laid(equations, forms, kept)
 
-    def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Signals]) -> Any:
+    def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Balanced]) -> Any:
         """Sum products of all columns, by axis."""
         others = self._of_other_runs(signals)
         found = (self.of_band(self._rows(band, signals, others, form), form.slices) for band in bands)
@@ -400,17 +400,17 @@ class Balances:
                 counts[at] += len(mine)
         return [(axis, counts) for axis in sums]
 
-    def _of_other_runs(self, signals: Mapping[int, Signals]) -> dict[int, Signals]:
+    def _of_other_runs(self, signals: Mapping[int, Balanced]) -> dict[int, Balanced]:
         """Average what the other runs of its path have at the places of each flight."""
-        every = [signals.get(n) or Signals(*np.zeros((2, len(flight), 0))) for n, flight in enumerate(self.flights)]
+        every = [signals.get(n) or Balanced(*np.zeros((2, len(flight), 0))) for n, flight in enumerate(self.flights)]
         return {
-            number: Signals(*(self.given.repeats.others(number, each) for each in zip(*every, strict=True)))
+            number: Balanced(*(self.given.repeats.others(number, each) for each in zip(*every, strict=True)))
             for number in self.path
             if number not in self.asked
         }
 
     def _rows(
-        self, band: Windows, signals: Mapping[int, Signals], others: Mapping[int, Signals], form: Form
+        self, band: Windows, signals: Mapping[int, Balanced], others: Mapping[int, Balanced], form: Form
     ) -> Iterator[Rows]:
         own = {number: windowed(band, self.flights[number], form, each) for number, each in signals.items()}
         known = {number: windowed(band, self.flights[number], form, each) for number, each in others.items()}
@@ -458,7 +458,7 @@ def averaged(band: Windows, flight: PlaybackFlight, values: Array, *, changes: b
     return np.concatenate([np.zeros((0, values.shape[1])), *(seen(values[part]) for part in long)])
 
 
-def windowed(band: Windows, flight: PlaybackFlight, form: Form, signals: Signals) -> Array:
+def windowed(band: Windows, flight: PlaybackFlight, form: Form, signals: Balanced) -> Array:
     """Lay windows over what is balanced, shape (window, column)."""
     acted, changed = averaged(band, flight, signals.acting), averaged(band, flight, signals.changing, changes=True)
     rows = np.zeros((len(acted), len(form.columns)))
@@ -502,7 +502,7 @@ class PastBalances(Balances):
         """Each flight is a path of its own."""
         return {number: (number, np.arange(len(flight), dtype=float)) for number, flight in enumerate(self.flights)}
 
-    def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Signals]) -> Any:
+    def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Balanced]) -> Any:
         """Average all columns over windows, by stretch, each as its own flight."""
         return [
             (number, part, averaged(bands[0], part, _seen(part)), windowed(bands[0], part, form, signals[number]))

@@ -16,7 +16,6 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import BLOCK_S, ENOUGH_BLOCKS, block_length, contiguous, half_width, jackknife_error, mean_error
@@ -143,7 +142,7 @@ class _Band(NamedTuple):
     def laid(self, flight: PlaybackFlight, values: Array, kernel: _Complex) -> Array:
         """Lay a kernel over values, shape (time, column) to (piece, column, frequency)."""
         parts = [
-            sliding_window_view(values[part], len(kernel), axis=0)[:: self.pieces.hop] @ kernel
+            self.pieces.laid(values[part], kernel)
             for part in flight.stretches
             if self.pieces.count(part.stop - part.start)
         ]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -203,13 +203,10 @@ class VehicleAt:
         """
         if not by:
             return np.asarray(flight.rotor_terms(*self.times_of_response)[samples])
-        response, period, slow = self.response, flight.motion.period, SLOW in self.free.index
-        slopes = [
-            response.slope_by_step(flight.speed[part], period, flight.hold, TIMES[by], slow=slow)
-            for part in flight.stretches
-        ]
+        response, slow = self.response, SLOW in self.free.index
+        slopes = flight.of_speeds(partial(response.slope_by_step, by=TIMES[by], slow=slow))
         # The number is the logarithm of the slow time.
-        return np.concatenate(slopes)[samples] * (response.slow_s if by == SLOW else 1.0)
+        return np.asarray(slopes[samples] * (response.slow_s if by == SLOW else 1.0))
 
     @cached_property
     def times_of_response(self) -> tuple[float, float, float | None]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -128,11 +128,14 @@ class PlaybackFlight:
         """Terms of the rotors over each step by the times of their response, of which the last few are remembered."""
 
         def terms(delay_s: float, lag_s: float, slow_s: float | None) -> Array:
-            period, hold = self.motion.period, self.hold
-            found = [rotor_terms_by_step(self.speed[p], period, hold, delay_s, lag_s, slow_s) for p in self.stretches]
-            return np.concatenate(found)
+            return self.of_speeds(rotor_terms_by_step, delay_s, lag_s, slow_s)
 
         return lru_cache(maxsize=_REMEMBERED)(terms)
+
+    def of_speeds(self, terms: Callable[..., Array], *times: Any) -> Array:
+        """Evaluate what follows from speeds, their sampling period, what they are between samples, and more."""
+        period, hold = self.motion.period, self.hold
+        return np.concatenate([terms(self.speed[part], period, hold, *times) for part in self.stretches])
 
     def starts(self, horizon: int, every: int) -> IntArray:
         """List every n-th sample from which a horizon fits into its stretch.
@@ -166,11 +169,9 @@ class LoggedFlight:
     `parts`: stretches without pauses, at least one; `hold`: what a speed is between samples; `actuation`: what drives
     the playback, in words; `contradictions`: what of it no verdict can stand with; `group`: see `PlaybackFlight`;
     `shares`: whether its commands are shares of the full speed of the rotors; `updated_hz`: how often the log says what
-    drives the playback, None for as often as there are samples; `begins`: stamp of the log's own clock at time 0, s;
-    `system`: what wrote the log.
+    drives the playback, None for as often as there are samples; `system`: what wrote the log.
     """
 
-    name: str
     parts: tuple[Signals, ...]
     hold: Hold
     actuation: str
@@ -179,8 +180,12 @@ class LoggedFlight:
     group: str = ""
     shares: bool = False
     updated_hz: float | None = None
-    begins: float = np.nan
     system: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name of its file."""
+        return self.parts[0].name
 
     @property
     def logged_hz(self) -> float:
@@ -190,7 +195,7 @@ class LoggedFlight:
     @classmethod
     def of(cls, signals: Signals) -> LoggedFlight:
         """Take a flight without pauses; commands stay until the next sample."""
-        return cls(signals.name, (signals,), "previous" if signals.commanded else "linear", "", ())
+        return cls((signals,), "previous" if signals.commanded else "linear", "", ())
 
     @property
     def time(self) -> Array:
@@ -200,10 +205,10 @@ class LoggedFlight:
     @property
     def playback(self) -> PlaybackFlight:
         """The flight as logged."""
-        return replace(playback_flight(self.name, self.parts, self.hold), group=self.group)
+        return replace(playback_flight(self.parts, self.hold), group=self.group)
 
 
-def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:
+def playback_flight(parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:
     """Put the stretches of a flight one after another, of one period and with the same signals."""
     first = parts[0]
     thrust_known = first.rotor_speed is not None or first.stated_thrust is not None
@@ -218,7 +223,7 @@ def playback_flight(name: str, parts: Sequence[Signals], hold: Hold) -> Playback
     ends = np.cumsum([0, *(len(part) for part in parts)]).tolist()
     force = [part.specific_force for part in parts if part.specific_force is not None]
     return PlaybackFlight(
-        name=name,
+        name=first.name,
         motion=motion,
         speed=_joined([_or_zero(part.rotor_speed, part, len(part.vehicle.rotors)) for part in parts]),
         hold=hold,

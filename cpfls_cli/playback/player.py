@@ -196,7 +196,7 @@ def made_ready(model: VehicleModel, flight: LoggedFlight) -> tuple[PlaybackFligh
     parts = [model.acting(part) for part in repaired]
     filtered = any(not one.effect.missing(part) for one in model.filters for part in repaired)
     # What a filter leaves of a speed that stays until the next sample is nearer to a straight line.
-    made = playback_flight(flight.name, parts, "linear" if filtered else model.hold_of(parts[0], flight.hold))
+    made = playback_flight(parts, "linear" if filtered else model.hold_of(parts[0], flight.hold))
     return replace(made, group=flight.group), player_of(model, made, parts)
 
 
@@ -394,11 +394,8 @@ class Course:
     def lagged(self, response: RotorResponse) -> Array:
         """Give the speeds at which rotors that lag turn at the starts, shape (run, rotor)."""
         flight = self.finer_flight
-        parts = [
-            response.terms_at_samples(flight.speed[part], flight.motion.period, flight.hold)
-            for part in flight.stretches
-        ]
-        return np.concatenate(parts)[self.finer * self.starts, 1 : 1 + flight.speed.shape[1]]
+        terms = flight.of_speeds(response.terms_at_samples)
+        return np.asarray(terms[self.finer * self.starts, 1 : 1 + flight.speed.shape[1]])
 
     @property
     def finer_flight(self) -> PlaybackFlight:

@@ -507,7 +507,7 @@ def playback(
                 driven_by=flight.actuation,
                 hold=flight.hold,
                 rotation_alone=not own.flight.translates,
-                begins_s=flight.begins,
+                begins_s=flight.parts[0].begins,
             )
             for flight, own, count in zip(flights, played, counts, strict=True)
         ),

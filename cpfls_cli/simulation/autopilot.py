@@ -12,11 +12,11 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.autopilots.law import Controller, Law, attitude_error
-from cpfls_cli.autopilots.motors import Motors
+from cpfls_cli.autopilots.motors import Motors, fitting_yaw
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.simulation.plant import Mixer
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, VEHICLE_STATES, rotation_rows
+from cpfls_cli.vehicle.rotors import rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.stepping import Flat, Machine, Memory
 from cpfls_cli.vehicle.tracing import SYMBOLS, Symbol
@@ -132,6 +132,36 @@ def upright(pull: Vector, yaw: Value, functions: Functions = SYMBOLS) -> tuple[V
     forward = cross((minus(0, functions.sin(yaw)), functions.cos(yaw), 0), up)
     forward = scaled(1 / functions.sqrt(dot(forward, forward)), forward)
     return forward, cross(up, forward), up
+
+
+@dataclass(frozen=True)
+class Mixer:
+    """Allocate a wrench; where a rotor cannot follow, yaw gives way first, and the rest is clipped.
+
+    `inverse`: squared speeds for one unit of thrust and of each torque; `limit`: largest squared speed, rad^2/s^2.
+    """
+
+    inverse: Array
+    limit: float
+
+    def mixed(self, wrench: Vector) -> tuple[Value, Value]:
+        """Find speeds that are possible for thrust and torque (N, N m), rad/s, and squared speeds that they ask for."""
+        by_rotor = transposed(self.inverse.tolist())
+        upright = SYMBOLS.rotors(dot(wrench[:3], own[:3]) for own in by_rotor)
+        yaw = SYMBOLS.rotors(times(wrench[3], own[3]) for own in by_rotor)
+        possible = upright + fitting_yaw(upright, yaw, self.limit) * yaw
+        squared = SYMBOLS.smallest(SYMBOLS.largest(possible, 0.0), self.limit)
+        return SYMBOLS.sqrt(squared), upright + yaw
+
+
+def mixer(vehicle: VehicleSettings) -> Mixer:
+    """Invert the allocation of a vehicle.
+
+    `ComputationError` where the rotors cannot produce thrust, roll, pitch and yaw independently.
+    """
+    units = np.eye(4)
+    inverse = rotor_demand(vehicle, units[:, 0], units[:, 1:]).squared_speed
+    return Mixer(inverse, vehicle.rotor_speed_max_rad_s**2)
 
 
 @dataclass(frozen=True)

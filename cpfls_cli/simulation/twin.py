@@ -499,7 +499,7 @@ def twin_of(
         instruments=moved_by.kind,
         channel=CHANNELS,
         time=flight.time,
-        begins=flight.begins,
+        begins=flight.parts[0].begins,
         measured=measured,
         measured_position=np.concatenate(positions) if len(positions) == len(flight.parts) else None,
         setpoint=setpoint,

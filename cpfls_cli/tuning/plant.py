@@ -15,8 +15,8 @@ from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, result
+from cpfls_cli.simulation.closed_loop import Plant, flown_vehicle
 from cpfls_cli.simulation.model import SimulatedEffects, with_effects
-from cpfls_cli.simulation.plant import Plant, flown_vehicle
 from cpfls_cli.vehicle.motion import BODY_RATE, VELOCITY
 from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, Numbers
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 
@@ -37,11 +37,11 @@ class Windows:
 
     def average(self, values: Array) -> Array:
         """Average values, shape (time, ...), over each window, ``int phi x dt``, shape (window, ...)."""
-        return self._apply(values, self.weight)
+        return np.asarray(self.laid(values, self.weight))
 
     def derivative(self, values: Array) -> Array:
         """Average the time derivative as `average` does, ``-int phi' x dt``; nothing is differentiated."""
-        return -self._apply(values, self.slope)
+        return np.asarray(-self.laid(values, self.slope))
 
     def alternating(self) -> Self:
         """Turn the sign of every other sample: white noise stays as large as it was, and what is smooth vanishes."""
@@ -57,9 +57,10 @@ class Windows:
         slope[inside] += self.slope
         return replace(self, weight=weight, slope=slope)
 
-    def _apply(self, values: Array, kernel: Array) -> Array:
+    def laid(self, values: Array, kernel: Numbers) -> Any:
+        """Lay a kernel of the windows' length, or several, over values, shape (window, ..., kernel)."""
         views = sliding_window_view(values, len(kernel), axis=0)[:: self.hop]
-        return np.asarray(views @ kernel)
+        return views @ kernel
 
 
 @lru_cache(maxsize=64)

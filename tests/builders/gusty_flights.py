@@ -319,6 +319,7 @@ def logged(flight, vehicle, *, commanded=False):
         time=motion.period * np.arange(samples),
         body_rate=motion.rate,
         vehicle=vehicle,
+        name=flight.name,
         attitude=euler_angles(motion.rotation),
         velocity=motion.velocity,
         position=motion.position,
@@ -326,7 +327,7 @@ def logged(flight, vehicle, *, commanded=False):
         commanded=commanded,
         setpoints=flight.setpoints,
     )
-    return LoggedFlight(flight.name, (signals,), flight.hold, "measured rotor speeds", ())
+    return LoggedFlight((signals,), flight.hold, "measured rotor speeds", ())
 
 
 def torque_samples(flight, truth, lowpass_hz=12.0, *, asked=False):

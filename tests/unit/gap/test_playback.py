@@ -50,7 +50,8 @@ def whole(*fitted, **numbers):
 
 
 def logged(*parts):
-    return replace(LoggedFlight.of(replace(parts[0], name="flight")), parts=parts)
+    named = tuple(replace(part, name="flight") for part in parts)
+    return replace(LoggedFlight.of(named[0]), parts=named)
 
 
 def played_back(model, signals, horizon=30):

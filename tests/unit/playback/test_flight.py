@@ -23,7 +23,7 @@ def test_setpoints_are_joined_where_all_stretches_know_them() -> None:
         _part(0, 12, attitude=wished[:12], thrust=np.ones((12, 1))),
         _part(30, 8, attitude=wished[12:]),
     ]
-    flight = playback_flight("flown", parts, "linear")
+    flight = playback_flight(parts, "linear")
     assert list(flight.setpoints) == ["attitude"]
     assert flight.setpoints["attitude"] == pytest.approx(wished)
 
@@ -35,4 +35,4 @@ def test_a_part_of_a_flight_has_its_part_of_the_setpoints() -> None:
 
 
 def test_a_flight_without_setpoints_has_none() -> None:
-    assert playback_flight("flown", [_part(0, 12)], "linear").setpoints == {}
+    assert playback_flight([_part(0, 12)], "linear").setpoints == {}

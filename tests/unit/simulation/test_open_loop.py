@@ -13,10 +13,9 @@ from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.simulation.autopilot import upright
-from cpfls_cli.simulation.closed_loop import Integration, clock_of, flown
+from cpfls_cli.simulation.autopilot import mixer, upright
+from cpfls_cli.simulation.closed_loop import Integration, Plant, actuators, clock_of, flown, flown_vehicle
 from cpfls_cli.simulation.model import in_the_loop, simulated_effects, with_effects
-from cpfls_cli.simulation.plant import Plant, actuators, flown_vehicle, mixer
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.vehicle.rotors import body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings

@@ -30,7 +30,7 @@ PROP = """  <link name="prop{index}_link"><inertial><origin xyz="{x} {y} 0"/><ma
 """
 
 
-ONE, TWO = (SimpleNamespace(name=f"{name}.csv", signals=None) for name in ("one", "two"))
+ONE, TWO = (SimpleNamespace(name=f"{name}.csv") for name in ("one", "two"))
 
 
 def urdf():
@@ -463,7 +463,7 @@ def test_no_name_of_a_log_ends_the_comment(mine, name):
     of = of_log(read_model(mine), None, None)
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
                             effects=(effect("drag_factor_error", error=0.25),))  # fmt: skip
-    _, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name=name, signals=None)])
+    _, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name=name)])
     comment = files["mine.sdf"].decode("ascii").partition("<!-- Corrected")[2].partition("-->")[0]
     assert "--" not in comment
     assert comment.endswith(" ")
@@ -589,7 +589,7 @@ def test_a_direction_that_no_flight_shows_stays(mine):
     """The log states another one, and its flight has no speeds of rotors."""
     of = replace(of_log(read_model(mine), None, None), spins=(-1, 1, -1, -1))
     found = SimpleNamespace(verdict="NO_GAP", contradictions=(), rivals={}, effects=(), not_excited=())
-    flight = SimpleNamespace(name="one.csv", signals=SimpleNamespace(rotor_speed=None))
+    flight = SimpleNamespace(name="one.csv", rotor_speed=None)
     said, files = corrected(of, SMALL.vehicle, found, [flight])
     assert files["mine.sdf"] == mine.read_bytes()
     assert said.unchanged[0].startswith("directions of rotors: no flight of more than 5 s")
