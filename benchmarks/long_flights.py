@@ -24,7 +24,7 @@ from cpfls_cli import __version__
 from cpfls_cli.artifacts.gate import SCHEMA_VERSION
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.files import seal_of
-from cpfls_cli.flights.flight import MOTION
+from cpfls_cli.flightlog.results import MOTION
 from cpfls_cli.flights.training import flight_source
 from cpfls_cli.identification.evaluator import Problem, decode, refine
 from cpfls_cli.identification.identify import model_evaluator

@@ -23,10 +23,10 @@ from benchmarks.paper.printed import LEAST_TORQUE, TABLE_4, TABLE_5, PrintedColu
 from benchmarks.paper.replicates import ALL_SAMPLES, Setting, Sweep, joined_sweeps, spread
 from benchmarks.paper.search_claims import AS_GOOD, paired_ratio
 from cpfls_cli.arrays import Array
-from cpfls_cli.flights.flight import Simulated
 from cpfls_cli.report.canvas import GREY, plot, style_of
 from cpfls_cli.report.content import UNKNOWN, Block, Cell, Folded, Plot, Table, Text, number, percent
 from cpfls_cli.report.source import Source
+from cpfls_cli.simulation.model import Simulated
 from cpfls_cli.words import joined
 
 if TYPE_CHECKING:

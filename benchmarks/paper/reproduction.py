@@ -41,7 +41,7 @@ from benchmarks.paper.search_claims import (
     TYPICAL_CONDITION_CLAIM,
     TYPICAL_ERRORS_CLAIM,
 )
-from cpfls_cli.flights.flight import MOTION
+from cpfls_cli.flightlog.results import MOTION
 from cpfls_cli.flights.prediction import AlongFlight
 from cpfls_cli.fuzzy.basis import breakpoints, seesaw
 from cpfls_cli.identification.data import TRAINING

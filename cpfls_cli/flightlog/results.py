@@ -88,6 +88,10 @@ class ImportReport:
         return {what: count for what, count in counts.items() if count}
 
 
+MOTION = ("attitude", "attitude_rate", "attitude_acceleration")
+"""Fields of trajectories and flights that hold Euler angles and their derivatives."""
+
+
 def _signal(text: str, *axes: str, **more: Any) -> Any:
     return about(text, "time", *axes, default=None, brief=False, **more)
 

@@ -24,12 +24,11 @@ from cpfls_cli.dynamics import (
 )
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.results import Flight
-from cpfls_cli.flights.flight import MOTION, require_signals
+from cpfls_cli.flightlog.results import MOTION, Flight
 from cpfls_cli.flights.models import any_model, is_found, read_model
 from cpfls_cli.flights.recordings import read_alone
 from cpfls_cli.flights.same_vehicle import model_of_another, other_vehicles
-from cpfls_cli.flights.training import check_file, torque_source_of
+from cpfls_cli.flights.training import check_file, require_signals, torque_source_of
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueData

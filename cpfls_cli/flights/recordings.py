@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, stretches
-from cpfls_cli.artifacts.gate import InputFile, Origin
+from cpfls_cli.artifacts.gate import InputFile, Origin, read_origin
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, settings_of
@@ -26,10 +26,11 @@ from cpfls_cli.flightlog.results import Imported
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster, shown_slowly, stated_vehicle
-from cpfls_cli.flights.flight import read_whole
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import LogColumns, is_log, read_log
+from cpfls_cli.simulation.model import Simulated
+from cpfls_cli.store import read as read_result
 from cpfls_cli.units import SPEED_UNITS
 from cpfls_cli.vehicle.rotors import AXES, body_wrench, require_control, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -191,6 +192,11 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     if isinstance(flight, Imported):
         return replace(own, updated_hz=flight.updated_hz, stated=flight.stated, system=flight.system)
     return own
+
+
+def read_whole(path: Path) -> tuple[Imported | Simulated, Origin]:
+    """Read a flight with all that is known of it, and where it comes from."""
+    return read_result(path, Imported) if "log" in read_origin(path).inputs else read_result(path, Simulated)
 
 
 def read_import(name: str, parts: Sequence[Imported], study: Study) -> ReadFlight:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, count
@@ -18,9 +18,8 @@ from cpfls_cli.consistency.check import ENOUGH
 from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.files import read_content
-from cpfls_cli.flightlog.results import Flight
+from cpfls_cli.flightlog.results import MOTION, Flight
 from cpfls_cli.flightlog.settings import SETPOINTS
-from cpfls_cli.flights.flight import MOTION, require_signals
 from cpfls_cli.flights.recordings import (
     ReadFlight,
     check_flight,
@@ -109,6 +108,13 @@ def _torque_data(rows: Sequence[Array]) -> TorqueData:
     time, attitude, rate, acceleration = rows[: len(_NEEDED)]
     torque = rows[len(_NEEDED)] if len(rows) > len(_NEEDED) else np.zeros_like(attitude)
     return TorqueData(time, Motion(attitude, rate, acceleration), torque)
+
+
+def require_signals(path: Path, held: Container[str], *needed: str) -> None:
+    """Refuse a flight that lacks what is needed."""
+    missing = [name for name in needed if name not in held]
+    if missing:
+        raise InputError(f"{path}: lacks {', '.join(missing)}; this stage needs {', '.join(needed)}")
 
 
 def part_of(source: TorqueSource, samples: slice) -> TorqueSource:

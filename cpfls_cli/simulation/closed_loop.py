@@ -1,4 +1,4 @@
-"""A vehicle in flight, with effects and what it carries, in the closed loop of autopilot and actuators along a motion."""
+"""A vehicle in flight with effects and what it carries, in the closed loop of autopilot and actuators along a plan."""
 
 from __future__ import annotations
 

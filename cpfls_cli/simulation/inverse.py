@@ -11,7 +11,8 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.dynamics import body_torque, inertia_tensor
 from cpfls_cli.errors import ComputationError, SettingError
-from cpfls_cli.simulation.measured import SimulatedFlight, noisy
+from cpfls_cli.simulation.measured import noisy
+from cpfls_cli.simulation.model import Simulated
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.trajectory.excited import AddedMotion
 from cpfls_cli.trajectory.planning import Trajectory
@@ -21,12 +22,17 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def simulate(
-    planned: Mapping[str, Array], vehicle: VehicleSettings, settings: SimulationSettings, rng: np.random.Generator
-) -> SimulatedFlight:
+    time: Array,
+    planned: Mapping[str, Array],
+    vehicle: VehicleSettings,
+    settings: SimulationSettings,
+    rng: np.random.Generator,
+) -> Simulated:
     """Compute the torques and rotor speeds that fly a planned motion.
 
     Parameters
     ----------
+    time : array, shape (time,), s
     planned : mapping of str to array
         `attitude`, `attitude_rate`, `attitude_acceleration`, `position`, `velocity`, `acceleration`, shape
         (time, 3) each; without the last three the vehicle is held at its centre of mass and only turns.
@@ -52,7 +58,7 @@ def simulate(
     signals, noise_std = noisy(exact, settings, rng)
     signals["torque"], signals["body_torque"] = _torques(signals, frozenset(noise_std))
     signals["body_rate"] = rotations.body_rate(signals["attitude"], signals["attitude_rate"])
-    return SimulatedFlight(signals, noise_std, demand.violations)
+    return Simulated.of(time, signals, noise_std, demand.violations)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,51 +12,23 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.effects.hooks import TrueMotion
 from cpfls_cli.simulation.autopilot import GyroscopeNoise, asked
 from cpfls_cli.simulation.closed_loop import ClosedLoop, SimulatedMotion, clock_of, fly
-from cpfls_cli.simulation.model import SimulatedEffects, in_table, played_gusts, simulated_effects, with_effects
+from cpfls_cli.simulation.model import (
+    Simulated,
+    SimulatedEffects,
+    Tracking,
+    in_table,
+    played_gusts,
+    simulated_effects,
+    values_of,
+    with_effects,
+)
 from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.vehicle.motion import ATTITUDE, BODY_RATE, POSITION, VELOCITY
-from cpfls_cli.vehicle.rotors import RotorViolation, body_wrench, violations
+from cpfls_cli.vehicle.rotors import body_wrench, violations
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.model import VehicleModel
-
-
-@dataclass(frozen=True)
-class SimulatedFlight:
-    """A simulated flight, with noise where asked.
-
-    Attributes
-    ----------
-    signals : mapping of str to array
-        By the names of the flight artifact; time is the first axis.
-    noise_std : mapping of str to array
-        Standard deviation of the noise added to each channel, by signal.
-    violations : tuple of RotorViolation
-        What was asked for and no rotor can do: the exact vehicle has no `rotor_speed` there, and of an autopilot the
-        commands were clipped.
-    """
-
-    signals: Mapping[str, Array]
-    noise_std: Mapping[str, Array]
-    violations: tuple[RotorViolation, ...]
-
-
-@dataclass(frozen=True)
-class MeasuredFlight(SimulatedFlight):
-    """A flight simulated in closed loop as logged.
-
-    Attributes
-    ----------
-    effects : SimulatedEffects
-        What was simulated: the truth that a diagnosis has to find.
-    position_error, attitude_error : array, shape (time, 3), m and rad
-        Simulated minus planned, without the noise.
-    """
-
-    effects: SimulatedEffects
-    position_error: Array
-    attitude_error: Array
 
 
 def measure(
@@ -68,7 +39,7 @@ def measure(
     rng: np.random.Generator,
     progress: Callable[[float, int], None] = lambda _done, _total: None,
     model: VehicleModel | None = None,
-) -> MeasuredFlight:
+) -> Simulated:
     """Simulate a planned motion in closed loop and log it.
 
     Parameters
@@ -110,14 +81,12 @@ def measure(
     signals, noise_std = _logged(time, motion, vehicle, settings, effects, rng)
     setpoints = asked(time, planned, vehicle, settings.closed_loop, motion.state)
     signals |= {f"setpoint_{name}": values for name, values in setpoints.items()}
-    return MeasuredFlight(
-        signals,
-        noise_std,
-        violations(motion.demand, vehicle.rotor_speed_max_rad_s),
-        effects if held is None else SimulatedEffects((*in_table(held).listed, *effects.listed)),
-        motion.state[:, POSITION] - planned["position"],
-        motion.state[:, ATTITUDE] - planned["attitude"],
+    flown = effects if held is None else SimulatedEffects((*in_table(held).listed, *effects.listed))
+    tracking = Tracking.of(
+        motion.state[:, POSITION] - planned["position"], motion.state[:, ATTITUDE] - planned["attitude"]
     )
+    beyond = violations(motion.demand, vehicle.rotor_speed_max_rad_s)
+    return Simulated.of(time, signals, noise_std, beyond, effects=values_of(flown), flown=flown, tracking=tracking)
 
 
 def _logged(

@@ -1,10 +1,10 @@
-"""The model that is simulated: how it turns, and effects of the catalogue with values, checked against their bounds."""
+"""What is simulated: effects with values, checked against their bounds, how a model divides, and flights of it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -13,7 +13,10 @@ from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import SettingError
+from cpfls_cli.flightlog.results import Flight
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.result import about, part, result
+from cpfls_cli.vehicle.rotors import RotorViolation
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
@@ -61,6 +64,110 @@ class SimulatedEffects:
     def hides_rotor_speed(self) -> bool:
         """Whether the flight logs commands in place of rotor speeds."""
         return any(one.effect.actuation is not None for one in self.listed)
+
+
+@result
+class Noise:
+    """Noise that was added to a signal."""
+
+    std: Array = about("standard deviation of each channel", "channel", unit="SI")
+
+
+@result
+class Tracking:
+    """How far an autopilot was off its path."""
+
+    position_rms_m: float = about("root mean square of the distance", unit="m")
+    position_max_m: float = about("largest distance", unit="m")
+    attitude_rms_rad: Array = about("root mean square of roll, pitch, yaw", "axis", unit="rad")
+
+    @classmethod
+    def of(cls, position_error: Array, attitude_error: Array) -> Self:
+        """Take how far a simulated flight is from its plan, shapes (time, 3), m and rad."""
+        away = np.linalg.norm(position_error, axis=1)
+        return cls(
+            position_rms_m=float(np.sqrt(np.mean(away**2))),
+            position_max_m=float(away.max()),
+            attitude_rms_rad=np.sqrt(np.mean(attitude_error**2, axis=0)),
+        )
+
+
+@result
+class Infeasible:
+    """Samples at which a rotor was asked for what it cannot do."""
+
+    rotor: int = about("number of the rotor, from 1")
+    kind: str = about("``negative squared speed`` or ``above the limit``")
+    first_s: float = about("first of them", unit="s")
+    last_s: float = about("last of them", unit="s")
+    samples: int = about("how many, which need not be all between")
+    worst: float = about("squared speed that is farthest off", unit="rad^2/s^2")
+
+    @classmethod
+    def of(cls, violation: RotorViolation, time: Array) -> Self:
+        """Describe them by the times of samples."""
+        return cls(
+            rotor=violation.rotor + 1,
+            kind=violation.kind,
+            first_s=float(time[violation.first]),
+            last_s=float(time[violation.last]),
+            samples=violation.count,
+            worst=violation.worst,
+        )
+
+
+@result
+class Simulated(Flight):
+    """A simulated flight, and what is known of its truth."""
+
+    SHOWN: ClassVar = ("samples", "max_torque", "setpoints", "noise")
+
+    noise_std: Mapping[str, Noise] = part()
+    infeasible: tuple[Infeasible, ...] = part()
+    effects: Mapping[str, float] = about("true values of what was flown beyond the model, by `effect.coefficient`")
+    tracking: Tracking | None = part(default=None)
+
+    flown: SimulatedEffects = field(default_factory=SimulatedEffects)
+    """Each effect with its numbers; in no file."""
+
+    @classmethod
+    def of(
+        cls,
+        time: Array,
+        signals: Mapping[str, Array],
+        noise_std: Mapping[str, Array],
+        violations: Sequence[RotorViolation],
+        **known: Any,
+    ) -> Self:
+        """Describe signals, the noise that was added to each channel, and what no rotor can do."""
+        given: dict[str, Any] = {"effects": {}, **signals, **known}
+        return cls(
+            time=time,
+            noise_std={name: Noise(std=np.atleast_1d(std)) for name, std in noise_std.items()},
+            infeasible=tuple(Infeasible.of(one, time) for one in violations),
+            **given,
+        )
+
+    @property
+    def samples(self) -> int:
+        """Samples of the flight."""
+        return len(self.time)
+
+    @property
+    def noise(self) -> list[str]:
+        """Signals with added noise."""
+        return sorted(self.noise_std)
+
+
+def values_of(effects: SimulatedEffects) -> dict[str, float]:
+    """Give the values of effects by ``effect.coefficient``; an effect without numbers is 1."""
+    return {
+        name: value
+        for flown in effects.listed
+        for name, value in (
+            {f"{flown.effect.name}.{entry}": value for entry, value in flown.values.items()} or {flown.effect.name: 1.0}
+        ).items()
+    }
 
 
 def simulated_effects(

@@ -9,10 +9,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.flightlog.results import Flight
-from cpfls_cli.flights.flight import Infeasible
 from cpfls_cli.report.canvas import Drawn, legend_above, line, stacked, style_of
 from cpfls_cli.report.content import plain
 from cpfls_cli.simulation.inverse import Flyability, TooMuch
+from cpfls_cli.simulation.model import Infeasible
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 from cpfls_cli.units import SPEED_UNITS
 

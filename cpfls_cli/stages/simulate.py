@@ -18,14 +18,13 @@ from cpfls_cli.artifacts.job import require_numbers
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.flightlog.results import Flight
-from cpfls_cli.flights.flight import MOTION, Infeasible, Simulated, Tracking, values_of
+from cpfls_cli.flightlog.results import MOTION, Flight
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.report.content import Outcome
 from cpfls_cli.simulation.inverse import simulate as fly_exactly
 from cpfls_cli.simulation.measured import measure
-from cpfls_cli.simulation.model import played_gusts, simulated_effects, with_effects
+from cpfls_cli.simulation.model import Simulated, played_gusts, simulated_effects, with_effects
 from cpfls_cli.stage import Run, stage, stage_named
 from cpfls_cli.stages._flight import FIGURES, STILL_AIR, WORDS, infeasible_sentence
 from cpfls_cli.store import read
@@ -170,13 +169,13 @@ def _plan(trajectory: Path, closed: bool) -> tuple[Array, dict[str, Array]]:
 
 def _inverse(run: Run, time: Array, planned: dict[str, Array], trajectory: Path) -> Simulated:
     with settings_of("simulation", run.study):
-        flight = fly_exactly(planned, run.study.vehicle, run.study.simulation, generator(run.study, "simulate"))
-    if flight.violations and run.study.simulation.infeasible == "stop":
-        problems = [infeasible_sentence(Infeasible.of(each, time)) for each in flight.violations]
+        flight = fly_exactly(time, planned, run.study.vehicle, run.study.simulation, generator(run.study, "simulate"))
+    if flight.infeasible and run.study.simulation.infeasible == "stop":
+        problems = [infeasible_sentence(each) for each in flight.infeasible]
         remedy = "fly more gently, change the vehicle, or set simulation.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
     run.go_on("reduce", run.output, output=run.beside("selection.h5"))
-    return Simulated.of(time, flight)
+    return flight
 
 
 def _closed_loop(run: Run, time: Array, planned: dict[str, Array], model: VehicleModel | None) -> Simulated:
@@ -185,4 +184,4 @@ def _closed_loop(run: Run, time: Array, planned: dict[str, Array], model: Vehicl
     if model is not None and model.gusts is not None and not study.simulation.closed_loop.gusts:
         run.say(STILL_AIR)
     run.go_on("gap", run.output, output=run.beside("gap"))
-    return replace(Simulated.of(time, flight), effects=values_of(flight.effects), tracking=Tracking.of(flight))
+    return flight

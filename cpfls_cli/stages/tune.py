@@ -22,8 +22,8 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError, about
 from cpfls_cli.export.parameter_files import parameter_file
 from cpfls_cli.flightlog.results import Flight, Imported
-from cpfls_cli.flights.flight import read_whole
 from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_model
+from cpfls_cli.flights.recordings import read_whole
 from cpfls_cli.flights.training import numbered_roles
 from cpfls_cli.logs.formats import log_contents, read_log
 from cpfls_cli.look.effectiveness import effectiveness

@@ -16,9 +16,9 @@ from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.flightlog.results import Imported
-from cpfls_cli.flights.flight import read_whole
 from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_model
 from cpfls_cli.flights.playback import flights_to_play, model_notes
+from cpfls_cli.flights.recordings import read_whole
 from cpfls_cli.flights.training import known_by
 from cpfls_cli.logs.formats import is_log, log_contents
 from cpfls_cli.pages.gap import MEASURED

@@ -36,10 +36,10 @@ from benchmarks.paper.search_claims import (
     paired_ratio,
 )
 from cpfls_cli.config.study import ReportSettings
-from cpfls_cli.flights.flight import Noise, Simulated
 from cpfls_cli.reduction.training_set import Selection
 from cpfls_cli.report.source import Source
 from cpfls_cli.result import plain
+from cpfls_cli.simulation.model import Noise, Simulated
 from cpfls_cli.store import Origin
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.sweeps import setting_of, sweep_of

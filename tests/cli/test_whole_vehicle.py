@@ -13,12 +13,12 @@ from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.results import Flight
-from cpfls_cli.flights.flight import Simulated
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rotations import body_torque
+from cpfls_cli.simulation.model import Simulated
 from cpfls_cli.store import read
 from tests.builders.artifacts import edited
 from tests.builders.exported_vehicles import on_numpy

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.flights.flight import MOTION
+from cpfls_cli.flightlog.results import MOTION
 from cpfls_cli.playback.disturbance import find_gusts
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Repeats, instruments

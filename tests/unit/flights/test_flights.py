@@ -14,13 +14,13 @@ from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study, resolved_yaml
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
-from cpfls_cli.flightlog.results import Flight, Imported
+from cpfls_cli.flightlog.results import MOTION, Flight, Imported
 from cpfls_cli.flights import playback, recordings
 from cpfls_cli.flights import training as sources
-from cpfls_cli.flights.flight import MOTION, Simulated
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.flights.recordings import ReadFlight, signals_of
 from cpfls_cli.simulation.inverse import flyability
+from cpfls_cli.simulation.model import Simulated
 from cpfls_cli.store import Origin, write
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings

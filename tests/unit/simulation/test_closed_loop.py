@@ -73,15 +73,15 @@ def test_accuracy_is_of_second_order_in_the_step():
 
 
 def test_path_is_followed_and_no_rotor_is_clipped(plain):
-    assert rms(plain.position_error).max() < 0.05
-    assert rms(plain.attitude_error).max() < 0.03
-    assert plain.violations == ()
+    assert plain.tracking.position_rms_m < 0.05
+    assert plain.tracking.attitude_rms_rad.max() < 0.03
+    assert plain.infeasible == ()
 
 
 @pytest.mark.parametrize("name", SEEN_BY_BALANCE)
 def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
     flight = flown(2.0, effects={name: typical(name)})
-    (one,) = flight.effects.listed
+    (one,) = flight.flown.listed
     signals = signals_of(flight)
     weak, left = balance(signals)
     if one.effect.kind == "actuator":
@@ -205,7 +205,7 @@ def test_effects_add_up():
     flight = flown(effects={name: typical(name) for name in names})
     signals = signals_of(flight)
     weak, left = balance(signals)
-    expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in flight.effects.listed)
+    expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in flight.flown.listed)
     np.testing.assert_array_less(rms(left - expected), [3e-5] * 3 + [2e-4] * 3)
 
 
@@ -225,7 +225,7 @@ def test_more_than_four_rotors_fly_too():
     spun = tuple(RotorSettings(position_m=hub, spin=1 if n % 2 else -1) for n, hub in enumerate(hubs))
     flight = flown(1.0, vehicle=replace(VEHICLE, rotors=spun))
     assert flight.signals["rotor_speed"].shape == (101, 6)
-    assert rms(flight.position_error).max() < 0.05
+    assert flight.tracking.position_rms_m < 0.05
 
 
 def test_vehicle_that_cannot_stay_on_its_path_is_given_up():
@@ -252,7 +252,7 @@ def flown_by(autopilot, seed=1, **parameters):
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot", "crazyflie"])
 def test_an_autopilot_flies_a_path_with_its_own_law(autopilot):
     flight = flown_by(autopilot)
-    assert np.abs(flight.position_error).max() < 0.3
+    assert flight.tracking.position_max_m < 0.3
     behind = flight.signals["setpoint_attitude"] - flight.signals["attitude"]
     # It follows the attitude that it is asked for late, and follows it.
     assert 0.01 < np.sqrt(np.mean(behind[:, :2] ** 2)) < 0.12
@@ -438,10 +438,10 @@ def test_a_new_actuator_effect_is_a_link_of_the_chain(monkeypatch):
     free = flown_with(monkeypatch)
     flight = flown_with(monkeypatch, limited_rotors=(500.0,))
     assert free.signals["rotor_speed"].min() < 345 < free.signals["rotor_speed"].max() < 500
-    assert flight.effects.hides_rotor_speed
+    assert flight.flown.hides_rotor_speed
     np.testing.assert_array_equal(flight.signals["position"], free.signals["position"])
     slow = flown_with(monkeypatch, limited_rotors=(345.0,))
-    assert slow.position_error[-1, 2] < free.position_error[-1, 2] - 0.01
+    assert slow.position[-1, 2] < free.position[-1, 2] - 0.01
 
 
 def test_a_new_effect_on_the_vehicle_is_one_function(monkeypatch):

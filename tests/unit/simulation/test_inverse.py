@@ -44,7 +44,13 @@ def planned(samples=300):
 
 def flown(motion=None, vehicle=VEHICLE, seed=30, **settings):
     motion = planned() if motion is None else motion
-    return simulate(motion, vehicle, SimulationSettings(**settings), np.random.default_rng(seed))
+    return simulate(
+        0.01 * np.arange(len(motion["attitude"])),
+        motion,
+        vehicle,
+        SimulationSettings(**settings),
+        np.random.default_rng(seed),
+    )
 
 
 def orientation(time):
@@ -79,7 +85,7 @@ def test_rotors_give_back_the_torque_and_the_weight():
     np.testing.assert_allclose(wrench.body_torque, flight.signals["body_torque"], atol=1e-9)
     force = planned()["acceleration"] + np.array([0, 0, 9.81])
     np.testing.assert_allclose(wrench.thrust, 6.0 * np.linalg.norm(force, axis=1), rtol=1e-12)
-    assert flight.violations == ()
+    assert flight.infeasible == ()
     assert flight.noise_std == {}
 
 
@@ -92,7 +98,7 @@ def test_planned_signals_pass_unchanged_without_noise():
 def test_noise_has_the_standard_deviation_that_was_asked_for():
     clean, noisy = flown(planned(4000)), flown(planned(4000), noise={"torque": 0.3, "attitude": 0.01})
     assert set(noisy.noise_std) == {"torque", "attitude"}
-    np.testing.assert_array_equal(noisy.noise_std["torque"], [0.3] * 3)
+    np.testing.assert_array_equal(noisy.noise_std["torque"].std, [0.3] * 3)
     for name, std in (("torque", 0.3), ("attitude", 0.01)):
         noise = noisy.signals[name] - clean.signals[name]
         # The standard deviation of 4000 samples scatters by 1.1 %.
@@ -108,7 +114,7 @@ def test_relative_noise_is_a_share_of_each_channel():
     noisy = flown(planned(4000), relative_noise={"torque": 0.05})
     own = clean.signals["torque"].std(axis=0)
     assert own.max() > 1.5 * own.min()
-    np.testing.assert_allclose(noisy.noise_std["torque"], 0.05 * own, rtol=1e-12)
+    np.testing.assert_allclose(noisy.noise_std["torque"].std, 0.05 * own, rtol=1e-12)
     noise = noisy.signals["torque"] - clean.signals["torque"]
     np.testing.assert_allclose(noise.std(axis=0), 0.05 * own, rtol=0.05)
 
@@ -116,7 +122,7 @@ def test_relative_noise_is_a_share_of_each_channel():
 def test_absolute_and_relative_noise_add_as_independent_ones():
     own = flown().signals["torque"].std(axis=0)
     both = flown(noise={"torque": 0.3}, relative_noise={"torque": 0.4})
-    np.testing.assert_allclose(both.noise_std["torque"], np.sqrt(0.09 + (0.4 * own) ** 2), rtol=1e-12)
+    np.testing.assert_allclose(both.noise_std["torque"].std, np.sqrt(0.09 + (0.4 * own) ** 2), rtol=1e-12)
 
 
 def test_body_signals_follow_from_the_noisy_ones():
@@ -137,10 +143,10 @@ def test_what_no_rotor_can_do_is_reported_and_left_out():
     weak = VehicleSettings(rotor_speed_max_rad_s=348.5)
     flight = flown(vehicle=weak)
     speed = flight.signals["rotor_speed"]
-    assert {violation.kind for violation in flight.violations} == {"above the limit"}
-    for violation in flight.violations:
-        gaps = np.flatnonzero(np.isnan(speed[:, violation.rotor]))
-        assert (violation.first, violation.last, violation.count) == (gaps[0], gaps[-1], len(gaps))
+    assert {one.kind for one in flight.infeasible} == {"above the limit"}
+    for one in flight.infeasible:
+        gaps = np.flatnonzero(np.isnan(speed[:, one.rotor - 1]))
+        assert (one.first_s, one.last_s, one.samples) == (*flight.time[gaps[[0, -1]]], len(gaps))
     assert np.nanmax(speed) <= 348.5
     assert np.isfinite(flight.signals["torque"]).all()
 
@@ -162,12 +168,21 @@ def turning(samples=500):
 
 def held(vehicle=None, **settings):
     vehicle = vehicle or VehicleSettings()
-    return simulate(turning(), vehicle, SimulationSettings(**settings), np.random.default_rng(3))
+    return simulate(0.02 * np.arange(500), turning(), vehicle, SimulationSettings(**settings), np.random.default_rng(3))
 
 
 def test_flight_of_a_held_vehicle_has_no_translation():
     assert set(held().signals) == {
-        *("attitude", "attitude_rate", "attitude_acceleration", "torque", "body_torque", "body_rate", "rotor_speed")
+        *(
+            "time",
+            "attitude",
+            "attitude_rate",
+            "attitude_acceleration",
+            "torque",
+            "body_torque",
+            "body_rate",
+            "rotor_speed",
+        )
     }
 
 
