@@ -380,8 +380,7 @@ class RecordedFlight:
     @property
     def signals(self) -> dict[str, Array]:
         """Known signals but the time, by name."""
-        held = {name: getattr(self, name) for name in SIGNALS if name != "time"}
-        return {name: values for name, values in held.items() if values is not None}
+        return {name: own for name, own in vars(self).items() if name != "time" and isinstance(own, np.ndarray)}
 
     def flight(self, vehicle: VehicleSettings, ground_height_m: float) -> Signals:
         """Rebuild the flight, with its vehicle and the height of the ground."""
@@ -390,10 +389,6 @@ class RecordedFlight:
         position = held.pop("setpoint_position")
         asked = {} if position is None else {"position": position}
         return Signals(**held, vehicle=vehicle, ground_height_m=ground_height_m, setpoints=asked)
-
-
-SIGNALS = tuple(each.name for each in described_fields(RecordedFlight) if each.about and each.about.axes)
-"""Names of the signals that are held."""
 
 
 def recorded(flights: Iterable[Signals], roles: Iterable[str]) -> dict[str, RecordedFlight]:

@@ -220,14 +220,13 @@ def playback_flight(parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:
         # Clocks are rounded; what rounding leaves of a step would show in every horizon.
         round(float(first.time[-1] - first.time[0]) / (len(first) - 1), 12),
     )
-    ends = np.cumsum([0, *(len(part) for part in parts)]).tolist()
     force = [part.specific_force for part in parts if part.specific_force is not None]
     return PlaybackFlight(
         name=first.name,
         motion=motion,
         speed=_joined([_or_zero(part.rotor_speed, part, len(part.vehicle.rotors)) for part in parts]),
         hold=hold,
-        stretches=tuple(slice(*pair) for pair in pairwise(ends)),
+        stretches=stretches_of(parts),
         has_attitude=first.attitude is not None,
         has_velocity=first.velocity is not None and thrust_known,
         has_position=first.position is not None,
@@ -239,6 +238,12 @@ def playback_flight(parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:
             if all(name in part.setpoints for part in parts)
         },
     )
+
+
+def stretches_of(parts: Sequence[Signals]) -> tuple[slice, ...]:
+    """Give the samples of each stretch among those of all, one after another."""
+    ends = np.cumsum([0, *(len(part) for part in parts)]).tolist()
+    return tuple(slice(*pair) for pair in pairwise(ends))
 
 
 def _joined(parts: Sequence[Array]) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
+from cpfls_cli.playback.flight import LoggedFlight, contradictions_of, stretches_of
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.lack import DrawnLack, Lack
@@ -186,13 +185,12 @@ def _lift(acceleration: Array, attitude: Array, gravity: float) -> Array:
 
 def baselines(flight: LoggedFlight, measured: Array) -> tuple[Array, Array]:
     """Give what knows no vehicle: the setpoints themselves, and a vehicle that stays as it begins; as `CHANNELS`."""
-    asked, ends = np.full_like(measured, np.nan), np.cumsum([0, *(len(part) for part in flight.parts)])
-    still = np.empty_like(measured)
-    for stretch, (first, end) in zip(flight.parts, pairwise(ends.tolist()), strict=True):
+    asked, still = np.full_like(measured, np.nan), np.empty_like(measured)
+    for stretch, own in zip(flight.parts, stretches_of(flight.parts), strict=True):
         for name, place in (("body_rate", slice(0, 3)), ("attitude", slice(3, 6)), ("velocity", slice(6, 9))):
             if name in stretch.setpoints:
-                asked[first:end, place] = stretch.setpoints[name]
-        still[first:end] = measured[first]
+                asked[own, place] = stretch.setpoints[name]
+        still[own] = measured[own.start]
     return asked, still
 
 
@@ -612,9 +610,10 @@ def _is_apart(difference: Array, follows: Array, floor: float, least: float) -> 
 def windows(flight: LoggedFlight) -> list[slice]:
     """Cut the samples of a flight into windows of `WINDOW_S`; none spans a pause, and what is left over is its own."""
     length = max(round(WINDOW_S / flight.parts[0].period), 2)
-    ends = np.cumsum([0, *(len(part) for part in flight.parts)]).tolist()
     return [
-        slice(start, min(start + length, end)) for first, end in pairwise(ends) for start in range(first, end, length)
+        slice(start, min(start + length, own.stop))
+        for own in stretches_of(flight.parts)
+        for start in range(own.start, own.stop, length)
     ]
 
 
@@ -641,12 +640,10 @@ def _stretches(
     flight: LoggedFlight, given: Array, measured: Array, simulated: Array, instrument: Array | None
 ) -> list[Stretch]:
     """Cut a channel into its stretches, up to where the simulated vehicle is lost."""
-    found, first = [], 0
-    for each in flight.parts:
-        own = slice(first, first + len(each))
-        first += len(each)
+    found = []
+    for own in stretches_of(flight.parts):
         known = np.isfinite(simulated[own]) & np.isfinite(measured[own])
-        count = len(each) if known.all() else int(np.argmin(known))
+        count = len(known) if known.all() else int(np.argmin(known))
         if count < 2:
             continue
         kept = slice(own.start, own.start + count)
