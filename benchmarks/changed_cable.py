@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from cpfls_cli.flights.flights import read_flights
 
 from benchmarks.blind_study.fly import fly
 from benchmarks.blind_study.sets import Size, sets
@@ -20,6 +19,7 @@ from benchmarks.shared.measure import count, program, table
 from cpfls_cli.changes.judge import changed
 from cpfls_cli.changes.numbers import flight_numbers
 from cpfls_cli.config.load import load_study
+from cpfls_cli.flights.recordings import read_flights
 
 REFERENCE = 5
 

@@ -51,7 +51,7 @@ def numbers_of(study: Study, paths: list[Path], keep: Path | None) -> dict[str, 
     for name in names.keys() - known.keys():
         try:
             read = read_alone(names[name], study)
-            known[name] = flight_numbers(read.recording, read.full_voltage)
+            known[name] = flight_numbers(read.signals, read.full_voltage)
         except CpflsError as error:
             print(f"{name}: {error}", file=sys.stderr)
     if keep:

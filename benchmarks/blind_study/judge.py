@@ -5,11 +5,10 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from cpfls_cli.flights.flights import read_flights
-
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import generator
 from cpfls_cli.errors import CpflsError
+from cpfls_cli.flights.recordings import read_flights
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.result import plain
 
