@@ -207,7 +207,7 @@ def _write_values(group: h5py.Group, name: str, value: Any, own: Described, abou
         array = np.char.encode(array, "utf-8", "backslashreplace")
     array = array.astype(np.uint8) if array.dtype == bool else array
     # By the library's own functions each takes twice as long.
-    if rows or array.nbytes >= _PACKED_BYTES:
+    if rows or (array.ndim and array.nbytes >= _PACKED_BYTES):
         shape, chunk = (rows or len(array), *array.shape[1:]), (min(rows, PART), *array.shape[1:]) if rows else True
         dataset = group.create_dataset(name, shape, array.dtype, chunks=chunk, compression="gzip", shuffle=True).id
     else:
