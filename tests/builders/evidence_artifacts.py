@@ -1,12 +1,14 @@
 """Evidence on a model with known numbers, as `cpfls identify` stores it."""
 
+from functools import reduce
+
 import numpy as np
 from scipy.stats import norm
 
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.store import read, write
 from cpfls_cli.validation.verdict import Reason
-from tests.builders.identified_models import value_of, with_parts
+from tests.builders.identified_models import with_parts
 
 LAGS, INPUTS, POINTS, DRAWS, STEPS = 40, 7, 91, 60, 50
 REASONS = ("R2 of body torque is 0.97 or more on held-out data", "errors follow roll", "the search was short")
@@ -66,7 +68,7 @@ def curves():
 
 def uncertainty(model, rng):
     def around(path, deviation):
-        value = value_of(model, path)
+        value = reduce(getattr, path.split("/"), model)
         return value + deviation * rng.standard_normal((DRAWS, len(value)))
 
     return {

@@ -52,10 +52,6 @@ def bent_torque(inertia=INERTIA, size=0.3):
     return torque_of
 
 
-def no_torque(motion):
-    return np.zeros((len(motion), 3))
-
-
 def random_flight(torque_of, seed, samples, *, noise=0.0, limit=np.pi, start=0.0):
     """A torque with white noise along a random motion, a hundred samples in a second."""
     rng = np.random.default_rng(seed)

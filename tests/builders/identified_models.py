@@ -32,13 +32,6 @@ def with_parts(given, values):
     return replace(given, **made)
 
 
-def value_of(given, path):
-    """Give a field of a result by its path."""
-    for name in path.split("/"):
-        given = getattr(given, name)
-    return given
-
-
 def write_changed(source, target, **values):
     """Write a model again with other values: names of fields, with two underscores for each slash."""
     given, origin = read(source, IdentifiedModel)

@@ -31,10 +31,6 @@ def looked_plant(gain, delay, lag, spread=NARROW, axis="roll", seed=1):
     return SimpleNamespace(axis=axis, identified=True, reason="", parameters=found, draws=draws, band_hz=band)
 
 
-def weak_plant(axis):
-    return SimpleNamespace(axis=axis, identified=False, reason="sticks rest", parameters=None, draws=None, band_hz=None)
-
-
 def looked_flight(autopilot, values=None, system=None, *, noise=0.02, attitude=False):
     """A log with the parameters of an autopilot, in which nothing but noise of the gyroscope is there."""
     count = 4000

@@ -88,18 +88,8 @@ def test_disagreement_of_another_vehicle(cpfls, refuse, gap_config, other_config
 
 
 def test_model_of_another_vehicle(refuse, pipeline, gap_config, shifted, tmp_path):
-    words = (
-        "gap",
-        gap_config,
-        *shifted,
-        "--model",
-        pipeline.model,
-        "-o",
-        tmp_path / "x",
-        "--set",
-        "vehicle.mass_kg=5.5",
-    )
-    (message,) = refuse(*words)
+    options = ("--model", pipeline.model, "--set", "vehicle.mass_kg=5.5")
+    (message,) = refuse("gap", gap_config, *shifted, *options, "-o", tmp_path / "x")
     assert f"{pipeline.model}: was made with another vehicle" in message
 
 

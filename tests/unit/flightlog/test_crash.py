@@ -1,5 +1,7 @@
 """What ends a flight before its time is found, cut and said; what looks alike and is flight stays."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -48,28 +50,25 @@ def test_the_part_before_a_crash_is_used(own, ends, without_force, with_force, k
     assert found.reasons == ()
 
 
-def test_a_crash_begins_where_rotors_at_their_limit_no_longer_hold_it(own):
-    found = flown(ended.gives_way(own))
-    assert found.span_s == (0.0, pytest.approx(ended.SECONDS + 0.6, abs=0.2))
-    assert found.ended == f"loss of control at {found.span_s[1] + 0.02:.1f} s, impact at 43.0 s"
-
-
-def test_what_rocks_on_the_ground_after_a_crash_is_not_taken_for_the_flight(own):
-    found = flown(ended.rocks_on_the_ground(own), ("force",))
-    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.1))
-    assert found.ended == "impact at 40.0 s"
-
-
-def test_what_leans_on_something_high_above_the_ground_does_not_fly(own):
-    found = flown(ended.leans_on_a_wall(own))
-    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.5))
-    assert "it rests on something, with its rotors on" in found.ended
-
-
-def test_a_fall_that_ends_with_a_jolt_is_an_impact(own):
-    found = flown(ended.falls_and_hits(own))
-    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.1))
-    assert found.ended == "it falls freely from 40.0 s on, impact at 40.6 s"
+@pytest.mark.parametrize(
+    ("ends", "known", "after", "within", "said"),
+    [
+        (ended.gives_way, ALL, 0.6, 0.2, r"loss of control at {:.1f} s, impact at 43\.0 s"),
+        (ended.rocks_on_the_ground, ("force",), 0.0, 0.1, r"impact at 40\.0 s"),
+        (ended.leans_on_a_wall, ALL, 0.0, 0.5, ".*it rests on something, with its rotors on.*"),
+        (ended.falls_and_hits, ALL, 0.0, 0.1, r"it falls freely from 40\.0 s on, impact at 40\.6 s"),
+    ],
+    ids=[
+        "rotors at their limit no longer hold it",
+        "it rocks on the ground",
+        "it leans high above the ground",
+        "a fall",
+    ],
+)
+def test_a_flight_ends_where_its_crash_begins(own, ends, known, after, within, said):
+    found = flown(ends(own), known)
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS + after, abs=within))
+    assert re.fullmatch(said.format(found.span_s[1] + 0.02), found.ended)
 
 
 @pytest.mark.parametrize("known", [ALL, ("force",), ("upright",)])

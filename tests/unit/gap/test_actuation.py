@@ -98,8 +98,11 @@ def test_both_stand_where_each_is_surely_not_0_beside_the_other_though_one_alone
     assert apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})[:2] == (BOTH, set())
 
 
-def test_less_than_nothing_is_nothing(monkeypatch):
-    left = {(): 90.0, LAG: -2.0, DELAY: LITTLE, BOTH: LITTLE}
+@pytest.mark.parametrize(
+    ("nothing", "lag", "delay"), [(90.0, -2.0, LITTLE), (9000.0, 9.0, 1.0)], ids=["less than nothing", "formulas"]
+)
+def test_what_formulas_are_off_by_and_less_than_nothing_are_nothing(nothing, lag, delay, monkeypatch):
+    left = {(): nothing, LAG: lag, DELAY: delay, BOTH: LITTLE}
     names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})
     assert (names, rivals) == (LAG, {("command_delay", "motor_lag", "")})
 
@@ -114,12 +117,6 @@ def test_a_filter_that_leaves_nothing_is_a_rival_of_one_that_surely_leaves_somet
 def test_a_delay_of_a_third_of_a_sample_is_none(monkeypatch):
     left = {(): 90.0, LAG: 9.0, DELAY: 9.0, BOTH: LITTLE}
     assert apart(monkeypatch, LAG, left, {BOTH: [SURE, (0.0035, 0.001)]})[0] == LAG
-
-
-def test_what_formulas_are_off_by_tells_nothing(monkeypatch):
-    left = {(): 9000.0, LAG: 9.0, DELAY: 1.0, BOTH: LITTLE}
-    names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})
-    assert (names, rivals) == (LAG, {("command_delay", "motor_lag", "")})
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from cpfls_cli.identification.solver import contiguous_blocks, with_folds
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.regressor import RIGID, Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
-from tests.builders.flights import no_torque, random_flight, rigid_torque
+from tests.builders.flights import random_flight, rigid_torque
 
 SETTINGS = IdentificationSettings(consequents="seesaw", products="additive", membership_functions=(1, 2, 3, 4, 3, 2))
 STRUCTURE = model_structure(SETTINGS)
@@ -32,7 +32,7 @@ SCALE = np.array([2.0, 1.0, 0.25])
 
 
 def flight_of_noise(samples=SAMPLES):
-    return random_flight(no_torque, 46, samples, noise=1.0)
+    return random_flight(lambda motion: np.zeros((len(motion), 3)), 46, samples, noise=1.0)
 
 
 SEESAW = {"consequents": "seesaw", "products": "additive"}

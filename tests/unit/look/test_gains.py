@@ -1,6 +1,7 @@
 """Gains from one log: what is sure of them, over plants whose loops are computed here by their formula."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from cpfls_cli.report.content import Text
 from cpfls_cli.stage import loaded
 from cpfls_cli.tuning.gains import AskedMargins
 from cpfls_cli.tuning.margins import crossing_margins
-from tests.builders.looked import NARROW, PLANTS, SYSTEMS, looked_flight, looked_plant, weak_plant
+from tests.builders.looked import NARROW, PLANTS, SYSTEMS, looked_flight, looked_plant
 
 HELD_DISK = 2 * np.tan(np.radians(45) / 2)
 
@@ -33,7 +34,9 @@ def few_draws(monkeypatch):
 
 
 def found(autopilot, values=None, own=None, **options):
-    plants = [own or looked_plant(*PLANTS[autopilot]), weak_plant("pitch"), weak_plant("yaw")]
+    weak = {"identified": False, "reason": "sticks rest", "parameters": None, "draws": None, "band_hz": None}
+    others = (SimpleNamespace(axis=axis, **weak) for axis in ("pitch", "yaw"))
+    plants = [own or looked_plant(*PLANTS[autopilot]), *others]
     return tuned_gains(looked_flight(autopilot, values, **options), plants)
 
 

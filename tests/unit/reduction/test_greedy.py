@@ -56,20 +56,15 @@ def printed_brute_force(Q, size):
     return chosen
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("criterion", ["sigma_min", "A", "D"])
-def test_chooses_what_brute_force_chooses(criterion, seed):
-    Q = problem(seed)
-    selection = reduce(Q, ReductionSettings(criterion=criterion, size=25))
-    assert selection.indices.tolist() == brute_force(Q, 25, criterion)
+FEW = [((11, 12, columns), 8) for columns in (1, 2, 3, 4)]
 
 
-@pytest.mark.parametrize("columns", [1, 2, 3, 4])
+@pytest.mark.parametrize(("given", "size"), [*(((seed,), 25) for seed in range(4)), *FEW])
 @pytest.mark.parametrize("criterion", ["sigma_min", "A", "D"])
-def test_few_parameters(criterion, columns):
-    Q = problem(11, samples=12, columns=columns)
-    selection = reduce(Q, ReductionSettings(criterion=criterion, size=8))
-    assert selection.indices.tolist() == brute_force(Q, 8, criterion)
+def test_chooses_what_brute_force_chooses_of_few_parameters_too(criterion, given, size):
+    Q = problem(*given)
+    selection = reduce(Q, ReductionSettings(criterion=criterion, size=size))
+    assert selection.indices.tolist() == brute_force(Q, size, criterion)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -331,17 +331,13 @@ def test_derivatives_agree_with_finite_differences(of, derivative):
     np.testing.assert_allclose(analytic, difference, atol=1e-6 * np.abs(difference).max())
 
 
-def test_free_fall_is_refused_with_its_time():
+@pytest.mark.parametrize(
+    ("sample", "falls", "at"), [(1, GRAVITY, "0.5"), (2, 2 * GRAVITY, "1")], ids=["at a sample", "between two samples"]
+)
+def test_free_fall_is_refused_with_its_time(sample, falls, at):
     translation = np.zeros((3, 3, 3))
-    translation[0, 1, 2] = -GRAVITY
-    with pytest.raises(ComputationError, match=r"free fall at t = 0.5 s"):
-        flat_attitude(np.array([0.0, 0.5, 1.0]), translation, np.zeros((3, 3)), GRAVITY)
-
-
-def test_free_fall_between_two_samples_is_refused():
-    translation = np.zeros((3, 3, 3))
-    translation[0, 2, 2] = -2 * GRAVITY
-    with pytest.raises(ComputationError, match=r"free fall at t = 1 s"):
+    translation[0, sample, 2] = -falls
+    with pytest.raises(ComputationError, match=f"free fall at t = {at} s"):
         flat_attitude(np.array([0.0, 0.5, 1.0]), translation, np.zeros((3, 3)), GRAVITY)
 
 
