@@ -36,7 +36,8 @@ class HeldOut:
     """Residuals of held-out flights under three models."""
 
     before: Array  # Shape (window, 6), N m and N: of the model as given, on signals as logged.
-    parameters: Array  # Shape (window, 6): of the model with its own numbers refitted on the training flights.
+    # Shape (window, 6): of the model with its own numbers as the training flights show them, in gusts with the effects.
+    parameters: Array
     after: Array  # Shape (window, 6): of the model with effects.
     floor: Array  # Shape (6,).
     known: BoolArray  # Shape (window, 6).
@@ -128,10 +129,12 @@ def held_out(
     }
     known = full.known & ~np.any([np.zeros_like(full.known), *beyond.values()], axis=0)
     here, own = floors(full, linear), system(fitted.flights)
+    # Alone in gusts a fit would give the vehicle an inertia of its loop, which does what effects do.
+    numbers = linear[: own.base.shape[2]] if full.gusty.any() else fit(own, channel_size(own.residual))
     scatter = scatter_size(scatter_variance(fitted), fitted.residual_at(linear), floor)
     return HeldOut(
         raw.residual,
-        plain.residual_at(fit(own, channel_size(own.residual))),
+        plain.residual_at(numbers),
         full.residual_at(linear),
         here,
         known,
