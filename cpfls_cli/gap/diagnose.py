@@ -17,7 +17,7 @@ from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.rotors import impossible
 from cpfls_cli.dynamics import InertiaModel
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds
@@ -44,7 +44,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, 
 from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
 from cpfls_cli.gap.naming.noisy_rate import with_noisy_rate
 from cpfls_cli.gap.naming.open_questions import not_excited, unexplained_channels, untried, with_unnamed
-from cpfls_cli.gap.naming.ranking import RankedStep
+from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import (
     Alternative,
     ByKind,
@@ -118,13 +118,10 @@ def diagnose(
             quiet = np.minimum(quiet, gusts.noise(windows))
             flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
             across = gusts.found.size[3:5]
-            named = _by_instruments(_named(flights, settings, rng, progress), flights, given, settings, across)
+            searched = _named(flights, settings, rng, progress)
+            named = _by_instruments(searched, flights, given, across)
             if _wrong_inertia(named):
-                # The loop may give an inertia to what an effect does, so effects are sought at that of the config too.
-                stated = _named(flights.as_stated(np.ones(3, dtype=bool)), settings, rng, progress)
-                stated = _by_instruments(stated, flights, given, settings, across)
-                if stated.judgement.found.hypothesis.chosen and not _wrong_inertia(stated):
-                    named = stated
+                named = _at_stated_inertia(searched, flights, given, across) or named
             gusts = _gusts(named, given, settings)
     losses = _losses(flights, named, settings, rng)
     if losses:
@@ -261,9 +258,7 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | No
     return air(found.hypothesis, found.estimates.linear, found.block, given, settings)
 
 
-def _by_instruments(
-    named: _Named, flights: _Flights, given: Instruments, settings: GapSettings, across: Array
-) -> _Named:
+def _by_instruments(named: _Named, flights: _Flights, given: Instruments, across: Array) -> _Named:
     """Judge what was named with the numbers that instruments identify, without what is 0 by them.
 
     A loop that answers gusts looks like a lag, so lags are named where they are significant by instruments.
@@ -280,7 +275,7 @@ def _by_instruments(
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
             break
-        fewer = fitted(named.judge.training, [each for each, _ in kept], found.floor, settings)
+        fewer = fitted(named.judge.training, [each for each, _ in kept], found.floor, found.settings)
         # A gap above the gusts is none of them: what it takes to explain it stays.
         if (fewer.rms_floors > np.maximum(found.rms_floors, CLEAR)).any():
             break
@@ -299,6 +294,27 @@ def _by_instruments(
         ]
     sure = {each.effect.name: chance for each, chance in kept if np.isfinite(chance)} | lags.chances
     return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure, unidentified=loose)
+
+
+def _at_stated_inertia(named: _Named, flights: _Flights, given: Instruments, across: Array) -> _Named | None:
+    """Find what explains as an inertia that is wrong does, and leaves it as the config states it; None if nothing.
+
+    A loop answers gusts by its rotors, so that a fit gives the inertia what their acceleration does. What is added is
+    significant by instruments jointly with the inertia, and that is not any more with it.
+    """
+    found, held = named.judgement.found, flights.as_stated(np.ones(3, dtype=bool))
+    names = {each.effect.name for each in found.hypothesis.chosen}
+    tried = [each for each in named.effects if each.name in VEHICLE_NUMBERS.rivals.keys() - names and not each.is_lag]
+    ranking = rank_effects(held.training, found.hypothesis.chosen, tried, found.settings, None, floor=found.floor)
+    for scored in ranking.ranking:
+        with_it = fitted(held.training, scored.chosen, found.floor, found.settings)
+        other = named._replace(
+            judge=replace(named.judge, **held._asdict()), judgement=named.judgement._replace(found=with_it)
+        )
+        other = _by_instruments(other, flights, given, across)
+        if scored.candidate.effect.name in other.sure and not _wrong_inertia(other):
+            return other
+    return None
 
 
 def _wrong_inertia(named: _Named) -> bool:
