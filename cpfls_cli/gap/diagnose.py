@@ -17,7 +17,7 @@ from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.rotors import impossible
 from cpfls_cli.dynamics import InertiaModel
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, system
@@ -45,7 +45,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, 
 from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
 from cpfls_cli.gap.naming.noisy_rate import with_noisy_rate
 from cpfls_cli.gap.naming.open_questions import not_excited, unexplained_channels, untried, with_unnamed
-from cpfls_cli.gap.naming.ranking import RankedStep
+from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import (
     Alternative,
     ByKind,
@@ -119,7 +119,10 @@ def diagnose(
             quiet = np.minimum(quiet, gusts.noise(windows))
             flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
             across = gusts.found.size[3:5]
-            named = _by_instruments(_named(flights, settings, rng, progress), given, settings, across)
+            searched = _named(flights, settings, rng, progress)
+            named = _by_instruments(searched, flights, given, across)
+            if _wrong_inertia(named):
+                named = _at_stated_inertia(searched, flights, given, across) or named
             gusts = _gusts(named, given, settings)
     losses = _losses(flights, named, settings, rng)
     if losses:
@@ -190,7 +193,11 @@ class _Flights(NamedTuple):
     def in_air(self, gusts: Air, axes: BoolArray) -> _Flights:
         """Give all of them the floor of their air; inertia that instruments do not identify is the loop's."""
         in_gusts = (gusts.around(flights, gusts.floor(self.training, flights)) for flights in self)
-        return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in in_gusts))
+        return _Flights(*in_gusts).as_stated(axes)
+
+    def as_stated(self, axes: BoolArray) -> _Flights:
+        """Hold the inertia about some body axes, shape (3,), at what the config states."""
+        return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in self))
 
 
 class _Named(NamedTuple):
@@ -252,22 +259,24 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | No
     return air(found.hypothesis, found.estimates.linear, found.block, given, settings)
 
 
-def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, across: Array) -> _Named:
+def _by_instruments(named: _Named, flights: _Flights, given: Instruments, across: Array) -> _Named:
     """Judge what was named with the numbers that instruments identify, without what is 0 by them.
 
     A loop that answers gusts looks like a lag, so lags are named where they are significant by instruments.
 
+    `flights`: of which instruments identify the inertia, though the search may have held it.
     `across`: gusts along x and y, shape (2,), N.
     """
-    judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
+    judge, refusals, fit = replace(named.judge, **flights._asdict()), list(named.refusals), named.judgement.found
     while True:
+        fit = fit._replace(hypothesis=system(flights.training, fit.hypothesis.chosen))
         found = by_instruments(fit, given)
         kept = significant_effects(found, given)
         names = {each.effect.name for each, _ in kept}
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
             break
-        fewer = fitted(judge.training, [each for each, _ in kept], found.floor, settings)
+        fewer = fitted(named.judge.training, [each for each, _ in kept], found.floor, found.settings)
         # A gap above the gusts is none of them: what it takes to explain it stays.
         if (fewer.rms_floors > np.maximum(found.rms_floors, CLEAR)).any():
             break
@@ -286,6 +295,36 @@ def _by_instruments(named: _Named, given: Instruments, settings: GapSettings, ac
         ]
     sure = {each.effect.name: chance for each, chance in kept if np.isfinite(chance)} | lags.chances
     return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure, unidentified=loose)
+
+
+def _at_stated_inertia(named: _Named, flights: _Flights, given: Instruments, across: Array) -> _Named | None:
+    """Find what explains as an inertia that is wrong does, and leaves it as the config states it; None if nothing.
+
+    A loop answers gusts by its rotors, so that a fit gives the inertia what their acceleration does. What is added is
+    significant by instruments jointly with the inertia, and that is not any more with it.
+    """
+    found, held = named.judgement.found, flights.as_stated(np.ones(3, dtype=bool))
+    names = {each.effect.name for each in found.hypothesis.chosen}
+    tried = [each for each in named.effects if each.name in VEHICLE_NUMBERS.rivals.keys() - names and not each.is_lag]
+    ranking = rank_effects(held.training, found.hypothesis.chosen, tried, found.settings, None, floor=found.floor)
+    for scored in ranking.ranking:
+        with_it = fitted(held.training, scored.chosen, found.floor, found.settings)
+        other = named._replace(
+            judge=replace(named.judge, **held._asdict()), judgement=named.judgement._replace(found=with_it)
+        )
+        other = _by_instruments(other, flights, given, across)
+        if scored.candidate.effect.name in other.sure and not _wrong_inertia(other):
+            return other
+    return None
+
+
+def _wrong_inertia(named: _Named) -> bool:
+    """Check whether a moment of inertia is among the numbers that are named as wrong."""
+    (hypothesis, estimates, *_), held_out = named.judgement
+    names = (each.effect.name for each in hypothesis.chosen)
+    numbers = dict(zip(names, estimates.effects, strict=True))
+    wrong = wrong_numbers(estimates, numbers, held_out.removed_by_numbers(0.0))
+    return wrong is not None and any(each.name.startswith("inertia") for each in wrong.numbers)
 
 
 def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
@@ -361,7 +400,7 @@ def _concluded(
     # In gusts instruments identify the numbers, and a gap need not be clear.
     still = not hypothesis.gusty.any()
     taken = held_out.removed_by_numbers(NOISE if still else 0.0)
-    numbers = wrong_numbers(estimates, effects, taken)
+    numbers = wrong_numbers(estimates, {each.name: each.numbers for each in effects}, taken)
     effects += [numbers] if numbers is not None else []
     # Where wrong numbers leave no gap, there is none that names could take a share of.
     removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)

@@ -40,6 +40,7 @@ class Truth(NamedTuple):
     gyro_noise: float = 0.01
     speed_noise: float = 0.001
     rotor_drag: float = 0.0
+    rotor_inertia: float = 0.0
 
     @property
     def places(self):
@@ -177,7 +178,8 @@ def _flown(flights, path, pushes, shoves, noise):
     logs = np.empty((len(flights), -(-len(path) // EVERY), 29))
     for number, (truth, *_, bandwidth) in enumerate(flight[:5] for flight in flights):
         hover, outer = truth.mass * GRAVITY / 4 / truth.thrust_factor, min(2.0, bandwidth / 6)
-        body = np.array([truth.mass, truth.lag_s, truth.damping, truth.drag, *truth.inertia, truth.rotor_drag])
+        of_rotors = truth.rotor_drag, truth.rotor_inertia
+        body = np.array([truth.mass, truth.lag_s, truth.damping, truth.drag, *truth.inertia, *of_rotors])
         pilot = np.array([outer**2, 1.6 * outer, 0.05 * hover, 4 * hover, *(bandwidth * np.array([1.0, 1.0, 0.4]))])
         result = (np.ascontiguousarray(each[:, number]) for each in (path, pushes, shoves, noise))
         _integrated(body, pilot, truth.mixer, np.linalg.inv(truth.mixer), hover**0.5, *result, logs[number])
@@ -192,6 +194,7 @@ def _integrated(body, pilot, mixer, unmix, hover, path, pushes, shoves, noise, l
     position, velocity, turn = path[0, :3].copy(), path[0, 3:6].copy(), np.eye(3)
     rate, measured, wanted, wrench = np.zeros(3), np.empty(3), np.empty(3), np.empty(4)
     speed, command, squared, hubs = np.full(4, hover), np.empty(4), np.empty(4), np.empty(4)
+    faster = np.empty(4)
     for now in range(len(path)):
         for axis in range(3):
             measured[axis] = rate[axis] + noise[now, axis]
@@ -207,10 +210,13 @@ def _integrated(body, pilot, mixer, unmix, hover, path, pushes, shoves, noise, l
             before = speed[rotor]
             speed[rotor] += STEP_S / body[1] * (command[rotor] - before)
             squared[rotor] = 0.5 * (before**2 + speed[rotor] ** 2)
+            faster[rotor] = (speed[rotor] - before) / STEP_S
         for row in range(4):
             wrench[row] = 0.0
             for rotor in range(4):
                 wrench[row] += mixer[row, rotor] * squared[rotor]
+        for rotor in range(4):
+            wrench[3] += np.sign(mixer[3, rotor]) * body[8] * faster[rotor]
         _hubs(body, mixer, squared, hubs)
         _move(body, wrench, hubs, pushes[now], shoves[now], position, velocity, turn, rate)
 

@@ -31,6 +31,8 @@ def beginning(selection, size):
     Samples that are chosen one by one do not depend on what comes after them. Exchanges and every n-th sample know the
     size from the start, and some criteria refuse a size below the full rank.
     """
+    if size == selection.selected:
+        return selection
     one_by_one = selection.criterion not in {*EXCHANGE_INFORMATION, "even"}
     if not one_by_one or size > selection.selected or selection.rank_trace[size - 1] < selection.rank_full:
         return None

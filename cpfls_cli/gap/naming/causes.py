@@ -118,15 +118,19 @@ def shares(found: NamedFit) -> Array:
     return np.asarray(along / max(abs(along.sum()), 1e-12))
 
 
-def wrong_numbers(estimates: Estimates, effects: Sequence[NamedEffect], removed: Array) -> NamedEffect | None:
+def wrong_numbers(
+    estimates: Estimates, effects: Mapping[str, Sequence[Estimate]], removed: Array
+) -> NamedEffect | None:
     """Name the numbers of the vehicle that are significantly wrong, relevant, and not explained by a named effect.
 
+    `effects`: the numbers of those that are named.
     `removed`, shape (6,): part of each channel's gap on unseen flights that refitting the numbers takes off.
     """
     # Each shows in a channel of its own.
     shown = dict(zip(NUMBERS, (*removed[:3], removed[5]), strict=True))
     named = [
-        (CATALOGUE[each.name].accounts, {number.name: number.value for number in each.numbers}) for each in effects
+        (CATALOGUE[name].accounts, {number.name: number.value for number in numbers})
+        for name, numbers in effects.items()
     ]
     wrong = []
     for number in (each for each in estimates.parameters if each.name in NUMBERS):

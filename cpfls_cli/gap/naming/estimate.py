@@ -125,10 +125,41 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
     free = _estimated(hypothesis, weight, block, *fit_within_bounds(hypothesis, weight))
     linear, held = fit_within_bounds(hypothesis, weight, of_vehicle=True)
     if np.array_equal(linear, free.linear):
-        return free
+        return _with_open_bounds(free, hypothesis, weight, block)
     bounded = _estimated(hypothesis, weight, block, linear, held)
     wrong = any(number.impossible for number in free.parameters if number.name in NUMBERS)
-    return replace(bounded, parameters=free.parameters) if wrong else bounded
+    bounded = replace(bounded, parameters=free.parameters) if wrong else bounded
+    return _with_open_bounds(bounded, hypothesis, weight, block)
+
+
+def _with_open_bounds(found: Estimates, hypothesis: System, weight: Array, block: IntArray) -> Estimates:
+    """Give numbers on a bound that may as well be 0 their intervals without bounds: single blocks ask for them."""
+    if not any(_on_bounds(numbers) for numbers in found.effects):
+        return found
+    without = _without_bounds(hypothesis, weight, block)
+
+    def opened(number: Estimate, free: Estimate) -> Estimate:
+        low, high = number.plausible
+        may_be_0 = free.low <= 0.0 <= free.high and number in _on_bounds([number])
+        return replace(number, low=max(low, free.low), high=min(high, free.high)) if may_be_0 else number
+
+    pairs = zip(found.effects, without.effects, strict=True)
+    return replace(found, effects=tuple(tuple(map(opened, *pair)) for pair in pairs))
+
+
+def _without_bounds(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
+    linear = equations(hypothesis, weight).solve()
+    return _estimated(hypothesis, weight, block, linear, np.zeros(len(linear), dtype=bool))
+
+
+def _on_bounds(numbers: Sequence[Estimate]) -> dict[Estimate, float]:
+    """List numbers that are surely on a bound, and this; 0 is no such bound: many coefficients cannot be less."""
+    return {
+        number: bound
+        for number in numbers
+        for bound in number.plausible
+        if bound and tied(np.array(number.value), np.array(bound)) and not number.low < 0.0 < number.high
+    }
 
 
 def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array, held: BoolArray) -> Estimates:
@@ -260,10 +291,7 @@ def earned(
 
 
 def on_bound(found: NamedFit) -> Refusal | None:
-    """Find an effect with a number of its size on a bound; where one is surely asked for beyond, that one is said.
-
-    Zero is not such a bound: many coefficients cannot be less.
-    """
+    """Find an effect with a number of its size on a bound; where one is surely asked for beyond, that one is said."""
     chosen, effects = found.hypothesis.chosen, found.estimates.effects
     for (effect, _), numbers in zip(chosen, effects, strict=True):
         shapes = [shape.name for shape in effect.shapes]
@@ -275,19 +303,12 @@ def on_bound(found: NamedFit) -> Refusal | None:
         if len(shapes) > 1 and all(at_ends):
             return Refusal(effect.name, f"{' and '.join(shapes)} may all be at the bounds of what is possible", True)
     for index, (effect, _) in enumerate(chosen):
-        sizes = sized(effect, effects[index])
-        bounds = {
-            number.name: f"{bound:.3g} {number.unit}"
-            for number in sizes
-            for bound in number.plausible
-            if bound and tied(np.array(number.value), np.array(bound))
-        }
+        on_bounds = _on_bounds(sized(effect, effects[index]))
+        bounds = {number.name: f"{bound:.3g} {number.unit}" for number, bound in on_bounds.items()}
         if not bounds:
             continue
-        weight = channel_weight(found.hypothesis, found.floor)
         # What the flights ask for without any bounds.
-        linear = equations(found.hypothesis, weight).solve()
-        free = _estimated(found.hypothesis, weight, found.block, linear, np.zeros(len(linear), dtype=bool))
+        free = _without_bounds(found.hypothesis, channel_weight(found.hypothesis, found.floor), found.block)
         beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
         says = "would surely be beyond" if beyond else "sits on the bound of"
         name = next(iter(beyond or bounds))

@@ -11,6 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import mean_error
+from cpfls_cli.effects.catalogue.parameter_error import shown
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import (
     System,
@@ -21,7 +22,7 @@ from cpfls_cli.gap.balance.balance_system import (
     scatter_variance,
     system,
 )
-from cpfls_cli.gap.balance.refine import fit
+from cpfls_cli.gap.balance.refine import fit, least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.estimate import NamedFit, Refusal, channel_weight, estimates, on_bound, size_in_floors
 from cpfls_cli.gap.naming.open_questions import unexplained_channels
@@ -36,7 +37,9 @@ class HeldOut:
     """Residuals of held-out flights under three models."""
 
     before: Array  # Shape (window, 6), N m and N: of the model as given, on signals as logged.
-    parameters: Array  # Shape (window, 6): of the model with its own numbers refitted on the training flights.
+    # Shape (window, 6): of the model with its own numbers refitted on the training flights, but in gusts the inertia,
+    # which is that with the effects.
+    parameters: Array
     after: Array  # Shape (window, 6): of the model with effects.
     floor: Array  # Shape (6,).
     known: BoolArray  # Shape (window, 6).
@@ -128,10 +131,13 @@ def held_out(
     }
     known = full.known & ~np.any([np.zeros_like(full.known), *beyond.values()], axis=0)
     here, own = floors(full, linear), system(fitted.flights)
+    numbers = (
+        _own_numbers(own, linear[: own.base.shape[2]]) if full.gusty.any() else fit(own, channel_size(own.residual))
+    )
     scatter = scatter_size(scatter_variance(fitted), fitted.residual_at(linear), floor)
     return HeldOut(
         raw.residual,
-        plain.residual_at(fit(own, channel_size(own.residual))),
+        plain.residual_at(numbers),
         full.residual_at(linear),
         here,
         known,
@@ -139,6 +145,18 @@ def held_out(
         full.most_noise,
         {name: share for name, there in beyond.items() if (share := float(there.any(axis=1).mean()))},
     )
+
+
+def _own_numbers(own: System, with_effects: Array) -> Array:
+    """Refit the vehicle's own numbers without effects in gusts, shape (column,).
+
+    Inertia and couplings of rates stay those with effects: a fit takes those of the loop, which do what effects do.
+    """
+    of_loop, size = shown(np.zeros(3, dtype=bool)) == 0, channel_size(own.residual)
+    numbers = np.where(of_loop, with_effects, 0.0)
+    matrix, left = own.base[..., ~of_loop] / size[:, None], own.residual_at(numbers) / size
+    numbers[~of_loop] = least_squares(matrix.reshape(left.size, -1), left.reshape(-1))
+    return numbers
 
 
 class Judgement(NamedTuple):

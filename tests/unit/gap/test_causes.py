@@ -26,7 +26,7 @@ SURE = number("inertia_x", 0.15, 0.02)
 
 
 def result(*numbers, effects=(), share=0.5):
-    effect = wrong_numbers(found(*numbers), effects, np.broadcast_to(share, 6))
+    effect = wrong_numbers(found(*numbers), {each.name: each.numbers for each in effects}, np.broadcast_to(share, 6))
     return () if effect is None else tuple(each.name for each in effect.numbers)
 
 
@@ -60,7 +60,7 @@ def test_the_channel_of_the_number_has_to_shrink():
 
 
 def test_probability_is_that_of_a_normal_error_of_the_surest_number():
-    effect = wrong_numbers(found(SURE, number("inertia_y", 0.05, 0.02)), (), np.full(6, 0.5))
+    effect = wrong_numbers(found(SURE, number("inertia_y", 0.05, 0.02)), {}, np.full(6, 0.5))
     assert effect.p_value == pytest.approx(2 * norm.sf(1.96 * 0.15 / 0.02))
     assert (effect.name, effect.share) == ("parameter_error", 0.5)
 
