@@ -41,7 +41,7 @@ from cpfls_cli.gap.naming.causes import (
     sensor_fault,
     wrong_numbers,
 )
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, fitted
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, ends_on_bound, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
 from cpfls_cli.gap.naming.noisy_rate import with_noisy_rate
 from cpfls_cli.gap.naming.open_questions import not_excited, unexplained_channels, untried, with_unnamed
@@ -120,7 +120,7 @@ def diagnose(
             flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
             across = gusts.found.size[3:5]
             searched = _named(flights, settings, rng, progress)
-            named = _by_instruments(searched, flights, given, across)
+            named = _by_instruments(searched, given, across)
             if _wrong_inertia(named):
                 named = _at_stated_inertia(searched, flights, given, across) or named
             gusts = _gusts(named, given, settings)
@@ -259,24 +259,27 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | No
     return air(found.hypothesis, found.estimates.linear, found.block, given, settings)
 
 
-def _by_instruments(named: _Named, flights: _Flights, given: Instruments, across: Array) -> _Named:
+def _by_instruments(named: _Named, given: Instruments, across: Array) -> _Named:
     """Judge what was named with the numbers that instruments identify, without what is 0 by them.
 
     A loop that answers gusts looks like a lag, so lags are named where they are significant by instruments.
 
-    `flights`: of which instruments identify the inertia, though the search may have held it.
     `across`: gusts along x and y, shape (2,), N.
     """
-    judge, refusals, fit = replace(named.judge, **flights._asdict()), list(named.refusals), named.judgement.found
+    judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
-        fit = fit._replace(hypothesis=system(flights.training, fit.hypothesis.chosen))
         found = by_instruments(fit, given)
+        refusal = ends_on_bound(found)
+        if refusal is not None:
+            refusals.append(refusal)
+            fit = found.without([refusal.name])
+            continue
         kept = significant_effects(found, given)
         names = {each.effect.name for each, _ in kept}
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
             break
-        fewer = fitted(named.judge.training, [each for each, _ in kept], found.floor, found.settings)
+        fewer = fitted(judge.training, [each for each, _ in kept], found.floor, found.settings)
         # A gap above the gusts is none of them: what it takes to explain it stays.
         if (fewer.rms_floors > np.maximum(found.rms_floors, CLEAR)).any():
             break
@@ -303,16 +306,14 @@ def _at_stated_inertia(named: _Named, flights: _Flights, given: Instruments, acr
     A loop answers gusts by its rotors, so that a fit gives the inertia what their acceleration does. What is added is
     significant by instruments jointly with the inertia, and that is not any more with it.
     """
-    found, held = named.judgement.found, flights.as_stated(np.ones(3, dtype=bool))
-    names = {each.effect.name for each in found.hypothesis.chosen}
-    tried = [each for each in named.effects if each.name in VEHICLE_NUMBERS.rivals.keys() - names and not each.is_lag]
-    ranking = rank_effects(held.training, found.hypothesis.chosen, tried, found.settings, None, floor=found.floor)
-    for scored in ranking.ranking:
-        with_it = fitted(held.training, scored.chosen, found.floor, found.settings)
-        other = named._replace(
-            judge=replace(named.judge, **held._asdict()), judgement=named.judgement._replace(found=with_it)
-        )
-        other = _by_instruments(other, flights, given, across)
+    found, held = named.judgement.found, flights.as_stated(np.ones(3, dtype=bool)).training
+    chosen = found.hypothesis.chosen
+    names = VEHICLE_NUMBERS.rivals.keys() - {each.effect.name for each in chosen}
+    tried = [each for each in named.effects if each.name in names and not each.is_lag]
+    for scored in rank_effects(held, chosen, tried, found.settings, None, floor=found.floor).ranking:
+        fit = fitted(held, scored.chosen, found.floor, found.settings)
+        fit = fit._replace(hypothesis=system(flights.training, fit.hypothesis.chosen))
+        other = _by_instruments(named._replace(judgement=named.judgement._replace(found=fit)), given, across)
         if scored.candidate.effect.name in other.sure and not _wrong_inertia(other):
             return other
     return None

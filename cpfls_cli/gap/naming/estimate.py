@@ -314,3 +314,14 @@ def on_bound(found: NamedFit) -> Refusal | None:
         name = next(iter(beyond or bounds))
         return Refusal(effect.name, f"its {name} {says} what is possible, {bounds[name]}", True)
     return None
+
+
+def ends_on_bound(found: NamedFit) -> Refusal | None:
+    """Find an effect, lags apart, that instruments have moved onto a bound of its size."""
+    for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
+        for number, bound in () if effect.is_lag else _on_bounds(sized(effect, numbers)).items():
+            reason = (
+                f"by instruments its {number.name} sits on the bound of what is possible, {bound:.3g} {number.unit}"
+            )
+            return Refusal(effect.name, reason)
+    return None

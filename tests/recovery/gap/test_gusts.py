@@ -26,6 +26,7 @@ HEAVY = 1.15
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 DAMPED = TRUE._replace(damping=6e-5)
+SPUN = TRUE._replace(rotor_inertia=1e-7)
 INERTIA = np.array(TRUE.inertia)
 FEW = GapSettings(shifts=39)
 
@@ -34,14 +35,20 @@ FEW = GapSettings(shifts=39)
 def flown():
     """Four flights of as many paths, and four of one, in gusts; three in which damping is missed, in both airs.
 
-    And four that log commands, in a storm.
+    Four that log commands, in a storm; and four of one path with heavy rotors, and with light ones that swing more.
     """
     asked = [Flight(TRUE, GUSTS, path, path, reach=3.0) for path in range(4)]
     again = [Flight(TRUE, GUSTS, 9, run, reach=3.0) for run in range(4)]
     late = [Flight(TRUE, STORM, path, path, reach=3.0, commands=True) for path in range(4)]
     damped = [Flight(DAMPED, gusts, path, path, reach=3.0) for gusts in (CALM, GUSTS) for path in range(3)]
-    each = list(gusty_flights([*asked, *again, *damped, *late], 30.0))
-    return {"asked": each[:4], "again": each[4:8], "calm": each[8:11], "damped": each[11:14], "late": each[14:]}
+    swung = [
+        Flight(truth, GUSTS, 99, run, reach=3.0, swing=swing)
+        for truth, swing in ((SPUN, 0.15), (TRUE, 0.5))
+        for run in range(10, 14)
+    ]
+    each = list(gusty_flights([*asked, *again, *damped, *late, *swung], 30.0))
+    parts = {"asked": 4, "again": 4, "calm": 3, "damped": 3, "late": 4, "spun": 4, "turned": 4}
+    return {name: [each.pop(0) for _ in range(count)] for name, count in parts.items()}
 
 
 def recorded(flights, vehicle, *, setpoints, commanded=False):
@@ -100,6 +107,20 @@ def test_a_centre_of_mass_is_told_from_a_constant_torque_in_gusts(flown):
         found = diagnosed(recordings).diagnosis
         assert (found.verdict, [each.name for each in found.effects]) == (GapVerdict.NAMED, [name])
         assert not found.alternatives
+
+
+@pytest.mark.parametrize(("kind", "name"), [("spun", "rotor_acceleration"), ("turned", "parameter_error")])
+def test_an_inertia_is_not_wrong_where_rotors_that_accelerate_do_as_much(flown, kind, name):
+    """The loop answers gusts by its rotors: their acceleration and half the inertia about z leave equal residuals."""
+    x, y, z = TRUE.vehicle.inertia_kg_m2[:3]
+    stated = replace(TRUE.vehicle, inertia_kg_m2=(x, y, z if kind == "spun" else 1.5 * z, 0.0, 0.0, 0.0))
+    found = diagnosed(recorded(flown[kind], stated, setpoints=False)).diagnosis
+    assert found.verdict in {GapVerdict.NAMED, GapVerdict.AMBIGUOUS}
+    (effect,) = found.effects
+    assert effect.name == name
+    numbers = {each.name: each for each in effect.numbers}
+    number, truth = (numbers["J_r"], SPUN.rotor_inertia) if kind == "spun" else (numbers["inertia_z"], 1 / 1.5 - 1)
+    assert number.low < truth < number.high
 
 
 @pytest.mark.parametrize(("heavy", "extends"), [(HEAVY, False), (1.25, True)])
