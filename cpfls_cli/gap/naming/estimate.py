@@ -133,18 +133,27 @@ def estimates(hypothesis: System, weight: Array, block: IntArray) -> Estimates:
 
 
 def _with_open_bounds(found: Estimates, hypothesis: System, weight: Array, block: IntArray) -> Estimates:
-    """Give numbers on a bound that may as well be 0 their intervals without bounds: single blocks ask for them."""
-    if not any(_on_bounds(numbers) for numbers in found.effects):
+    """Give numbers on a bound that may as well be 0 their intervals without bounds: single blocks ask for them.
+
+    They are those of effects of which others of their numbers are surely not 0.
+    """
+    on_bounds = [_on_bounds(numbers) for numbers in found.effects]
+    if not any(on_bounds):
         return found
     without = _without_bounds(hypothesis, weight, block)
 
     def opened(number: Estimate, free: Estimate) -> Estimate:
-        low, high = number.plausible
-        may_be_0 = free.low <= 0.0 <= free.high and number in _on_bounds([number])
-        return replace(number, low=max(low, free.low), high=min(high, free.high)) if may_be_0 else number
+        (least, most), value = number.plausible, number.value
+        if not (free.low <= 0.0 <= free.high and least <= 0.0 <= most):
+            return number
+        return replace(number, low=min(value, max(least, free.low)), high=max(value, min(most, free.high)))
 
-    pairs = zip(found.effects, without.effects, strict=True)
-    return replace(found, effects=tuple(tuple(map(opened, *pair)) for pair in pairs))
+    effects = []
+    for numbers, free, bounds in zip(found.effects, without.effects, on_bounds, strict=True):
+        sure = any(each.low > 0 or each.high < 0 for each in numbers if each not in bounds)
+        known = {each.name: each for each in free}
+        effects.append(tuple(opened(each, known[each.name]) if sure and each in bounds else each for each in numbers))
+    return replace(found, effects=tuple(effects))
 
 
 def _without_bounds(hypothesis: System, weight: Array, block: IntArray) -> Estimates:

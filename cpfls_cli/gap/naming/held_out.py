@@ -37,8 +37,8 @@ class HeldOut:
     """Residuals of held-out flights under three models."""
 
     before: Array  # Shape (window, 6), N m and N: of the model as given, on signals as logged.
-    # Shape (window, 6): of the model with its own numbers refitted on the training flights, but in gusts the inertia,
-    # which is that with the effects.
+    # Shape (window, 6): of the model with its own numbers refitted on the training flights, its inertia in gusts with
+    # the effects.
     parameters: Array
     after: Array  # Shape (window, 6): of the model with effects.
     floor: Array  # Shape (6,).

@@ -105,6 +105,21 @@ def test_what_would_have_to_be_impossible_is_no_name(truth, bounded, says):
     assert refusal.in_the_way
 
 
+def test_a_number_on_its_bound_that_may_be_0_refuses_no_name():
+    """Another number shows the effect; the interval of this one is what is possible."""
+    coefficients = list(CATALOGUE["com_offset"].coefficients)
+    coefficients[1] = replace(coefficients[1], low=-8e-6, high=8e-6, scale=None)
+    chosen = [
+        candidate("com_offset")._replace(effect=replace(CATALOGUE["com_offset"], coefficients=coefficients, exact=None))
+    ]
+    known = flights((candidate("com_offset"), [0.004, 1e-5]))
+    found, refusals = earned(known, chosen, best_floor(system(known, chosen)), SETTINGS)
+    assert (kept(found), refusals) == (["com_offset"], [])
+    x, y = found.estimates.effects[0]
+    assert x.low < 0.004 < x.high
+    assert (y.low, y.value, y.high) == pytest.approx((-8e-6, 8e-6, 8e-6))
+
+
 def test_two_that_would_have_to_cancel_are_no_names():
     """Two that differ by next to nothing, which is a damping, explain a damping by a difference that nothing allows."""
     known = flights(OFFSET, (candidate("linear_damping"), [0.2, 0.2, 0.1]))
