@@ -81,9 +81,7 @@ def _flown(hidden: Hidden, gusts: tuple[float, float, float], instrument: str, d
 
 def _diagnosed(hidden: Hidden, flown: Sequence[PlaybackFlight], instrument: str) -> DiagnosisRun:
     kept = flown if instrument == "setpoints" else [replace(flight, setpoints={}) for flight in flown]
-    recordings = [
-        replace(logged(flight, hidden.vehicle, commanded=hidden.commands).parts[0], name=flight.name) for flight in kept
-    ]
+    recordings = [logged(flight, hidden.vehicle, commanded=hidden.commands).parts[0] for flight in kept]
     return diagnose(recordings[:-1], recordings[-1:], GapSettings(), np.random.default_rng(1))
 
 

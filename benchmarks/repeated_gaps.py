@@ -7,7 +7,6 @@ know, in gusts and in still air, and with neither, in gusts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -64,7 +63,7 @@ def main(draws: int = 6) -> None:
 
 def split(flown: Sequence[PlaybackFlight]) -> Repeatability:
     """Split what a model without drag and damping leaves of flights."""
-    recordings = [replace(logged(flight, SMALL.vehicle).parts[0], name=flight.name) for flight in flown]
+    recordings = [logged(flight, SMALL.vehicle).parts[0] for flight in flown]
     windows, model = common_windows(recordings, GapSettings()), plain(None)
     flights = [weak_flight(each, windows, None, force=True) for each in recordings]
     repeated = RepeatedRuns.of(recordings)

@@ -46,7 +46,7 @@ settings.load_profile("untimed")
 
 
 def read_once():
-    """Give what reads a file anew only where it is another than before: a tenth of the time of tests went into that."""
+    """Give what reads a file anew only where it is another than before, which takes a tenth of the time of tests."""
     examine = store.examine
     known = lru_cache(32)(lambda path, _, kind, rows: examine(path, kind, rows))
 
@@ -58,7 +58,7 @@ def read_once():
 
 @pytest.fixture(scope="session", autouse=True)
 def spare():
-    """Leave pictures away, but where a test looks at them, draw no more trends than a rate of 0.005 asks for."""
+    """Leave pictures away, but where a test looks at them; draw trends for a rate of 0.005; read a file once."""
     with command_line.undrawn(), pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setattr("cpfls_cli.changes.trend._DRAWS", 300)
         monkeypatch.setattr(store, "examine", read_once())

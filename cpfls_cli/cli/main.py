@@ -20,7 +20,7 @@ _THREAD_LIMITS = (
 
 
 # Python asks for garbage after 700 new objects: too often where libraries load, and make thousands that stay.
-_OBJECTS_PER_COLLECTION = 50_000
+_OBJECTS_PER_COLLECTION = 10_000
 
 
 def run() -> None:

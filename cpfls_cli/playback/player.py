@@ -36,8 +36,8 @@ class Observer:
     """Observes torque and force that a model misses, about and along the body axes.
 
     The model takes one step from each measured sample. What it misses of a step is the torque and force e that must
-    have acted over it beside its own. They are taken for a disturbance d, which is followed from 0 on over the steps h
-    of the past, about and along each axis with a rate r and a memory T,
+    have acted over it in addition to its own. They are taken for a disturbance d, which is followed from 0 on over the
+    steps h of the past, about and along each axis with a rate r and a memory T,
 
         d' = exp(-h / T) (d + (1 - exp(-r h)) (e - d)).
 
@@ -424,7 +424,7 @@ class Course:
         return states
 
     def errors(self, states: State) -> Array:
-        """Compare runs with what was measured, shape (run, horizon, 4, 3), as `cpfls_cli.playback.player.Runs` does."""
+        """Compare runs with what was measured, shape (run, horizon, 4, 3), as `Runs` does."""
         return less_measured(states, self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon))
 
 

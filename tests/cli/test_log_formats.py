@@ -61,7 +61,7 @@ def test_import_takes_a_log_of_a_new_format(cpfls, log_study, tmp_path):
 @pytest.mark.usefixtures("fake_format")
 def test_the_gap_workflow_takes_it_as_well(log_study, tmp_path):
     flights = read_flights([write(tmp_path / "log.fake")], load_study(log_study))
-    assert [recording.name for recording in flights.recordings] == ["log.fake"]
+    assert [flight.name for flight in flights.flights] == ["log.fake"]
 
 
 @pytest.mark.usefixtures("fake_format")

@@ -67,9 +67,7 @@ class Logging:
         """Arrange a flight for the balance."""
         settings = self.settings
         shared = windows(signals.period, settings.window_s, settings.overlap)
-        flight = weak_flight(
-            replace(signals, name="next flight"), shared, self.base, settings.force, settings.axes, self.floor
-        )
+        flight = weak_flight(signals, shared, self.base, settings.force, settings.axes, self.floor)
         return flight if self.air is None else self.air.around([flight], self.floor)[0]
 
 

@@ -53,8 +53,7 @@ def flown():
 
 def recorded(flights, vehicle, *, setpoints, commanded=False):
     known = [each if setpoints else replace(each, setpoints={}) for each in flights]
-    parts = [logged(each, vehicle, commanded=commanded).parts[0] for each in known]
-    return [replace(signals, name=flight.name) for flight, signals in zip(flights, parts, strict=True)]
+    return [logged(each, vehicle, commanded=commanded).parts[0] for each in known]
 
 
 def heavier(vehicle):

@@ -1,7 +1,5 @@
 """What of a gap comes again in gusts, on flights of known truth: drag and damping that no config states, or none."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -40,7 +38,7 @@ def found():
 
 
 def split(flown):
-    recordings = [replace(logged(flight, SMALL.vehicle).parts[0], name=flight.name) for flight in flown]
+    recordings = [logged(flight, SMALL.vehicle).parts[0] for flight in flown]
     windows, model = common_windows(recordings, GapSettings()), plain(None)
     flights = [weak_flight(each, windows, None, force=True) for each in recordings]
     return RepeatedRuns.of(recordings).split(model.system(flights), model.linear)

@@ -88,8 +88,7 @@ def test_a_load_on_a_cable():
 
 def test_an_unbalanced_rotor_above_half_of_the_rate():
     """It turns 55 times a second in a log of 100 Hz: by its speed it is known where it stands."""
-    flight = recorded()
-    signals = flight
+    signals = recorded()
     assert signals.rotor_speed.mean() / (2 * np.pi) > 0.5 / PERIOD
     speed = signals.rotor_speed * [1.0, 1.1, 0.95, 1.05]
     turns = PERIOD * (np.cumsum(speed[:, 1]) - 0.5 * speed[:, 1])
