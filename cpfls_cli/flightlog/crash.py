@@ -28,7 +28,8 @@ _STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
 # Norm of the differences of four rotors, which have none to spare, from their mean; the rate below which something else
 # than they must hold it; the cosine between weight and rotors of what leans; and the share of the largest rotor that
 # all others are below where it works alone.
-_HELD_FOUR, _HELD_RAD_S, _LEANS, _ALONE = 0.4, 2.0, 0.95, 0.25
+_HELD_FOUR, _HELD_RAD_S, _LEANS, _ALONE = 0.4, 2.0, 0.95, 0.1
+LONG=3.0
 # Before the end of a stretch, where a crash is looked for; flight before that, which shows what it does in flight; and
 # the time from its last wild motion to the end, in which no pilot has recovered.
 _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
@@ -98,7 +99,7 @@ class Signs:
 
     def slower(self, most_hz: float) -> "Signs":
         """Take no more samples a second than are asked for; of each few the first."""
-        every = max(1, int(1 / (most_hz * self.period)))
+        every = max(1, int(1 / (most_hz * self.period) + 0.01))
         held = {each.name: getattr(self, each.name) for each in fields(self)}
         return replace(self, **{name: own[::every] for name, own in held.items() if own is not None})
 
@@ -232,11 +233,12 @@ def _held_four(signs: Signs) -> BoolArray:
     felt = averaged(signs.felt, signs.period, _REST_S)
     weight = np.linalg.norm(felt, axis=1)
     held = (weight > _WEIGHT[0]) & (weight < _WEIGHT[1]) & (averaged(signs.slow, signs.period, _REST_S) < _HELD_RAD_S)
-    largest = np.sort(averaged(np.nan_to_num(signs.rotors), signs.period, SLOW_S), axis=1)
-    held &= (np.abs(felt[:, 2]) < _LEANS * weight) | (largest[:, -2] < _ALONE * largest[:, -1])
+    works = averaged(np.nan_to_num(signs.rotors), signs.period, SLOW_S)
+    off = works.min(axis=1) < _ALONE * works.mean(axis=1)
+    held &= (asked & (np.abs(felt[:, 2]) < _LEANS * weight)) | off
     # What has lost two of its rotors falls over within that time.
-    long = np.ones(max(1, round(_LIES_S / signs.period)), dtype=bool)
-    return np.asarray(binary_opening(smoothed(asked & held, signs.period, SLOW_S), long), dtype=bool)
+    long = np.ones(max(1, round(LONG / signs.period)), dtype=bool)
+    return np.asarray(binary_opening(smoothed(held, signs.period, SLOW_S), long), dtype=bool)
 
 
 def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
@@ -314,13 +316,13 @@ def _last_burst(samples: IntArray, period: float) -> int:
 def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Mark near the end of a stretch what flight before never had: motion, force, motion with a rotor at its limit."""
     first, after = part
-    last = min(round(_LAST_S / signs.period), (after - first) // 2)
+    last = min(round(_LAST_S / signs.period), after - first - round(_FEWEST_S / signs.period))
     before = slice(first, after - last)
     # Rotors may drop at the impact.
     stop = min(len(signs.time), after + round(_THEN_S / signs.period))
     late = np.arange(first, stop) >= before.stop
     nothing = np.zeros(stop - first, dtype=bool)
-    if signs.turning is None or signs.body_rate is None or (before.stop - first) * signs.period < _FEWEST_S:
+    if signs.turning is None or signs.body_rate is None or last < 0:
         return nothing, nothing, nothing
 
     def beyond(values: Array, least: float) -> BoolArray:
