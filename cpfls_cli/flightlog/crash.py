@@ -25,11 +25,10 @@ _OVER_S, _OVER = 3.0, 0.2
 # Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
 # below which it does not turn, as a share of what is usual and by itself.
 _STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
-# Norm of the differences of four rotors, which have none to spare, from their mean; the rate below which something else
-# than they must hold it; the cosine between weight and rotors of what leans; and the share of the largest rotor that
-# all others are below where it works alone.
-_HELD_FOUR, _HELD_RAD_S, _LEANS, _ALONE = 0.4, 2.0, 0.95, 0.1
-LONG=3.0
+# Norm of the differences of four rotors from their mean, over it, by which a vehicle that is level is trimmed at most,
+# that of one rotor that does nothing, 1.15, and of two, 2; the rate below which it does not spin; and the cosine
+# between weight and rotors of what leans.
+_TRIMMED, _WITHOUT_ONE, _WITHOUT_TWO, _SPINS_RAD_S, _LEANS = 0.6, 1.1, 1.9, 2.0, 0.95
 # Before the end of a stretch, where a crash is looked for; flight before that, which shows what it does in flight; and
 # the time from its last wild motion to the end, in which no pilot has recovered.
 _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
@@ -157,10 +156,10 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     It also rests where its rotors ask it to turn and it does not. What falls as no flight does flies no more.
     """
     nowhere = np.zeros(len(active), dtype=bool)
-    if signs.slow is None or signs.rate is None or not active.any():
-        return Resting(nowhere, nowhere)
     held = active & _held_four(signs)
     free = active & ~held
+    if signs.slow is None or signs.rate is None or not free.any():
+        return Resting(held, nowhere)
     lively = free & (signs.slow > LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else free
     turned = averaged(signs.rate, signs.period, _REST_S)
@@ -223,22 +222,24 @@ def _unlike(rotors: Array) -> Array:
 
 
 def _held_four(signs: Signs) -> BoolArray:
-    """Mark where four rotors ask for a turn that none can fly without, of a vehicle that leans or hangs on one of them.
+    """Mark where something else than its rotors must hold a vehicle of four, which has none to spare.
 
-    What flies level feels its weight along its rotors, and may be trimmed for a weight off its centre or a weak rotor.
+    With one that does nothing it spins, with two it falls. Rotors may be trimmed for a weight off its centre or a weak
+    one of them, but what flies level feels its weight along them.
     """
-    if signs.rotors is None or signs.rotors.shape[1] != 4 or signs.felt is None or signs.slow is None:
+    if signs.rotors is None or signs.rotors.shape[1] != 4 or signs.slow is None:
         return np.zeros(len(signs.time), dtype=bool)
-    asked = np.linalg.norm(averaged(_unlike(signs.rotors), signs.period, SLOW_S), axis=1) > _HELD_FOUR
-    felt = averaged(signs.felt, signs.period, _REST_S)
-    weight = np.linalg.norm(felt, axis=1)
-    held = (weight > _WEIGHT[0]) & (weight < _WEIGHT[1]) & (averaged(signs.slow, signs.period, _REST_S) < _HELD_RAD_S)
     works = averaged(np.nan_to_num(signs.rotors), signs.period, SLOW_S)
-    off = works.min(axis=1) < _ALONE * works.mean(axis=1)
-    held &= (asked & (np.abs(felt[:, 2]) < _LEANS * weight)) | off
-    # What has lost two of its rotors falls over within that time.
-    long = np.ones(max(1, round(LONG / signs.period)), dtype=bool)
-    return np.asarray(binary_opening(smoothed(held, signs.period, SLOW_S), long), dtype=bool)
+    mean = works.mean(axis=1)
+    uneven = np.linalg.norm(works - mean[:, None], axis=1) / np.maximum(mean, ALIVE)
+    most = np.where(averaged(signs.slow, signs.period, _REST_S) < _SPINS_RAD_S, _WITHOUT_ONE, _WITHOUT_TWO)
+    if signs.felt is not None:
+        felt = averaged(signs.felt, signs.period, _REST_S)
+        weight = np.linalg.norm(felt, axis=1)
+        leans = (weight > _WEIGHT[0]) & (weight < _WEIGHT[1]) & (np.abs(felt[:, 2]) < _LEANS * weight)
+        most[leans & (most == _WITHOUT_ONE)] = _TRIMMED
+    long = np.ones(max(1, round(_LIES_S / signs.period)), dtype=bool)
+    return np.asarray(binary_opening(smoothed((uneven > most) | (mean < ALIVE), signs.period, SLOW_S), long), dtype=bool)
 
 
 def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
@@ -336,9 +337,16 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
         strained |= beyond(np.arccos(np.clip(up, -1.0, 1.0)), _STRAINED_RAD)
     if signs.rotors is not None:
         strained &= (signs.rotors[first:stop] >= _AT_LIMIT * float(np.nanmax(signs.rotors))).any(axis=1)
-    hard = nothing if signs.felt is None else beyond(np.linalg.norm(signs.felt, axis=1), HARD)
-    # A touchdown jolts too; but then the vehicle stands on its feet.
-    wild = wild | hard | beyond(spins, _WILD_RAD_S2) if lies_then else wild
+    hard = across = nothing
+    if signs.felt is not None:
+        # What pushes across the rotors' axis is no rotor, however hard it climbed before.
+        across = beyond(np.hypot(*signs.felt.T[:2]), HARD)
+        hard = across | beyond(np.linalg.norm(signs.felt, axis=1), HARD)
+    # A touchdown jolts too; but then the vehicle stands on its feet, as a log shows that goes on.
+    if lies_then:
+        wild = wild | hard | beyond(spins, _WILD_RAD_S2)
+    elif after == len(signs.time):
+        wild = wild | across
     return wild, hard, nothing if signs.rotors is None else strained
 
 

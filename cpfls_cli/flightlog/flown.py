@@ -28,15 +28,15 @@ _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
 # height that is estimated for it.
 _FAR_RAD, _PUSHED, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 0.03, 1.0
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
-# vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
-_SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
+# vehicle.
+_SWINGS_RAD_S, _AS_HELD = 0.03, 0.6
 _UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
 # Range of squared commands, over their mean, whose thrust is felt in the air, unless it climbs by so many m; and the
 # share of it that is felt where something else holds the vehicle.
 _WORKS, _CLIMBS_M, _UNFELT = 1.0, 3.0, 0.12
 # Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in weights
 # below which it falls, on the mean over s.
-_TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
+_TURNS_RAD_S, _FALLS, _TURN_S = 0.2, 0.3, 0.2
 _LONGEST_CUT_S = 3.0  # Longer than that no throttle is cut in flight: a fall of 44 m.
 _MOST_CLOCK_HZ = 50.0  # Rate that is enough to find a flight.
 _FEWEST_ROWS = 10  # Of which it can be seen.
@@ -143,9 +143,11 @@ def find_flown(signs: Signs) -> FlownPart:
         why = "by its attitude it lies on its back for seconds, and it feels its weight along its rotors all the while"
         return _no_flight(f"{why}: it stands, and the attitude is wrong")
     rests = crash.resting(signs, active)
-    active = _lifted(signs, smoothed(active & ~rests.carried, signs.period, _SHORT_S))
-    if not active.any():
-        return _no_flight(f"{how} throughout")
+    free = _lifted(signs, smoothed(active & ~rests.carried, signs.period, _SHORT_S))
+    if not free.any():
+        rested = (active & rests.carried).any()
+        return _no_flight("something else than its rotors carries it" if rested else f"{how} throughout")
+    active = free
     if _still(signs, active):
         return _no_flight("the vehicle neither turns nor moves")
     if held := _held(signs, active):
@@ -191,16 +193,18 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
     level, rate = signs.level, signs.turning
     assert level is not None, "asked for"
     # Thrust goes as the square of the level, or with it: who mostly climbs hovers at less than his usual level.
-    felt, of_hover = None, level
+    felt, of_hover, above = None, level, level > _OF_LARGEST * largest
     if signs.felt is not None:
         felt = averaged(np.linalg.norm(signs.felt, axis=1), signs.period, _TURN_S)
         # By the mean force, in which vibration is none.
         of_hover = level / np.sqrt(np.maximum(np.linalg.norm(averaged(signs.felt, signs.period, _TURN_S), axis=1), 1.0))
-    hover = float(np.median(of_hover[level > _OF_LARGEST * largest]))
+    elif signs.slow is not None:
+        # What turns with its rotors on is in the air.
+        above = above | ((signs.slow > _TURNS_RAD_S) & (level > ALIVE))
+    hover = float(np.median(of_hover[above]))
     carrying = np.asarray(level > _OF_HOVER * hover, dtype=bool)
     if rate is not None and carrying.any():
-        turns = np.sqrt(averaged(rate**2, signs.period, _SHORT_S))
-        lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
+        lively = np.sqrt(averaged(rate**2, signs.period, _SHORT_S)) > _TURNS_RAD_S
         if felt is not None:
             lively |= felt < _FALLS
         # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
@@ -267,15 +271,6 @@ def _held(signs: Signs, active: BoolArray) -> str:
     """Say by what something else than rotors is seen to hold a vehicle whose rotors turn; empty where nothing is."""
     if signs.rotors is None:
         return ""
-    if signs.rotors.shape[1] == 4 and signs.slow is not None:
-        shares = np.nan_to_num(signs.rotors)[active]
-        third = np.sort(shares[shares.mean(axis=1) > ALIVE], axis=1)[:, 1]
-        if len(third) and float(np.median(third)) < ALIVE:
-            return "no more than two of its four rotors work at a time"
-        works = np.median(shares, axis=0)
-        idle = np.flatnonzero(works < _OF_MEAN * works.mean())
-        if len(idle) and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
-            return f"rotor {idle[0] + 1} hardly works, and it does not spin"
     if _unfelt(signs, active):
         return "what it feels does not grow with its thrust"
     if signs.body_rate is None or signs.felt is None:
