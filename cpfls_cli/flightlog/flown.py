@@ -18,6 +18,7 @@ _OF_HOVER = 0.6  # Share of the level at hover below which rotors idle.
 _OF_LARGEST = 0.5  # Share of the largest level above which rotors carry the vehicle.
 _SHORT_S = 1.0  # Shorter pauses are part of a flight, and shorter flights none.
 _OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05  # Above the ground it flies: as a share of the highest, and in m.
+_SINKS_M_S = 0.2  # Rate at which no vehicle that stands sinks by its estimate.
 _MARGIN_S = 0.5  # Left out after take-off and before landing, where the ground pushes.
 # Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move.
 _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
@@ -237,12 +238,15 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
         return turning
     risen = np.abs(height - ground) > max(_LEAST_HEIGHT, _OF_HEIGHT * highest)
     off = np.zeros_like(turning)
+    sinks = averaged(np.gradient(height, period), period, _SHORT_S) < -_SINKS_M_S
     # Between the first and the last moment above it a flight may well come down to the height of its ground.
     for first, after in runs(turning):
         high = first + np.flatnonzero(risen[first:after])
         if len(high):
-            off[high[0] : high[-1] + 1] = True
-    return smoothed(off, period, _SHORT_S)
+            # What comes down at one rate flies until it touches.
+            stays = np.flatnonzero(~sinks[high[-1] : after])
+            off[high[0] : high[-1] + 1 + (stays[0] if len(stays) else after)] = True
+    return smoothed(off & turning, period, _SHORT_S)
 
 
 def _still(signs: Signs, active: BoolArray) -> bool:
