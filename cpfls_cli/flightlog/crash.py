@@ -265,8 +265,9 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     first, after = part
     if after == rests.plunges:
         return {"loss of control": after}
-    rests_then = bool(rests.carried[after : after + 1].any())
-    lies_then = rests_then or bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
+    then = rests.carried[after : after + round(_REST_S / signs.period)]
+    rests_then = len(then) > 0 and bool(then.all())
+    lies_then = bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
     marked = _beyond_flight(signs, part, lies_then=lies_then)
     if rests_then and marked[0][: after - first].any():
         # What shakes it when it has come to rest ends no flight; what brings it there does.
