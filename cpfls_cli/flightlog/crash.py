@@ -22,9 +22,6 @@ _SENSES = (0.7, 2.0)  # Of gravity: the median force of a log, by which an accel
 # For how long no rotor that carries the weight can be above its vehicle, which would fall 88 m meanwhile; and the share
 # of the time with rotors on that is so where an attitude is wrong throughout.
 _OVER_S, _OVER = 3.0, 0.2
-# Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
-# below which it does not turn, as a share of what is usual and by itself.
-_STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
 # Norm of the differences of four rotors from their mean, over it, by which a vehicle that is level is trimmed at most,
 # that of one rotor that does nothing, 1.15, and of two, 2; the rate below which it does not spin; and the cosine
 # between weight and rotors of what leans.
@@ -153,7 +150,7 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
 
     Rotors push along one axis of the body: where the accelerometer feels the weight along another one while the vehicle
     hardly turns, it lies on its side or back. Without an accelerometer it lies where it is more than 90 degrees over.
-    It also rests where its rotors ask it to turn and it does not. What falls as no flight does flies no more.
+    What falls as no flight does flies no more.
     """
     nowhere = np.zeros(len(active), dtype=bool)
     held = active & _held_four(signs)
@@ -166,10 +163,9 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
     calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
     lies = calm & _off_its_feet(signs, flies)
-    rests = active & calm & (lies | _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
     # A mean over a time says as much of all of it.
-    carried = held | binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
+    carried = held | binary_dilation(binary_opening(active & lies, window[: len(window) // 2 + 1]), window)
     plunges = _plunges(signs, active)
     carried |= (plunges >= 0) & (np.arange(len(active)) >= plunges)
     return Resting(np.asarray(carried, dtype=bool), np.asarray(lies, dtype=bool), plunges)
@@ -215,12 +211,6 @@ def _turned_up(upright: Array, flies: BoolArray) -> Array:
     return np.asarray(upright * (np.sign(np.median(upright[flies])) or 1.0))
 
 
-def _unlike(rotors: Array) -> Array:
-    """Give rotors against their mean, as shares also where a config calls speeds so."""
-    mean = rotors.mean(axis=1, keepdims=True)
-    return np.asarray(np.nan_to_num(rotors - mean) / max(1.0, float(np.nanquantile(mean, 0.98))))
-
-
 def _held_four(signs: Signs) -> BoolArray:
     """Mark where something else than its rotors must hold a vehicle of four, which has none to spare.
 
@@ -239,21 +229,9 @@ def _held_four(signs: Signs) -> BoolArray:
         leans = (weight > _WEIGHT[0]) & (weight < _WEIGHT[1]) & (np.abs(felt[:, 2]) < _LEANS * weight)
         most[leans & (most == _WITHOUT_ONE)] = _TRIMMED
     long = np.ones(max(1, round(_LIES_S / signs.period)), dtype=bool)
-    return np.asarray(binary_opening(smoothed((uneven > most) | (mean < ALIVE), signs.period, SLOW_S), long), dtype=bool)
-
-
-def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
-    if signs.rotors is None or signs.slow is None:
-        return np.zeros(len(flies), dtype=bool)
-    unlike = _unlike(signs.rotors)
-    asked = np.linalg.norm(averaged(unlike - np.median(unlike[flies], axis=0), signs.period, _REST_S), axis=1)
-    turns = averaged(signs.slow, signs.period, _REST_S)
-    hardly = turns < min(_HARDLY_RAD_S, _OF_RATE * float(np.median(turns[flies])))
-    stuck = (asked > max(_STUCK, _STUCK_TIMES * float(np.median(asked[flies])))) & hardly
-    if signs.height is not None:
-        # High above where it was lowest it hovers with rotors that have become unlike.
-        stuck &= signs.height < float(np.quantile(signs.height, 0.02)) + _DROP_M
-    return np.asarray(stuck)
+    return np.asarray(
+        binary_opening(smoothed((uneven > most) | (mean < ALIVE), signs.period, SLOW_S), long), dtype=bool
+    )
 
 
 def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str, int]:

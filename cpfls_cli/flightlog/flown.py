@@ -25,9 +25,8 @@ _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
 # Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
 # range of leans above which a vehicle moves.
 _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
-# Ranges of leans and of slow forces, in weights, of what surely moves; of slow forces of what does not, and of the
-# height that is estimated for it.
-_FAR_RAD, _PUSHED, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 0.03, 1.0
+# Ranges of leans and of slow forces, in weights, of what surely moves, and of slow forces of what does not.
+_FAR_RAD, _PUSHED, _UNPUSHED = 0.2, 0.3, 0.03
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
 # vehicle.
 _SWINGS_RAD_S, _AS_HELD = 0.03, 0.6
@@ -238,13 +237,13 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
         return turning
     risen = np.abs(height - ground) > max(_LEAST_HEIGHT, _OF_HEIGHT * highest)
     off = np.zeros_like(turning)
-    sinks = averaged(np.gradient(height, period), period, _SHORT_S) < -_SINKS_M_S
+    later = height[np.minimum(np.arange(len(height)) + round(SLOW_S / period), len(height) - 1)]
     # Between the first and the last moment above it a flight may well come down to the height of its ground.
     for first, after in runs(turning):
         high = first + np.flatnonzero(risen[first:after])
         if len(high):
             # What comes down at one rate flies until it touches.
-            stays = np.flatnonzero(~sinks[high[-1] : after])
+            stays = np.flatnonzero((height - later)[high[-1] : after] < _SINKS_M_S * SLOW_S)
             off[high[0] : high[-1] + 1 + (stays[0] if len(stays) else after)] = True
     return smoothed(off & turning, period, _SHORT_S)
 
@@ -261,14 +260,12 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     # Vibration of the rotors is no turning: its mean is that of noise.
     slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))
     shakes = turning < _SHAKES_RAD_S and slow < _OF_NOISE * turning / np.sqrt(SLOW_S / signs.period)
-    # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
-    drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
-    # Where a gyroscope reads next to nothing, of a dead one as of a simulated hover, leans, force and height say more.
-    if turning < _STILL_RAD_S:
-        lifts = (pushed is None or pushed >= _UNPUSHED) and rises > _STILL_M
-        return not (lifts or (leans or 0.0) > _FAR_RAD or (pushed or 0.0) > _PUSHED)
-    soft = turning < _SOFT_RAD_S
-    return (rises <= _STILL_M and ((shakes and (level or leans is None)) or soft)) or (soft and drifts)
+    # Estimates of height and lean drift on the ground, but what is not pushed has not moved.
+    drifts = pushed is not None and pushed < _UNPUSHED
+    # Where a gyroscope reads next to nothing, of a dead one as of a simulated hover, lean and force say more.
+    moves = not drifts and ((leans or 0.0) > _FAR_RAD or (pushed or 0.0) > _PUSHED)
+    soft = turning < _SOFT_RAD_S and not moves
+    return (soft or (shakes and (level or leans is None))) and (drifts or rises <= _STILL_M)
 
 
 def _held(signs: Signs, active: BoolArray) -> str:
