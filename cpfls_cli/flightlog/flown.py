@@ -18,7 +18,7 @@ _OF_HOVER = 0.6  # Share of the level at hover below which rotors idle.
 _OF_LARGEST = 0.5  # Share of the largest level above which rotors carry the vehicle.
 _SHORT_S = 1.0  # Shorter pauses are part of a flight, and shorter flights none.
 _OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05  # Above the ground it flies: as a share of the highest, and in m.
-_SINKS_M_S = 0.2  # Rate at which no vehicle that stands sinks by its estimate.
+_CLIMBS_M_S = 0.2  # Rate at which no estimate of height drifts for long.
 _MARGIN_S = 0.5  # Left out after take-off and before landing, where the ground pushes.
 # Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move.
 _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
@@ -236,15 +236,19 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
     if highest < 2 * _LEAST_HEIGHT:
         return turning
     risen = np.abs(height - ground) > max(_LEAST_HEIGHT, _OF_HEIGHT * highest)
-    off = np.zeros_like(turning)
-    later = height[np.minimum(np.arange(len(height)) + round(SLOW_S / period), len(height) - 1)]
+    off, step = np.zeros_like(turning), round(SLOW_S / period)
+    steady = np.arange(len(height))
+    rises = height - height[np.maximum(steady - step, 0)] > _CLIMBS_M_S * SLOW_S
+    sinks = height - height[np.minimum(steady + step, len(height) - 1)] > _CLIMBS_M_S * SLOW_S
     # Between the first and the last moment above it a flight may well come down to the height of its ground.
     for first, after in runs(turning):
         high = first + np.flatnonzero(risen[first:after])
         if len(high):
-            # What comes down at one rate flies until it touches.
-            stays = np.flatnonzero((height - later)[high[-1] : after] < _SINKS_M_S * SLOW_S)
-            off[high[0] : high[-1] + 1 + (stays[0] if len(stays) else after)] = True
+            # What climbs or sinks without a pause from or to there flies as well.
+            stands, lands = np.flatnonzero(~rises[first : high[0]]), np.flatnonzero(~sinks[high[-1] : after])
+            off[first + (stands[-1] + 1 if len(stands) else 0) : high[-1] + (lands[0] + 1 if len(lands) else after)] = (
+                True
+            )
     return smoothed(off & turning, period, _SHORT_S)
 
 

@@ -163,6 +163,11 @@ def _reader(path: Path) -> ModuleType:
     foreign = foreign_file(path, form)
     if foreign is not None:
         raise InputError(f"{path}: {foreign}")
+    if first.startswith(b"timestamp,") and (topic := _ONE_TOPIC.search(path.name)):
+        raise InputError(
+            f"{path}: {topic[1]} alone, one topic of a log of PX4 as ulog2csv writes them: give the log itself (.ulg),"
+            " which holds all of them"
+        )
     if form is None:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
         free = ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS if form.by_content))
@@ -262,6 +267,7 @@ def _is_header(line: bytes) -> bool:
 
 
 _FIRST_BYTES, _BEGINS_WITHIN = 1024, 1 << 16
+_ONE_TOPIC: Final = re.compile(r"_((?:vehicle|sensor|actuator|estimator)_[a-z_]+)_\d+\.csv$")
 
 
 _UNPACK: Final = "unpack it first, and give the log inside"

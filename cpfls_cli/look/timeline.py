@@ -38,6 +38,9 @@ _LIES, _LIES_S, _HARD_S = -0.7, 1.0, 1.5
 """Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity and
 times the largest of its flight, and how long before the end of a flight it may come, s."""
 
+_SELDOM: Final = 0.995
+"""Share of a flight in which nothing strikes it."""
+
 _READS: Final = 0.12
 """By which an accelerometer at rest may differ from gravity, share of it: the largest offset by its data sheets."""
 
@@ -164,6 +167,7 @@ def timeline(
         *_limits(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_losses(flight, topics),
         *_misread(flight),
+        *_hits(flight),
         *_on_its_back(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_battery(flight),
     ]
@@ -186,7 +190,8 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
     lifts, lands = _land_detector(topics)
     ends = [(what, at + recognition.counted_from_s) for what, at in recognition.flown.moments]
     last, spans = float(flight.time[-1]), runs(flight.flown)
-    lately = flight.collective[-max(2, round(_AT_END_S * flight.rate_hz)) :]
+    # Rotors may be logged less often than rates.
+    lately = flight.collective[np.isfinite(flight.collective)][-max(2, round(_AT_END_S * flight.rate_hz)) :]
     for number, (first, after) in enumerate(spans):
         before = spans[number - 1][1] if number else 0
         follows = spans[number + 1][0] if number + 1 < len(spans) else None
@@ -433,6 +438,20 @@ def _misread(flight: LogFlight) -> Iterator[Event]:
         yield Event(time_s=float(flight.time[0]), kind="calibration", text=text, severity="warning")
 
 
+def _hits(flight: LogFlight) -> Iterator[Event]:
+    """Find what strikes a vehicle that flies on: pushes across its rotors' axis that they cannot make."""
+    sensor = flight.accelerometer
+    flown = np.empty(0) if sensor is None else _flown_or_after(flight, sensor.time, -_HARD_S)
+    if sensor is None or not flown.any():
+        return
+    across = np.nan_to_num(np.hypot(*sensor.values.T[:2])) / STANDARD_GRAVITY * flown
+    struck = np.flatnonzero(across > max(HARD, BEYOND * float(np.quantile(across[flown], _SELDOM))))
+    for rows in np.split(struck, 1 + np.flatnonzero(np.diff(sensor.time[struck]) > _HARD_S)):
+        if len(rows):
+            text = f"is hit, with {across[rows].max():.2g} g across its rotors' axis"
+            yield Event(time_s=float(sensor.time[rows[0]]), kind="hit", text=text, severity="warning")
+
+
 def _losses(flight: LogFlight, topics: Topics) -> Iterator[Event]:
     for begin, end in flight.gaps_s[(flight.gaps_s[:, 1] - flight.gaps_s[:, 0]) > _LONG_GAP_S].tolist():
         rows = (flight.time >= begin) & (flight.time <= end)
@@ -535,5 +554,17 @@ def _in_words(kind: str, many: Sequence[Event]) -> str:
 
 
 _KEPT: Final = frozenset(
-    ("flown", "take-off", "landing", "end", "impact", "loss of control", "free fall", "limit", "clipping", "armed")
+    (
+        "flown",
+        "take-off",
+        "landing",
+        "end",
+        "impact",
+        "hit",
+        "loss of control",
+        "free fall",
+        "limit",
+        "clipping",
+        "armed",
+    )
 )
