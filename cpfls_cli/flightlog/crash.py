@@ -262,14 +262,10 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     if rests_then:
         return {"rests with its rotors on": after}
     if stops:
-        hit = next((hit for fall, hit in _falls(signs) if 0 <= (fall - after) * signs.period < _THEN_S), None)
-        if hit is None and signs.felt is not None:
-            # By a force that its flight never had.
-            size = np.linalg.norm(signs.felt, axis=1)
-            least = max(HARD, BEYOND * float(size[slice(*part)].max()))
-            struck = after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
-            hit = int(struck[0]) if len(struck) else None
-        return {"rotors stop in the air": after} | ({} if hit is None else {"impact": hit})
+        # No rotor makes what it feels then.
+        felt = np.empty(0) if signs.felt is None else np.linalg.norm(signs.felt, axis=1)
+        struck = after + np.flatnonzero(felt[after : after + round(_LIES_S / signs.period)] > HARD)
+        return {"rotors stop in the air": after} | ({"impact": int(struck[0])} if len(struck) else {})
     return {}
 
 

@@ -31,9 +31,9 @@ _FAR_RAD, _PUSHED, _UNPUSHED = 0.2, 0.3, 0.03
 # vehicle.
 _SWINGS_RAD_S, _AS_HELD = 0.03, 0.6
 _UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
-# Range of squared commands, over their mean, whose thrust is felt in the air, unless it climbs by so many m; and the
-# share of it that is felt where something else holds the vehicle.
-_WORKS, _CLIMBS_M, _UNFELT = 1.0, 3.0, 0.12
+# Range of squared commands, over their mean, whose thrust is felt in the air; and the share of it that is felt where
+# something else holds the vehicle.
+_WORKS, _UNFELT = 1.0, 0.12
 # Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in weights
 # below which it falls, on the mean over s.
 _TURNS_RAD_S, _FALLS, _TURN_S = 0.2, 0.3, 0.2
@@ -298,8 +298,7 @@ def _held(signs: Signs, active: BoolArray) -> str:
 def _unfelt(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle feels no more where its rotors work much more."""
     inner = _inner(signs, active)
-    climbs = signs.height is not None and float(np.ptp(signs.height[active])) > _CLIMBS_M
-    if signs.level is None or signs.felt is None or climbs or not inner.any():
+    if signs.level is None or signs.felt is None or not inner.any():
         return False
     squares, felt = (averaged(each, signs.period, SLOW_S)[inner] for each in (signs.level**2, signs.felt))
     thrust = np.median(felt, axis=0)
