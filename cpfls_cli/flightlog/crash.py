@@ -19,9 +19,6 @@ SLOW_S = 0.5  # Means over so long hold no vibration.
 # does: more than 60 degrees off.
 _WEIGHT, _OFF_THRUST = (0.8, 1.2), 0.5
 _SENSES = (0.7, 2.0)  # Of gravity: the median force of a log, by which an accelerometer and its unit are believed.
-# For how long no rotor that carries the weight can be above its vehicle, which would fall 88 m meanwhile; and the share
-# of the time with rotors on that is so where an attitude is wrong throughout.
-_OVER_S, _OVER = 3.0, 0.2
 # Norm of the differences of four rotors from their mean, over it, by which a vehicle that is level is trimmed at most,
 # that of one rotor that does nothing, 1.15, and of two, 2; the rate below which it does not spin; and the cosine
 # between weight and rotors of what leans.
@@ -178,22 +175,6 @@ def _plunges(signs: Signs, active: BoolArray) -> int:
     falls = active[step:] & (signs.height[:-step] - signs.height[step:] > _PLUNGES_M_S * SLOW_S)
     long = (first for first, after in runs(falls) if (after - first) * signs.period > _PLUNGE_S - SLOW_S)
     return next(long, -1)
-
-
-def turns_over(signs: Signs, active: BoolArray) -> bool:
-    """Tell whether by its attitude a vehicle is again and again on its back, and feels its weight along its rotors.
-
-    No flight does; a vehicle that stands while its gyroscope drifts or its attitude is wrong does.
-    """
-    if signs.felt is None or signs.upright is None or not active.any():
-        return False
-    thrust = np.median(signs.felt[active], axis=0)
-    along = averaged(signs.felt @ thrust / max(float(np.linalg.norm(thrust)), _WEIGHT[0]), signs.period, SLOW_S)
-    # A controller turns its rotors down where it takes itself for upside down.
-    on = active if signs.level is None else signs.level > ALIVE
-    impossible = on & (_turned_up(signs.upright, active) < 0) & (along > _WEIGHT[0]) & (along < _WEIGHT[1])
-    long = sum(after - first for first, after in runs(impossible) if (after - first) * signs.period >= _OVER_S)
-    return long > _OVER * int(on.sum())
 
 
 def _off_its_feet(signs: Signs, flies: BoolArray) -> BoolArray:

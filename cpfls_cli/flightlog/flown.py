@@ -25,8 +25,9 @@ _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
 # Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
 # range of leans above which a vehicle moves.
 _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
-# Ranges of leans and of slow forces, in weights, of what surely moves, and of slow forces of what does not.
-_FAR_RAD, _PUSHED, _UNPUSHED = 0.2, 0.3, 0.03
+# Ranges of leans and of slow forces, in weights, of what surely moves; of slow forces of what does not, and of leans
+# at which a flight is pushed.
+_FAR_RAD, _PUSHED, _UNPUSHED, _OVER_RAD = 0.2, 0.3, 0.03, 1.0
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
 # vehicle.
 _SWINGS_RAD_S, _AS_HELD = 0.03, 0.6
@@ -139,9 +140,6 @@ def find_flown(signs: Signs) -> FlownPart:
     active, how = _active(signs)
     if active is None:
         return FlownPart(None, (how,), flies=False)
-    if crash.turns_over(signs, active):
-        why = "by its attitude it lies on its back for seconds, and it feels its weight along its rotors all the while"
-        return _no_flight(f"{why}: it stands, and the attitude is wrong")
     rests = crash.resting(signs, active)
     free = _lifted(signs, smoothed(active & ~rests.carried, signs.period, _SHORT_S))
     if not free.any():
@@ -256,7 +254,8 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle whose rotors turn stands on the ground or is bound to a bench."""
     height = signs.height
     rises = 0.0 if height is None else float(np.ptp(height[active]))
-    leans, pushed = _leans(signs, active), _pushed(signs, active)
+    lean = None if signs.upright is None else np.arccos(np.clip(np.abs(signs.upright), 0.0, 1.0))
+    leans, pushed = (_range(signs, active, each) for each in (lean, signs.felt))
     level = leans is not None and leans < _LEANS_RAD
     if signs.turning is None or signs.slow is None:
         return height is not None and (rises < _UNMOVED_M or (level and rises <= _STILL_M))
@@ -269,7 +268,9 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     # Where a gyroscope reads next to nothing, of a dead one as of a simulated hover, lean and force say more.
     moves = not drifts and ((leans or 0.0) > _FAR_RAD or (pushed or 0.0) > _PUSHED)
     soft = turning < _SOFT_RAD_S and not moves
-    return (soft or (shakes and (level or leans is None))) and (drifts or rises <= _STILL_M)
+    # What leans far while its weight stays has an attitude that is wrong.
+    wrong = drifts and (leans or 0.0) > _OVER_RAD
+    return (soft or wrong or (shakes and (level or leans is None))) and (drifts or rises <= _STILL_M)
 
 
 def _held(signs: Signs, active: BoolArray) -> str:
@@ -307,21 +308,12 @@ def _unfelt(signs: Signs, active: BoolArray) -> bool:
     return works > _WORKS and feels < _UNFELT * works * float(thrust @ thrust)
 
 
-def _leans(signs: Signs, active: BoolArray) -> float | None:
-    """Give the range of leans, rad, without their vibration."""
+def _range(signs: Signs, active: BoolArray, values: Array | None) -> float | None:
+    """Give the range of a signal without its vibration, the largest of its columns."""
     inner = _inner(signs, active)
-    if signs.upright is None or not inner.any():
+    if values is None or not inner.any():
         return None
-    upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[inner]), 0.0, 1.0)
-    return float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95])))
-
-
-def _pushed(signs: Signs, active: BoolArray) -> float | None:
-    """Give the range of what an accelerometer feels, in weights, without vibration."""
-    inner = _inner(signs, active)
-    if signs.felt is None or not inner.any():
-        return None
-    return float(np.ptp(averaged(signs.felt, signs.period, SLOW_S)[inner], axis=0).max())
+    return float(np.ptp(averaged(values, signs.period, SLOW_S)[inner], axis=0).max())
 
 
 def _inner(signs: Signs, active: BoolArray) -> BoolArray:

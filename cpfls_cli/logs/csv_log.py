@@ -67,10 +67,7 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
                 if len(row) < len(names) and count > 1 and not any(table.rows):
                     break
                 way = f"line {number - 1} has to name each column"
-                if len(names) > 1:
-                    way = (
-                        "each row needs one for each name, those that hold a separator in quotes, and a line of its own"
-                    )
+                way = way if len(names) == 1 else "rows need a field a name, in quotes where it holds a separator"
                 raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names: {way}")
             try:
                 numbers.extend(_plain_numbers([row[index] for index in kept]))
@@ -135,11 +132,13 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         begun.append(text)
         if text.strip():
             break
-    # A field in quotes may hold other separators.
-    parts = _delimiter(begun[-1] if begun else header), _delimiter(header)
-    parted = {each: next(_rows(iter(begun[-1:]), each), []) for each in parts}
-    delimiter = next((each for each, own in parted.items() if len(own) == len(names)), parts[1])
-    first, rows = parted[delimiter], _rows(chain(begun, lines), delimiter)
+    delimiter = _delimiter(begun[-1] if begun else header)
+    first = next(_rows(iter(begun[-1:]), delimiter), [])
+    if 1 < len(names) != len(first):
+        # A field in quotes may hold another separator.
+        delimiter = _delimiter(header)
+        first = next(_rows(iter(begun[-1:]), delimiter), [])
+    rows = _rows(chain(begun, lines), delimiter)
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
         rows = ([field.replace(",", ".") for field in fields] for fields in rows)
         first = [field.replace(",", ".") for field in first]

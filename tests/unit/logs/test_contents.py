@@ -271,7 +271,7 @@ def test_a_column_that_is_empty_at_first_may_hold_words(tmp_path: Path) -> None:
 def test_a_last_line_that_was_cut_is_left_out_and_no_other_one(tmp_path: Path) -> None:
     own = contents(_written(tmp_path / "log.csv", "time,p,q\n0,1,2\n1,2,3\n2,3"))
     np.testing.assert_array_equal(own.topics[""]["time"], [0.0, 1.0])
-    with pytest.raises(InputError, match=r"log\.csv:3: 2 fields, but 3 column names$"):
+    with pytest.raises(InputError, match=r"log\.csv:3: 2 fields, but 3 column names: rows need"):
         contents(_written(tmp_path / "log.csv", "time,p,q\n0,1,2\n1,2\n2,3,4\n"))
 
 
