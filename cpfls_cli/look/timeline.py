@@ -210,7 +210,7 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
         stopped = touch.severity == "warning"
         if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows), stopped)):
             yield touch
-        elif last - end < _AT_END_S and np.fmin.reduce(lately) > _LESS * _carried_by(flight):
+        elif last - end < _AT_END_S and lately.min(initial=np.inf) > _LESS * _carried_by(flight):
             text = f"the log ends in the air{_voltage_lost(flight)}"
             yield Event(time_s=end, kind="end", text=text, severity="warning" if flight.system else "note")
     for what, at in ends:

@@ -49,6 +49,19 @@ def test_a_flight_that_comes_down_to_the_height_of_its_ground_is_one():
     assert flown.span_s == (pytest.approx(6.5, abs=0.1), pytest.approx(29.5, abs=0.1))
 
 
+def test_a_climb_begins_and_a_descent_ends_on_the_ground():
+    """From 5 s and to 35 s at 2 m/s, which is within a tenth of the highest for a second and more."""
+    height = np.clip(np.minimum(2 * (TIME - 5), 2 * (35 - TIME)), 0.0, None)
+    flown = flown_by(between(2, 36, 0.5), height, turning(5, 35))
+    assert flown.span_s == (pytest.approx(5.5, abs=0.2), pytest.approx(34.5, abs=0.2))
+
+
+def test_a_calm_hover_after_acrobatics_flies():
+    level = between(3, 15, 0.8) - between(8, 11, 0.55) + between(15, 38, 0.25)
+    flown = flown_by(level, None, turning(3, 15, 7.0) + turning(15, 38, 0.5))
+    assert flown.stretches_s == ((pytest.approx(3.5, abs=0.2), pytest.approx(37.5, abs=0.2)),)
+
+
 def test_idling_in_flips_is_part_of_the_flight():
     level = between(5, 35, 0.5) - between(15, 20, 0.42)
     lively = flown_by(level, None, turning(5, 35, 6.0))

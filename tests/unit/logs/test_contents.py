@@ -239,7 +239,14 @@ def test_names_with_spaces_are_of_commas(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "first",
-    ["2024-05-01T12:00:59.5Z", "2024-05-01 12:00:59.5", "2024/05/01 12:00:59.5", "12:00:59.5", "7:00:59.5"],
+    [
+        "2024-05-01T12:00:59.5Z",
+        "2024-05-01 12:00:59.5 UTC",
+        "2024-05-01 12:00:59.5",
+        "2024/05/01 12:00:59.5",
+        "12:00:59.5",
+        "7:00:59.5",
+    ],
 )
 def test_dates_and_times_of_day_are_stamps_in_seconds(tmp_path: Path, first: str) -> None:
     second = first.replace("00:59.5", "01:00.75")
@@ -273,6 +280,18 @@ def test_a_last_line_that_was_cut_is_left_out_and_no_other_one(tmp_path: Path) -
     np.testing.assert_array_equal(own.topics[""]["time"], [0.0, 1.0])
     with pytest.raises(InputError, match=r"log\.csv:3: 2 fields, but 3 column names: rows need"):
         contents(_written(tmp_path / "log.csv", "time,p,q\n0,1,2\n1,2\n2,3,4\n"))
+
+
+def test_fields_in_quotes_may_hold_another_separator(tmp_path: Path) -> None:
+    own = contents(_written(tmp_path / "log.csv", 'time,places,p\n0,"[1;2]",3\n1,"[2;3]",4\n'))
+    np.testing.assert_array_equal(own.topics[""]["p"], [3.0, 4.0])
+
+
+def test_one_topic_of_a_log_of_px4_is_called_so(tmp_path: Path) -> None:
+    path = _written(tmp_path / "11_02_33_vehicle_air_data_0.csv", "timestamp,baro_alt_meter\n1,158.3\n")
+    with pytest.raises(InputError, match=r"vehicle_air_data alone, one topic of a log of PX4 .*: give the log itself"):
+        log_contents(path, None)
+    assert log_contents(_written(tmp_path / "data_0.csv", path.read_text()), None).topics
 
 
 def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
