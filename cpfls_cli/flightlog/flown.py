@@ -145,12 +145,11 @@ def find_flown(signs: Signs) -> FlownPart:
     if not free.any():
         rested = (active & rests.carried).any()
         return _no_flight("something else than its rotors carries it" if rested else f"{how} throughout")
-    active = free
-    if _still(signs, active):
+    if _still(signs, free):
         return _no_flight("the vehicle neither turns nor moves")
-    if held := _held(signs, active):
+    if held := _held(signs, free):
         return _no_flight(f"{held}, as on a test stand")
-    return _longest(signs, active, rests, how)
+    return _longest(signs, free, rests, how)
 
 
 def _no_flight(why: str) -> FlownPart:

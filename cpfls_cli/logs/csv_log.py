@@ -132,12 +132,11 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         begun.append(text)
         if text.strip():
             break
-    delimiter = _delimiter(begun[-1] if begun else header)
-    first = next(_rows(iter(begun[-1:]), delimiter), [])
-    if 1 < len(names) != len(first):
-        # A field in quotes may hold another separator.
-        delimiter = _delimiter(header)
+    # A field in quotes may hold another separator than what parts the names.
+    for delimiter in (_delimiter(begun[-1] if begun else header), _delimiter(header)):
         first = next(_rows(iter(begun[-1:]), delimiter), [])
+        if len(names) in (1, len(first)):
+            break
     rows = _rows(chain(begun, lines), delimiter)
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
         rows = ([field.replace(",", ".") for field in fields] for fields in rows)
