@@ -233,20 +233,18 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
     if highest < 2 * _LEAST_HEIGHT:
         return turning
     risen = np.abs(height - ground) > max(_LEAST_HEIGHT, _OF_HEIGHT * highest)
-    off, step = np.zeros_like(turning), round(SLOW_S / period)
-    steady = np.arange(len(height))
-    rises = height - height[np.maximum(steady - step, 0)] > _CLIMBS_M_S * SLOW_S
-    sinks = height - height[np.minimum(steady + step, len(height) - 1)] > _CLIMBS_M_S * SLOW_S
+    off, step, rows = np.zeros_like(turning), round(SLOW_S / period), np.arange(len(height))
+    rises = height - height[np.maximum(rows - step, 0)] > _CLIMBS_M_S * SLOW_S
+    sinks = height - height[np.minimum(rows + step, rows[-1])] > _CLIMBS_M_S * SLOW_S
     # Between the first and the last moment above it a flight may well come down to the height of its ground.
     for first, after in runs(turning):
         high = first + np.flatnonzero(risen[first:after])
         if len(high):
             # What climbs or sinks without a pause from or to there flies as well.
-            stands, lands = np.flatnonzero(~rises[first : high[0]]), np.flatnonzero(~sinks[high[-1] : after])
-            off[first + (stands[-1] + 1 if len(stands) else 0) : high[-1] + (lands[0] + 1 if len(lands) else after)] = (
-                True
-            )
-    return smoothed(off & turning, period, _SHORT_S)
+            stands = np.append(-1, np.flatnonzero(~rises[first : high[0]]))[-1]
+            lands = np.append(np.flatnonzero(~sinks[high[-1] : after]), after - high[-1] - 1)[0]
+            off[first + stands + 1 : high[-1] + lands + 1] = True
+    return smoothed(off, period, _SHORT_S)
 
 
 def _still(signs: Signs, active: BoolArray) -> bool:
