@@ -56,6 +56,12 @@ def test_a_climb_begins_and_a_descent_ends_on_the_ground():
     assert flown.span_s == (pytest.approx(5.5, abs=0.2), pytest.approx(34.5, abs=0.2))
 
 
+def test_a_descent_that_is_cut_short_leaves_what_follows_on_the_ground():
+    height = np.interp(TIME, [3, 5, 11, 12.5, 26, 27, 34, 35], [0, 2, 2, 0, 0, 2, 2, 0])
+    flown = flown_by(between(3, 12, 0.5) + between(20, 36, 0.5), height, turning(3, 12) + turning(26, 35))
+    assert [tuple(map(round, own)) for own in flown.stretches_s] == [(4, 11), (27, 34)]
+
+
 def test_a_calm_hover_after_acrobatics_flies():
     level = between(3, 15, 0.8) - between(8, 11, 0.55) + between(15, 38, 0.25)
     flown = flown_by(level, None, turning(3, 15, 7.0) + turning(15, 38, 0.5))
