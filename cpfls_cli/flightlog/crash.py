@@ -19,10 +19,16 @@ SLOW_S = 0.5  # Means over so long hold no vibration.
 # does: more than 60 degrees off.
 _WEIGHT, _OFF_THRUST = (0.8, 1.2), 0.5
 _SENSES = (0.7, 2.0)  # Of gravity: the median force of a log, by which an accelerometer and its unit are believed.
-# Norm of the differences of four rotors from their mean, over it, by which a vehicle that is level is trimmed at most,
-# that of one rotor that does nothing, 1.15, and of two, 2; the rate below which it does not spin; and the cosine
-# between weight and rotors of what leans.
-_TRIMMED, _WITHOUT_ONE, _WITHOUT_TWO, _SPINS_RAD_S, _LEANS = 0.6, 1.1, 1.9, 2.0, 0.95
+# For how long no rotor that carries the weight can be above its vehicle, which would fall 88 m meanwhile; and the share
+# of the time with rotors on that is so where an attitude is wrong throughout.
+_OVER_S, _OVER = 3.0, 0.2
+# Difference between rotors that turns every vehicle, as a share of the largest command and of what is usual; the rate
+# below which it does not turn, as a share of what is usual and by itself.
+_STUCK, _STUCK_TIMES, _OF_RATE, _HARDLY_RAD_S = 0.15, 6.0, 0.3, 0.1
+# Norm of the differences of four rotors, which have none to spare, from their mean; the rate below which something else
+# than they must hold it; the cosine between weight and rotors of what leans; and the share of the largest rotor that
+# all others are below where it works alone.
+_HELD_FOUR, _HELD_RAD_S, _LEANS, _ALONE = 0.4, 2.0, 0.95, 0.25
 # Before the end of a stretch, where a crash is looked for; flight before that, which shows what it does in flight; and
 # the time from its last wild motion to the end, in which no pilot has recovered.
 _LAST_S, _FEWEST_S, _AT_ONCE_S = 10.0, 5.0, 2.0
@@ -147,34 +153,51 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
 
     Rotors push along one axis of the body: where the accelerometer feels the weight along another one while the vehicle
     hardly turns, it lies on its side or back. Without an accelerometer it lies where it is more than 90 degrees over.
-    What falls as no flight does flies no more.
+    It also rests where its rotors ask it to turn and it does not. What falls as no flight does flies no more.
     """
     nowhere = np.zeros(len(active), dtype=bool)
+    if signs.slow is None or signs.rate is None or not active.any():
+        return Resting(nowhere, nowhere)
     held = active & _held_four(signs)
     free = active & ~held
-    if signs.slow is None or signs.rate is None or not free.any():
-        return Resting(held, nowhere)
     lively = free & (signs.slow > LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else free
     turned = averaged(signs.rate, signs.period, _REST_S)
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
     calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
     lies = calm & _off_its_feet(signs, flies)
+    rests = active & calm & (lies | _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
     # A mean over a time says as much of all of it.
-    carried = held | binary_dilation(binary_opening(active & lies, window[: len(window) // 2 + 1]), window)
+    carried = held | binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
     plunges = _plunges(signs, active)
     carried |= (plunges >= 0) & (np.arange(len(active)) >= plunges)
     return Resting(np.asarray(carried, dtype=bool), np.asarray(lies, dtype=bool), plunges)
 
 
 def _plunges(signs: Signs, active: BoolArray) -> int:
-    step = round(SLOW_S / signs.period)
+    step = max(1, round(SLOW_S / signs.period))
     if signs.height is None or len(active) <= step:
         return -1
-    falls = active[step:] & (signs.height[:-step] - signs.height[step:] > _PLUNGES_M_S * SLOW_S)
+    falls = active[step:] & (signs.height[:-step] - signs.height[step:] > _PLUNGES_M_S * step * signs.period)
     long = (first for first, after in runs(falls) if (after - first) * signs.period > _PLUNGE_S - SLOW_S)
     return next(long, -1)
+
+
+def turns_over(signs: Signs, active: BoolArray) -> bool:
+    """Tell whether by its attitude a vehicle is again and again on its back, and feels its weight along its rotors.
+
+    No flight does; a vehicle that stands while its gyroscope drifts or its attitude is wrong does.
+    """
+    if signs.felt is None or signs.upright is None or not active.any():
+        return False
+    thrust = np.median(signs.felt[active], axis=0)
+    along = averaged(signs.felt @ thrust / max(float(np.linalg.norm(thrust)), _WEIGHT[0]), signs.period, SLOW_S)
+    # A controller turns its rotors down where it takes itself for upside down.
+    on = active if signs.level is None else signs.level > ALIVE
+    impossible = on & (_turned_up(signs.upright, active) < 0) & (along > _WEIGHT[0]) & (along < _WEIGHT[1])
+    long = sum(after - first for first, after in runs(impossible) if (after - first) * signs.period >= _OVER_S)
+    return long > _OVER * int(on.sum())
 
 
 def _off_its_feet(signs: Signs, flies: BoolArray) -> BoolArray:
@@ -192,27 +215,42 @@ def _turned_up(upright: Array, flies: BoolArray) -> Array:
     return np.asarray(upright * (np.sign(np.median(upright[flies])) or 1.0))
 
 
-def _held_four(signs: Signs) -> BoolArray:
-    """Mark where something else than its rotors must hold a vehicle of four, which has none to spare.
+def _unlike(rotors: Array) -> Array:
+    """Give rotors against their mean, as shares also where a config calls speeds so."""
+    mean = rotors.mean(axis=1, keepdims=True)
+    return np.asarray(np.nan_to_num(rotors - mean) / max(1.0, float(np.nanquantile(mean, 0.98))))
 
-    With one that does nothing it spins, with two it falls. Rotors may be trimmed for a weight off its centre or a weak
-    one of them, but what flies level feels its weight along them.
+
+def _held_four(signs: Signs) -> BoolArray:
+    """Mark where four rotors ask for a turn that none can fly without, of a vehicle that leans or hangs on one of them.
+
+    What flies level feels its weight along its rotors, and may be trimmed for a weight off its centre or a weak rotor.
     """
-    if signs.rotors is None or signs.rotors.shape[1] != 4 or signs.slow is None:
+    if signs.rotors is None or signs.rotors.shape[1] != 4 or signs.felt is None or signs.slow is None:
         return np.zeros(len(signs.time), dtype=bool)
-    works = averaged(np.nan_to_num(signs.rotors), signs.period, SLOW_S)
-    mean = works.mean(axis=1)
-    uneven = np.linalg.norm(works - mean[:, None], axis=1) / np.maximum(mean, ALIVE)
-    most = np.where(averaged(signs.slow, signs.period, _REST_S) < _SPINS_RAD_S, _WITHOUT_ONE, _WITHOUT_TWO)
-    if signs.felt is not None:
-        felt = averaged(signs.felt, signs.period, _REST_S)
-        weight = np.linalg.norm(felt, axis=1)
-        leans = (weight > _WEIGHT[0]) & (weight < _WEIGHT[1]) & (np.abs(felt[:, 2]) < _LEANS * weight)
-        most[leans & (most == _WITHOUT_ONE)] = _TRIMMED
+    asked = np.linalg.norm(averaged(_unlike(signs.rotors), signs.period, SLOW_S), axis=1) > _HELD_FOUR
+    felt = averaged(signs.felt, signs.period, _REST_S)
+    weight = np.linalg.norm(felt, axis=1)
+    held = (weight > _WEIGHT[0]) & (weight < _WEIGHT[1]) & (averaged(signs.slow, signs.period, _REST_S) < _HELD_RAD_S)
+    largest = np.sort(averaged(np.nan_to_num(signs.rotors), signs.period, SLOW_S), axis=1)
+    held &= (np.abs(felt[:, 2]) < _LEANS * weight) | (largest[:, -2] < _ALONE * largest[:, -1])
+    # What has lost two of its rotors falls over within that time.
     long = np.ones(max(1, round(_LIES_S / signs.period)), dtype=bool)
-    return np.asarray(
-        binary_opening(smoothed((uneven > most) | (mean < ALIVE), signs.period, SLOW_S), long), dtype=bool
-    )
+    return np.asarray(binary_opening(smoothed(asked & held, signs.period, SLOW_S), long), dtype=bool)
+
+
+def _stuck(signs: Signs, flies: BoolArray) -> BoolArray:
+    if signs.rotors is None or signs.slow is None:
+        return np.zeros(len(flies), dtype=bool)
+    unlike = _unlike(signs.rotors)
+    asked = np.linalg.norm(averaged(unlike - np.median(unlike[flies], axis=0), signs.period, _REST_S), axis=1)
+    turns = averaged(signs.slow, signs.period, _REST_S)
+    hardly = turns < min(_HARDLY_RAD_S, _OF_RATE * float(np.median(turns[flies])))
+    stuck = (asked > max(_STUCK, _STUCK_TIMES * float(np.median(asked[flies])))) & hardly
+    if signs.height is not None:
+        # High above where it was lowest it hovers with rotors that have become unlike.
+        stuck &= signs.height < float(np.quantile(signs.height, 0.02)) + _DROP_M
+    return np.asarray(stuck)
 
 
 def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str, int]:
@@ -224,9 +262,8 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     first, after = part
     if after == rests.plunges:
         return {"loss of control": after}
-    then = rests.carried[after : after + round(_REST_S / signs.period)]
-    rests_then = len(then) > 0 and bool(then.all())
-    lies_then = bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
+    rests_then = bool(rests.carried[after : after + 1].any())
+    lies_then = rests_then or bool(rests.lies[after : after + round(_LIES_S / signs.period)].any())
     marked = _beyond_flight(signs, part, lies_then=lies_then)
     if rests_then and marked[0][: after - first].any():
         # What shakes it when it has come to rest ends no flight; what brings it there does.
@@ -243,10 +280,14 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     if rests_then:
         return {"rests with its rotors on": after}
     if stops:
-        # No rotor makes what it feels then.
-        felt = np.empty(0) if signs.felt is None else np.linalg.norm(signs.felt, axis=1)
-        struck = after + np.flatnonzero(felt[after : after + round(_LIES_S / signs.period)] > HARD)
-        return {"rotors stop in the air": after} | ({"impact": int(struck[0])} if len(struck) else {})
+        hit = next((hit for fall, hit in _falls(signs) if 0 <= (fall - after) * signs.period < _THEN_S), None)
+        if hit is None and signs.felt is not None:
+            # By a force that its flight never had.
+            size = np.linalg.norm(signs.felt, axis=1)
+            least = max(HARD, BEYOND * float(size[slice(*part)].max()))
+            struck = after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
+            hit = int(struck[0]) if len(struck) else None
+        return {"rotors stop in the air": after} | ({} if hit is None else {"impact": hit})
     return {}
 
 
@@ -273,13 +314,13 @@ def _last_burst(samples: IntArray, period: float) -> int:
 def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Mark near the end of a stretch what flight before never had: motion, force, motion with a rotor at its limit."""
     first, after = part
-    last = min(round(_LAST_S / signs.period), after - first - round(_FEWEST_S / signs.period))
+    last = min(round(_LAST_S / signs.period), (after - first) // 2)
     before = slice(first, after - last)
     # Rotors may drop at the impact.
     stop = min(len(signs.time), after + round(_THEN_S / signs.period))
     late = np.arange(first, stop) >= before.stop
     nothing = np.zeros(stop - first, dtype=bool)
-    if signs.turning is None or signs.body_rate is None or last < 0:
+    if signs.turning is None or signs.body_rate is None or (before.stop - first) * signs.period < _FEWEST_S:
         return nothing, nothing, nothing
 
     def beyond(values: Array, least: float) -> BoolArray:
@@ -293,16 +334,9 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
         strained |= beyond(np.arccos(np.clip(up, -1.0, 1.0)), _STRAINED_RAD)
     if signs.rotors is not None:
         strained &= (signs.rotors[first:stop] >= _AT_LIMIT * float(np.nanmax(signs.rotors))).any(axis=1)
-    hard = across = nothing
-    if signs.felt is not None:
-        # What pushes across the rotors' axis is no rotor, however hard it climbed before.
-        across = beyond(np.hypot(*signs.felt.T[:2]), HARD)
-        hard = across | beyond(np.linalg.norm(signs.felt, axis=1), HARD)
-    # A touchdown jolts too; but then the vehicle stands on its feet, as a log shows that goes on.
-    if lies_then:
-        wild = wild | hard | beyond(spins, _WILD_RAD_S2)
-    elif after == len(signs.time):
-        wild = wild | across
+    hard = nothing if signs.felt is None else beyond(np.linalg.norm(signs.felt, axis=1), HARD)
+    # A touchdown jolts too; but then the vehicle stands on its feet.
+    wild = wild | hard | beyond(spins, _WILD_RAD_S2) if lies_then else wild
     return wild, hard, nothing if signs.rotors is None else strained
 
 
@@ -326,7 +360,7 @@ def _stops_in_the_air(signs: Signs, after: int) -> bool:
     """Tell whether rotors stop while the vehicle is high, or feels itself fall."""
     if signs.level is None or after >= len(signs.time):
         return False
-    second = slice(after, after + round(1.0 / signs.period))
+    second = slice(after, after + max(1, round(1.0 / signs.period)))
     if signs.level[second].min() >= ALIVE:
         return False
     if signs.height is not None and float(signs.height[after] - signs.height[second].min()) > _DROP_M:

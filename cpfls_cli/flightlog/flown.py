@@ -25,19 +25,19 @@ _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
 # Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
 # range of leans above which a vehicle moves.
 _SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
-# Ranges of leans and of slow forces, in weights, of what surely moves; of slow forces of what does not, and of leans
-# at which a flight is pushed.
-_FAR_RAD, _PUSHED, _UNPUSHED, _OVER_RAD = 0.2, 0.3, 0.03, 1.0
+# Ranges of leans and of slow forces, in weights, of what surely moves; of slow forces of what does not, and of the
+# height that is estimated for it.
+_FAR_RAD, _PUSHED, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 0.03, 1.0
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
-# vehicle.
-_SWINGS_RAD_S, _AS_HELD = 0.03, 0.6
+# vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
+_SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
 _UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
-# Range of squared commands, over their mean, whose thrust is felt in the air; and the share of it that is felt where
-# something else holds the vehicle.
-_WORKS, _UNFELT = 1.0, 0.12
+# Range of squared commands, over their mean, whose thrust is felt in the air, unless it climbs by so many m; and the
+# share of it that is felt where something else holds the vehicle.
+_WORKS, _CLIMBS_M, _UNFELT = 1.0, 3.0, 0.12
 # Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in weights
 # below which it falls, on the mean over s.
-_TURNS_RAD_S, _FALLS, _TURN_S = 0.2, 0.3, 0.2
+_TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
 _LONGEST_CUT_S = 3.0  # Longer than that no throttle is cut in flight: a fall of 44 m.
 _MOST_CLOCK_HZ = 50.0  # Rate that is enough to find a flight.
 _FEWEST_ROWS = 10  # Of which it can be seen.
@@ -140,16 +140,18 @@ def find_flown(signs: Signs) -> FlownPart:
     active, how = _active(signs)
     if active is None:
         return FlownPart(None, (how,), flies=False)
+    if crash.turns_over(signs, active):
+        why = "by its attitude it lies on its back for seconds, and it feels its weight along its rotors all the while"
+        return _no_flight(f"{why}: it stands, and the attitude is wrong")
     rests = crash.resting(signs, active)
-    free = _lifted(signs, smoothed(active & ~rests.carried, signs.period, _SHORT_S))
-    if not free.any():
-        rested = (active & rests.carried).any()
-        return _no_flight("something else than its rotors carries it" if rested else f"{how} throughout")
-    if _still(signs, free):
+    active = _lifted(signs, smoothed(active & ~rests.carried, signs.period, _SHORT_S))
+    if not active.any():
+        return _no_flight(f"{how} throughout")
+    if _still(signs, active):
         return _no_flight("the vehicle neither turns nor moves")
-    if held := _held(signs, free):
+    if held := _held(signs, active):
         return _no_flight(f"{held}, as on a test stand")
-    return _longest(signs, free, rests, how)
+    return _longest(signs, active, rests, how)
 
 
 def _no_flight(why: str) -> FlownPart:
@@ -190,18 +192,16 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
     level, rate = signs.level, signs.turning
     assert level is not None, "asked for"
     # Thrust goes as the square of the level, or with it: who mostly climbs hovers at less than his usual level.
-    felt, of_hover, above = None, level, level > _OF_LARGEST * largest
+    felt, of_hover = None, level
     if signs.felt is not None:
         felt = averaged(np.linalg.norm(signs.felt, axis=1), signs.period, _TURN_S)
         # By the mean force, in which vibration is none.
         of_hover = level / np.sqrt(np.maximum(np.linalg.norm(averaged(signs.felt, signs.period, _TURN_S), axis=1), 1.0))
-    elif signs.slow is not None:
-        # What turns with its rotors on is in the air.
-        above = above | ((signs.slow > _TURNS_RAD_S) & (level > ALIVE))
-    hover = float(np.median(of_hover[above]))
+    hover = float(np.median(of_hover[level > _OF_LARGEST * largest]))
     carrying = np.asarray(level > _OF_HOVER * hover, dtype=bool)
     if rate is not None and carrying.any():
-        lively = np.sqrt(averaged(rate**2, signs.period, _SHORT_S)) > _TURNS_RAD_S
+        turns = np.sqrt(averaged(rate**2, signs.period, _SHORT_S))
+        lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
         if felt is not None:
             lively |= felt < _FALLS
         # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
@@ -228,14 +228,15 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
     first = int(np.argmax(turning))
     if first < _SHORT_S / period:
         return turning
-    ground = float(np.median(height[max(0, first - round(1 / period)) : first]))
+    ground = float(np.median(height[max(0, first - max(1, round(1 / period))) : first]))
     highest = float(np.quantile(np.abs(height - ground)[turning], 0.95))
     if highest < 2 * _LEAST_HEIGHT:
         return turning
     risen = np.abs(height - ground) > max(_LEAST_HEIGHT, _OF_HEIGHT * highest)
-    off, step, rows = np.zeros_like(turning), round(SLOW_S / period), np.arange(len(height))
-    rises = height - height[np.maximum(rows - step, 0)] > _CLIMBS_M_S * SLOW_S
-    sinks = height - height[np.minimum(rows + step, rows[-1])] > _CLIMBS_M_S * SLOW_S
+    off, step, rows = np.zeros_like(turning), max(1, round(SLOW_S / period)), np.arange(len(height))
+    least = _CLIMBS_M_S * step * period
+    rises = height - height[np.maximum(rows - step, 0)] > least
+    sinks = height - height[np.minimum(rows + step, rows[-1])] > least
     # Between the first and the last moment above it a flight may well come down to the height of its ground.
     for first, after in runs(turning):
         high = first + np.flatnonzero(risen[first:after])
@@ -251,8 +252,7 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle whose rotors turn stands on the ground or is bound to a bench."""
     height = signs.height
     rises = 0.0 if height is None else float(np.ptp(height[active]))
-    lean = None if signs.upright is None else np.arccos(np.clip(np.abs(signs.upright), 0.0, 1.0))
-    leans, pushed = (_range(signs, active, each) for each in (lean, signs.felt))
+    leans, pushed = _leans(signs, active), _pushed(signs, active)
     level = leans is not None and leans < _LEANS_RAD
     if signs.turning is None or signs.slow is None:
         return height is not None and (rises < _UNMOVED_M or (level and rises <= _STILL_M))
@@ -260,20 +260,29 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     # Vibration of the rotors is no turning: its mean is that of noise.
     slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))
     shakes = turning < _SHAKES_RAD_S and slow < _OF_NOISE * turning / np.sqrt(SLOW_S / signs.period)
-    # Estimates of height and lean drift on the ground, but what is not pushed has not moved.
-    drifts = pushed is not None and pushed < _UNPUSHED
-    # Where a gyroscope reads next to nothing, of a dead one as of a simulated hover, lean and force say more.
-    moves = not drifts and ((leans or 0.0) > _FAR_RAD or (pushed or 0.0) > _PUSHED)
-    soft = turning < _SOFT_RAD_S and not moves
-    # What leans far while its weight stays has an attitude that is wrong.
-    wrong = drifts and (leans or 0.0) > _OVER_RAD
-    return (soft or wrong or (shakes and (level or leans is None))) and (drifts or rises <= _STILL_M)
+    # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
+    drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
+    # Where a gyroscope reads next to nothing, of a dead one as of a simulated hover, leans, force and height say more.
+    if turning < _STILL_RAD_S:
+        lifts = (pushed is None or pushed >= _UNPUSHED) and rises > _STILL_M
+        return not (lifts or (leans or 0.0) > _FAR_RAD or (pushed or 0.0) > _PUSHED)
+    soft = turning < _SOFT_RAD_S
+    return (rises <= _STILL_M and ((shakes and (level or leans is None)) or soft)) or (soft and drifts)
 
 
 def _held(signs: Signs, active: BoolArray) -> str:
     """Say by what something else than rotors is seen to hold a vehicle whose rotors turn; empty where nothing is."""
     if signs.rotors is None:
         return ""
+    if signs.rotors.shape[1] == 4 and signs.slow is not None:
+        shares = np.nan_to_num(signs.rotors)[active]
+        third = np.sort(shares[shares.mean(axis=1) > ALIVE], axis=1)[:, 1]
+        if len(third) and float(np.median(third)) < ALIVE:
+            return "no more than two of its four rotors work at a time"
+        works = np.median(shares, axis=0)
+        idle = np.flatnonzero(works < _OF_MEAN * works.mean())
+        if len(idle) and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
+            return f"rotor {idle[0] + 1} hardly works, and it does not spin"
     if _unfelt(signs, active):
         return "what it feels does not grow with its thrust"
     if signs.body_rate is None or signs.felt is None:
@@ -296,7 +305,8 @@ def _held(signs: Signs, active: BoolArray) -> str:
 def _unfelt(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle feels no more where its rotors work much more."""
     inner = _inner(signs, active)
-    if signs.level is None or signs.felt is None or not inner.any():
+    climbs = signs.height is not None and float(np.ptp(signs.height[active])) > _CLIMBS_M
+    if signs.level is None or signs.felt is None or climbs or not inner.any():
         return False
     squares, felt = (averaged(each, signs.period, SLOW_S)[inner] for each in (signs.level**2, signs.felt))
     thrust = np.median(felt, axis=0)
@@ -305,12 +315,21 @@ def _unfelt(signs: Signs, active: BoolArray) -> bool:
     return works > _WORKS and feels < _UNFELT * works * float(thrust @ thrust)
 
 
-def _range(signs: Signs, active: BoolArray, values: Array | None) -> float | None:
-    """Give the range of a signal without its vibration, the largest of its columns."""
+def _leans(signs: Signs, active: BoolArray) -> float | None:
+    """Give the range of leans, rad, without their vibration."""
     inner = _inner(signs, active)
-    if values is None or not inner.any():
+    if signs.upright is None or not inner.any():
         return None
-    return float(np.ptp(averaged(values, signs.period, SLOW_S)[inner], axis=0).max())
+    upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[inner]), 0.0, 1.0)
+    return float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95])))
+
+
+def _pushed(signs: Signs, active: BoolArray) -> float | None:
+    """Give the range of what an accelerometer feels, in weights, without vibration."""
+    inner = _inner(signs, active)
+    if signs.felt is None or not inner.any():
+        return None
+    return float(np.ptp(averaged(signs.felt, signs.period, SLOW_S)[inner], axis=0).max())
 
 
 def _inner(signs: Signs, active: BoolArray) -> BoolArray:

@@ -54,25 +54,6 @@ def test_a_crash_begins_where_rotors_at_their_limit_no_longer_hold_it(own):
     assert found.ended == f"loss of control at {found.span_s[1] + 0.02:.1f} s, impact at 43.0 s"
 
 
-def test_a_crash_amid_rotors_that_go_on_is_seen(own):
-    """It stands on its feet afterwards, three rotors near hover and one at rest, and rocks."""
-    rocks = ended.then(ended.then(own, 0.04, rate=9.0, felt=(0.0, 0.0, 90.0), rotors=0.6), 6.0, rotors=(1.6, 1, 1.2, 0))
-    late = rocks.time > ended.SECONDS + 0.1
-    rocks.rate[late] += 0.5 * np.sin(5 * rocks.time[late, None])
-    found = flown(ended.joined(rocks, own), ("force",))
-    assert found.moments[0] == ("impact", pytest.approx(ended.SECONDS, abs=0.1))
-    assert [round(end) for _, end in found.stretches_s] == [40, 86]
-
-
-def test_what_hits_it_sideways_at_the_end_of_a_climb_is_an_impact(own):
-    """It felt more along its rotors before."""
-    climbs = type(own)(**vars(own))
-    climbs.specific_force = own.specific_force * np.where((own.time > 9) & (own.time < 11), 6.0, 1.0)[:, None]
-    for across, ends in ((60.0, "impact at 40.0 s"), (20.0, "")):
-        struck = ended.then(climbs, 0.1, felt=(0.0, across, 9.8), rotors=1.0)
-        assert flown(struck, ("force",)).ended == ends
-
-
 def test_what_rocks_on_the_ground_after_a_crash_is_not_taken_for_the_flight(own):
     found = flown(ended.rocks_on_the_ground(own), ("force",))
     assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.1))
@@ -233,7 +214,7 @@ def test_an_attitude_that_turns_over_while_weight_stays_is_no_flight(own):
     bench.specific_force = np.tile([0.0, 0.0, 9.81], (len(own.time), 1))
     found = flown(bench, ("force", "upright"))
     assert not found.flies
-    assert found.reasons == ("no flight in it: the vehicle neither turns nor moves",)
+    assert found.reasons[0].startswith("no flight in it: by its attitude it lies on its back for seconds")
 
 
 def test_a_long_turn_pushed_along_its_side_is_no_rest(own):
