@@ -1,6 +1,7 @@
 """A log's columns on their clocks, and what they are taken for so far, with the reason and the rivals of each guess."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -117,9 +118,11 @@ class LogTable:
 def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str, str]:
     """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
     ranks: dict[str, int] = {}
+    groups = Counter(name.rpartition("/")[0] for name in fields)
     for name, values in fields.items():
-        # In a struct of MATLAB, or a group of HDF5, what comes last says what it is.
-        lower, known = name.lower().strip().rpartition("/")[2], np.asarray(values, dtype=float)
+        # In a struct of MATLAB, or a group of HDF5, what comes last says what it is; alone it is a unit, as in deg/sec.
+        (group, _, last), known = name.rpartition("/"), np.asarray(values, dtype=float)
+        lower = (last if groups[group] > 1 else name).lower().strip()
         known = known[np.isfinite(known)]
         usual = _TIME_NAMES.fullmatch(lower)
         rises = len(known) > max(2, 0.5 * len(values)) and (np.diff(known) >= 0).all() and np.ptp(known) > 0

@@ -66,8 +66,8 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
                 # A last line may have been cut, where more than one before it show how long they are.
                 if len(row) < len(names) and count > 1 and not any(table.rows):
                     break
-                way = f"line {number - 1} has to name each column"
-                way = way if len(names) == 1 else "rows need a field a name, in quotes where it holds a separator"
+                way = "each row needs one field for each column name; a field that holds a separator needs quotes"
+                way = f"line {number - 1} has to name each column" if len(names) == 1 else way
                 raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names: {way}")
             try:
                 numbers.extend(_plain_numbers([row[index] for index in kept]))

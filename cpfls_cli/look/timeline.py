@@ -38,9 +38,6 @@ _LIES, _LIES_S, _HARD_S = -0.7, 1.0, 1.5
 """Force along the rotors, in gravity and over s, of what lies on its back; force of a hard landing, in gravity and
 times the largest of its flight, and how long before the end of a flight it may come, s."""
 
-_SELDOM: Final = 0.995
-"""Share of a flight in which nothing strikes it."""
-
 _READS: Final = 0.12
 """By which an accelerometer at rest may differ from gravity, share of it: the largest offset by its data sheets."""
 
@@ -167,7 +164,6 @@ def timeline(
         *_limits(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_losses(flight, topics),
         *_misread(flight),
-        *_hits(flight),
         *_on_its_back(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_battery(flight),
     ]
@@ -438,20 +434,6 @@ def _misread(flight: LogFlight) -> Iterator[Event]:
         yield Event(time_s=float(flight.time[0]), kind="calibration", text=text, severity="warning")
 
 
-def _hits(flight: LogFlight) -> Iterator[Event]:
-    """Find what strikes a vehicle that flies on: pushes across its rotors' axis that they cannot make."""
-    sensor = flight.accelerometer
-    flown = np.empty(0) if sensor is None else _flown_or_after(flight, sensor.time, -_HARD_S)
-    if sensor is None or not flown.any():
-        return
-    across = np.nan_to_num(np.hypot(*sensor.values.T[:2])) / STANDARD_GRAVITY * flown
-    struck = np.flatnonzero(across > max(HARD, BEYOND * float(np.quantile(across[flown], _SELDOM))))
-    for rows in np.split(struck, 1 + np.flatnonzero(np.diff(sensor.time[struck]) > _HARD_S)):
-        if len(rows):
-            text = f"is hit, with {across[rows].max():.2g} g across its rotors' axis"
-            yield Event(time_s=float(sensor.time[rows[0]]), kind="hit", text=text, severity="warning")
-
-
 def _losses(flight: LogFlight, topics: Topics) -> Iterator[Event]:
     for begin, end in flight.gaps_s[(flight.gaps_s[:, 1] - flight.gaps_s[:, 0]) > _LONG_GAP_S].tolist():
         rows = (flight.time >= begin) & (flight.time <= end)
@@ -554,17 +536,5 @@ def _in_words(kind: str, many: Sequence[Event]) -> str:
 
 
 _KEPT: Final = frozenset(
-    (
-        "flown",
-        "take-off",
-        "landing",
-        "end",
-        "impact",
-        "hit",
-        "loss of control",
-        "free fall",
-        "limit",
-        "clipping",
-        "armed",
-    )
+    ("flown", "take-off", "landing", "end", "impact", "loss of control", "free fall", "limit", "clipping", "armed")
 )

@@ -12,7 +12,7 @@ from cpfls_cli.rotations import body_rate
 from tests.builders.studies import VEHICLE
 
 NAMES = ["t", "roll", "pitch", "yaw", "mx", "my", "mz"]
-FIELDS = "rows need a field a name, in quotes where it holds a separator"
+FIELDS = "each row needs one field for each column name; a field that holds a separator needs quotes"
 
 
 def rows():

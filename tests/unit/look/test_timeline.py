@@ -54,19 +54,6 @@ def test_a_flight_between_the_ground(autopilot):
     assert flies[0] == lifts[0]
 
 
-def test_what_strikes_a_vehicle_that_flies_on():
-    struck = replace_felt(HOP, 14.0, (60.0, 0.0, 9.8))
-    assert of(events(logs.px4(struck)), "hit") == [(14.0, "is hit, with 6.1 g across its rotors' axis")]
-    # What climbs feels as much along them.
-    assert of(events(logs.px4(replace_felt(HOP, 14.0, (0.0, 0.0, 60.0)))), "hit") == []
-
-
-def replace_felt(own, at_s, felt):
-    hit = type(own)(**vars(own))
-    hit.specific_force = np.where(np.abs(own.time - at_s)[:, None] < 0.015, felt, own.specific_force)
-    return hit
-
-
 def test_what_px4_states():
     more = {
         "vehicle_land_detected": state([0, 5.9, 24.2], landed=[1, 0, 1]),
