@@ -98,7 +98,7 @@ class Signs:
 
     def slower(self, most_hz: float) -> "Signs":
         """Take no more samples a second than are asked for; of each few the first."""
-        every = max(1, int(1 / (most_hz * self.period)))
+        every = max(1, int(1 / (most_hz * self.period) + 0.01))
         held = {each.name: getattr(self, each.name) for each in fields(self)}
         return replace(self, **{name: own[::every] for name, own in held.items() if own is not None})
 
@@ -176,10 +176,10 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
 
 
 def _plunges(signs: Signs, active: BoolArray) -> int:
-    step = round(SLOW_S / signs.period)
+    step = max(1, round(SLOW_S / signs.period))
     if signs.height is None or len(active) <= step:
         return -1
-    falls = active[step:] & (signs.height[:-step] - signs.height[step:] > _PLUNGES_M_S * SLOW_S)
+    falls = active[step:] & (signs.height[:-step] - signs.height[step:] > _PLUNGES_M_S * step * signs.period)
     long = (first for first, after in runs(falls) if (after - first) * signs.period > _PLUNGE_S - SLOW_S)
     return next(long, -1)
 
@@ -360,7 +360,7 @@ def _stops_in_the_air(signs: Signs, after: int) -> bool:
     """Tell whether rotors stop while the vehicle is high, or feels itself fall."""
     if signs.level is None or after >= len(signs.time):
         return False
-    second = slice(after, after + round(1.0 / signs.period))
+    second = slice(after, after + max(1, round(1.0 / signs.period)))
     if signs.level[second].min() >= ALIVE:
         return False
     if signs.height is not None and float(signs.height[after] - signs.height[second].min()) > _DROP_M:

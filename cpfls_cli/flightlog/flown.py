@@ -18,6 +18,7 @@ _OF_HOVER = 0.6  # Share of the level at hover below which rotors idle.
 _OF_LARGEST = 0.5  # Share of the largest level above which rotors carry the vehicle.
 _SHORT_S = 1.0  # Shorter pauses are part of a flight, and shorter flights none.
 _OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05  # Above the ground it flies: as a share of the highest, and in m.
+_CLIMBS_M_S = 0.2  # Rate at which no estimate of height drifts for long.
 _MARGIN_S = 0.5  # Left out after take-off and before landing, where the ground pushes.
 # Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move.
 _STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
@@ -227,17 +228,23 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
     first = int(np.argmax(turning))
     if first < _SHORT_S / period:
         return turning
-    ground = float(np.median(height[max(0, first - round(1 / period)) : first]))
+    ground = float(np.median(height[max(0, first - max(1, round(1 / period))) : first]))
     highest = float(np.quantile(np.abs(height - ground)[turning], 0.95))
     if highest < 2 * _LEAST_HEIGHT:
         return turning
     risen = np.abs(height - ground) > max(_LEAST_HEIGHT, _OF_HEIGHT * highest)
-    off = np.zeros_like(turning)
+    off, step, rows = np.zeros_like(turning), max(1, round(SLOW_S / period)), np.arange(len(height))
+    least = _CLIMBS_M_S * step * period
+    rises = height - height[np.maximum(rows - step, 0)] > least
+    sinks = height - height[np.minimum(rows + step, rows[-1])] > least
     # Between the first and the last moment above it a flight may well come down to the height of its ground.
     for first, after in runs(turning):
         high = first + np.flatnonzero(risen[first:after])
         if len(high):
-            off[high[0] : high[-1] + 1] = True
+            # What climbs or sinks without a pause from or to there flies as well.
+            stands = np.append(-1, np.flatnonzero(~rises[first : high[0]]))[-1]
+            lands = np.append(np.flatnonzero(~sinks[high[-1] : after]), after - high[-1] - 1)[0]
+            off[first + stands + 1 : high[-1] + lands + 1] = True
     return smoothed(off, period, _SHORT_S)
 
 

@@ -1,6 +1,7 @@
 """A log's columns on their clocks, and what they are taken for so far, with the reason and the rivals of each guess."""
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -24,7 +25,7 @@ from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
 if TYPE_CHECKING:
     from cpfls_cli.flightlog.rebuilt import Rebuilt
 
-_TIME_NAMES: Final = re.compile(r"t(_s)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?")
+_TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?")
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
@@ -117,8 +118,11 @@ class LogTable:
 def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str, str]:
     """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
     ranks: dict[str, int] = {}
+    groups = Counter(name.rpartition("/")[0] for name in fields)
     for name, values in fields.items():
-        lower, known = name.lower().strip(), np.asarray(values, dtype=float)
+        # In a struct of MATLAB, or a group of HDF5, what comes last says what it is; alone it is a unit, as in deg/sec.
+        (group, _, last), known = name.rpartition("/"), np.asarray(values, dtype=float)
+        lower = (last if groups[group] > 1 else name).lower().strip()
         known = known[np.isfinite(known)]
         usual = _TIME_NAMES.fullmatch(lower)
         rises = len(known) > max(2, 0.5 * len(values)) and (np.diff(known) >= 0).all() and np.ptp(known) > 0

@@ -127,6 +127,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
 
 def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
     """Say why a log without a column that is recognised is refused."""
+    named = [own for own in named if own.signal != "voltage"]
     clocks = [time for own in named if len(time := log.values(own.group.columns[:1])[0])]
     if clocks:
         log.require_long_enough(max(float(time[-1] - time[0]) for time in clocks))

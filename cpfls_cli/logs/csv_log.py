@@ -66,8 +66,9 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
                 # A last line may have been cut, where more than one before it show how long they are.
                 if len(row) < len(names) and count > 1 and not any(table.rows):
                     break
-                way = f": line {number - 1} has to name each column" if len(names) == 1 else ""
-                raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names{way}")
+                way = "each row needs one field for each column name; a field that holds a separator needs quotes"
+                way = f"line {number - 1} has to name each column" if len(names) == 1 else way
+                raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names: {way}")
             try:
                 numbers.extend(_plain_numbers([row[index] for index in kept]))
             except ValueError:
@@ -131,8 +132,12 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         begun.append(text)
         if text.strip():
             break
-    first = _fields(begun[-1]) if begun else []
-    rows = _rows(chain(begun, lines), _delimiter(begun[-1] if begun else header))
+    # A field in quotes may hold another separator than what parts the names.
+    for delimiter in (_delimiter(begun[-1] if begun else header), _delimiter(header)):
+        first = next(_rows(iter(begun[-1:]), delimiter), [])
+        if len(names) in (1, len(first)):
+            break
+    rows = _rows(chain(begun, lines), delimiter)
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
         rows = ([field.replace(",", ".") for field in fields] for fields in rows)
         first = [field.replace(",", ".") for field in first]
@@ -185,7 +190,7 @@ def _seconds(text: str) -> float:
     if ":" not in text:
         raise ValueError(text)
     # An hour may have one digit, and slashes may part a date.
-    dated, of_day = text.replace("/", "-"), f"1970-01-01T{'0' * (text[1:2] == ':')}{text}"
+    dated, of_day = text.replace("/", "-").removesuffix(" UTC"), f"1970-01-01T{'0' * (text[1:2] == ':')}{text}"
     stamp = datetime.fromisoformat(dated if dated[4:5] == "-" else of_day)
     return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
 

@@ -186,7 +186,8 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
     lifts, lands = _land_detector(topics)
     ends = [(what, at + recognition.counted_from_s) for what, at in recognition.flown.moments]
     last, spans = float(flight.time[-1]), runs(flight.flown)
-    lately = flight.collective[-max(2, round(_AT_END_S * flight.rate_hz)) :]
+    # Rotors may be logged less often than rates.
+    lately = flight.collective[np.isfinite(flight.collective)][-max(2, round(_AT_END_S * flight.rate_hz)) :]
     for number, (first, after) in enumerate(spans):
         before = spans[number - 1][1] if number else 0
         follows = spans[number + 1][0] if number + 1 < len(spans) else None
@@ -205,7 +206,7 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
         stopped = touch.severity == "warning"
         if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows), stopped)):
             yield touch
-        elif last - end < _AT_END_S and np.fmin.reduce(lately) > _LESS * _carried_by(flight):
+        elif last - end < _AT_END_S and lately.min(initial=np.inf) > _LESS * _carried_by(flight):
             text = f"the log ends in the air{_voltage_lost(flight)}"
             yield Event(time_s=end, kind="end", text=text, severity="warning" if flight.system else "note")
     for what, at in ends:

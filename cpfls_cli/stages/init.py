@@ -19,7 +19,7 @@ from cpfls_cli.arguments import moments
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.config.load import ASK, how_to_fill_in, parse_config, validate
 from cpfls_cli.consistency.findings import Finding
-from cpfls_cli.errors import ConfigError, CpflsError, InputError, about
+from cpfls_cli.errors import ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.airframe import Airframe, RotorPlace, usual_airframe
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal, known_log, propose
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
@@ -27,7 +27,7 @@ from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, USUAL, log_faster
 from cpfls_cli.flights.models import found_vehicle, is_found
 from cpfls_cli.flights.recordings import check_flight, imported, read_import, seen_twice
-from cpfls_cli.logs.formats import log_contents, suffixes_in_words
+from cpfls_cli.logs.formats import about_flight, log_contents, suffixes_in_words
 from cpfls_cli.page import TEMPLATES
 from cpfls_cli.pages.trust import contradicted
 from cpfls_cli.report.content import Command, number
@@ -323,7 +323,7 @@ def proposed(
     for at, log in enumerate(given):
         run.progress(at, len(given), log.name)
         own = log_contents(log)
-        with about(log, InputError):
+        with about_flight(log):
             one = known_log(str(log), own.topics, own.units, own.parameters, own.system)
             known.append(replace(one, of_file=own.warnings))
     mass, model = stated.mass_kg, stated.model

@@ -14,7 +14,7 @@ import numpy as np
 import typer
 
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.logs.formats import LogContents, log_flights, suffixes_in_words
+from cpfls_cli.logs.formats import LogContents, about_flight, log_flights, suffixes_in_words
 from cpfls_cli.look.balance import RotorBalance
 from cpfls_cli.look.effectiveness import AxisPlant
 from cpfls_cli.look.flight import AXES
@@ -264,10 +264,11 @@ def _every(run: Run, name: str, path: Path, done: int, total: int) -> dict[str, 
     flights, found = log_flights(path), dict[str, Look]()
     if len(flights) == 1:
         try:
-            return {name: _one(run, path.name, flights[0], done, total)}
+            with about_flight(path):
+                return {name: _one(run, path.name, flights[0], done, total)}
         except InputError as error:
             # It is a log, but holds nothing to look at.
-            raise ComputationError(f"{path}: {str(error).removeprefix(f'{path.name}: ')}") from None
+            raise ComputationError(str(error)) from None
     for number, contents in enumerate(flights, 1):
         own, title = f"{name}-flight-{number}", f"{path.name}, flight {number} of {len(flights)}"
         run.take({"log": path}, own)

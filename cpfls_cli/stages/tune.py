@@ -19,13 +19,13 @@ from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.config.study import Study
-from cpfls_cli.errors import InputError, about
+from cpfls_cli.errors import InputError
 from cpfls_cli.export.parameter_files import parameter_file
 from cpfls_cli.flightlog.results import Flight, Imported
 from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_model
 from cpfls_cli.flights.recordings import read_whole
 from cpfls_cli.flights.training import numbered_roles
-from cpfls_cli.logs.formats import log_contents, read_log
+from cpfls_cli.logs.formats import about_flight, log_contents, read_log
 from cpfls_cli.look.effectiveness import effectiveness
 from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.gains import HOLDS, LogGains, TunedGains, tuned_gains
@@ -264,7 +264,7 @@ def _of_log(run: Run, log: Path, asked: AskedMargins) -> LogGains | None:
     # Of a log alone only the file for the ground station is written.
     asked_for, run.writes = run.output if run.writes else None, False
     contents = log_contents(log)
-    with about(log, InputError):
+    with about_flight(log):
         flight = read_flight(log.name, contents.topics, contents.units, contents.parameters, contents.system)
     if run.dry_run:
         return None

@@ -12,6 +12,7 @@ from cpfls_cli.rotations import body_rate
 from tests.builders.studies import VEHICLE
 
 NAMES = ["t", "roll", "pitch", "yaw", "mx", "my", "mz"]
+FIELDS = "each row needs one field for each column name; a field that holds a separator needs quotes"
 
 
 def rows():
@@ -92,8 +93,8 @@ def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):
         ("\n\n", "LOG: is empty; a log starts with a line of column names"),
         (",".join(NAMES) + "\n", "LOG: holds column names but no samples"),
         ("t,t,pitch\n0,1,2\n", "LOG: column 't' appears twice"),
-        (",".join(NAMES) + "\n0,0,0,0,0,0,0\n1,0,0\n", "LOG:3: 3 fields, but 7 column names"),
-        (",".join(NAMES) + "\n0,0,0,0,0,0,0,0\n", "LOG:2: 8 fields, but 7 column names"),
+        (",".join(NAMES) + "\n0,0,0,0,0,0,0\n1,0,0\n", f"LOG:3: 3 fields, but 7 column names: {FIELDS}"),
+        (",".join(NAMES) + "\n0,0,0,0,0,0,0,0\n", f"LOG:2: 8 fields, but 7 column names: {FIELDS}"),
         (",".join(NAMES) + "\n0,0,up,0,0,0,0\n", "LOG:2: column 'pitch' = 'up': not a number"),
         (",".join(NAMES) + "\n0,0,\x00,0,0,0,0\n", "LOG:2: column 'pitch' = '\\x00': not a number"),
         (",".join(NAMES) + "\n0,0,1_000,0,0,0,0\n", "LOG:2: column 'pitch' = '1_000': not a number"),

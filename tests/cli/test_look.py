@@ -1,5 +1,6 @@
 """`cpfls look` on logs of each autopilot, from the command line to what a person reads."""
 
+import gzip
 import re
 
 import numpy as np
@@ -102,6 +103,29 @@ def test_a_log_that_shows_no_flight_of_a_multirotor_is_refused_with_code_1(refus
 def test_what_is_no_log_is_refused_with_code_2(refuse, logs):
     assert refuse("look", logs) == [f"{logs}: is a folder; give its logs: cpfls look {logs}/*"]
     assert refuse("look", logs / "none.bbl") == [f"{logs / 'none.bbl'}: no such file"]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".csv.gz"])
+def test_a_whole_log_that_is_called_as_a_topic_of_px4_is_read(cpfls, tmp_path, suffix):
+    whole = flat_log(OWN)
+    whole.topics[""] = {"timestamp": whole.topics[""].pop("t"), **whole.topics[""]}
+    text = write_csv(tmp_path / "log.csv", whole).read_bytes()
+    log, config = tmp_path / f"log_vehicle_attitude_0{suffix}", tmp_path / "study.yaml"
+    log.write_bytes(gzip.compress(text) if suffix.endswith(".gz") else text)
+    assert "balance" in cpfls("look", log).stdout
+    cpfls("init", log, "--mass", 0.8, "--arm", 0.16, "-o", config)
+    cpfls("import", config, log, "-o", tmp_path / "flight.h5")
+
+
+@pytest.mark.parametrize(("command", "code"), [(("look",), 1), (("init", "-o", "study.yaml"), 2)])
+def test_one_topic_of_px4_alone_is_called_so(refuse, tmp_path, monkeypatch, command, code):
+    monkeypatch.chdir(tmp_path)
+    time = np.arange(0.0, 10.0, 0.05)
+    rows = [f"{round(1e6 * at)},{158 + at / 10}" for at in time]
+    (tmp_path / "log_vehicle_air_data_0.csv").write_text("\n".join(["timestamp,baro_alt_meter", *rows, ""]))
+    (said,) = refuse(command[0], "log_vehicle_air_data_0.csv", *command[1:], code=code)
+    assert said.startswith("log_vehicle_air_data_0.csv: by its name vehicle_air_data alone, one topic of a log of PX4")
+    assert "if it is a whole log: no column is recognised" in said
 
 
 def test_several_logs_are_a_table_and_a_page_each(cpfls, logs, tmp_path, monkeypatch):

@@ -49,6 +49,30 @@ def test_a_flight_that_comes_down_to_the_height_of_its_ground_is_one():
     assert flown.span_s == (pytest.approx(6.5, abs=0.1), pytest.approx(29.5, abs=0.1))
 
 
+def test_a_climb_begins_and_a_descent_ends_on_the_ground():
+    """From 5 s and to 35 s at 2 m/s, which is within a tenth of the highest for a second and more."""
+    height = np.clip(np.minimum(2 * (TIME - 5), 2 * (35 - TIME)), 0.0, None)
+    flown = flown_by(between(2, 36, 0.5), height, turning(5, 35))
+    assert flown.span_s == (pytest.approx(5.5, abs=0.2), pytest.approx(34.5, abs=0.2))
+
+
+def test_a_descent_that_is_cut_short_leaves_what_follows_on_the_ground():
+    height = np.interp(TIME, [3, 5, 11, 12.5, 26, 27, 34, 35], [0, 2, 2, 0, 0, 2, 2, 0])
+    flown = flown_by(between(3, 12, 0.5) + between(20, 36, 0.5), height, turning(3, 12) + turning(26, 35))
+    assert [tuple(map(round, own)) for own in flown.stretches_s] == [(4, 11), (27, 34)]
+
+
+@pytest.mark.parametrize("period", [1.0, 2.0])
+def test_a_flight_that_is_logged_once_a_second_or_less_is_found(period):
+    time = np.arange(0.0, 120.0, period)
+    flies = (time > 5) & (time < 110)
+    rotors, height = np.repeat(0.5 * flies[:, None], 4, axis=1), np.where(flies, 5 + np.sin(time), 0.0)
+    rate = 0.3 * np.sin(2 * time)[:, None] * [1.0, 0.0, 0.0]
+    found = find_flown(Signs(time=time, rotors=rotors, height=height, body_rate=rate))
+    assert found.span_s == (pytest.approx(6, abs=2.1), pytest.approx(109, abs=2.1))
+    assert found.ended == ""
+
+
 def test_idling_in_flips_is_part_of_the_flight():
     level = between(5, 35, 0.5) - between(15, 20, 0.42)
     lively = flown_by(level, None, turning(5, 35, 6.0))

@@ -21,9 +21,18 @@ from pyarrow import parquet
 
 from cpfls_cli import files
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.recognised import LogTable
 from cpfls_cli.logs import matrices
 from cpfls_cli.logs.csv_log import contents, row_lines
-from cpfls_cli.logs.formats import LOG_FORMATS, foreign_file, formats_in_words, is_log, log_contents, suffixes_in_words
+from cpfls_cli.logs.formats import (
+    LOG_FORMATS,
+    about_flight,
+    foreign_file,
+    formats_in_words,
+    is_log,
+    log_contents,
+    suffixes_in_words,
+)
 from tests.builders import blackbox_logs, ulogs
 from tests.builders.dataflash_logs import dataflash, definition
 from tests.builders.ros_bags import BEGIN_NS, imu, write_bag
@@ -239,7 +248,14 @@ def test_names_with_spaces_are_of_commas(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "first",
-    ["2024-05-01T12:00:59.5Z", "2024-05-01 12:00:59.5", "2024/05/01 12:00:59.5", "12:00:59.5", "7:00:59.5"],
+    [
+        "2024-05-01T12:00:59.5Z",
+        "2024-05-01 12:00:59.5 UTC",
+        "2024-05-01 12:00:59.5",
+        "2024/05/01 12:00:59.5",
+        "12:00:59.5",
+        "7:00:59.5",
+    ],
 )
 def test_dates_and_times_of_day_are_stamps_in_seconds(tmp_path: Path, first: str) -> None:
     second = first.replace("00:59.5", "01:00.75")
@@ -271,8 +287,38 @@ def test_a_column_that_is_empty_at_first_may_hold_words(tmp_path: Path) -> None:
 def test_a_last_line_that_was_cut_is_left_out_and_no_other_one(tmp_path: Path) -> None:
     own = contents(_written(tmp_path / "log.csv", "time,p,q\n0,1,2\n1,2,3\n2,3"))
     np.testing.assert_array_equal(own.topics[""]["time"], [0.0, 1.0])
-    with pytest.raises(InputError, match=r"log\.csv:3: 2 fields, but 3 column names$"):
+    with pytest.raises(InputError, match=r"log\.csv:3: 2 fields, but 3 column names: each row needs"):
         contents(_written(tmp_path / "log.csv", "time,p,q\n0,1,2\n1,2\n2,3,4\n"))
+
+
+def test_fields_in_quotes_may_hold_another_separator(tmp_path: Path) -> None:
+    own = contents(_written(tmp_path / "log.csv", 'time,places,p\n0,"[1;2]",3\n1,"[2;3]",4\n'))
+    np.testing.assert_array_equal(own.topics[""]["p"], [3.0, 4.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "topic"),
+    [
+        ("11_02_33_vehicle_air_data_0.csv", "vehicle_air_data"),
+        ("battery_status_1.csv.gz", "battery_status"),
+        ("log_vehicle_attitude_setpoint_0.csv", "vehicle_attitude_setpoint"),
+        ("test_vehicle_flight_1.csv", ""),
+        ("vehicle_attitude.csv", ""),
+        ("myvehicle_attitude_0.csv", ""),
+    ],
+)
+def test_what_has_no_flight_and_the_name_of_a_topic_of_px4_is_called_so(name: str, topic: str) -> None:
+    said = f"by its name {topic} alone, one topic of a log of PX4 as ulog2csv writes them: give the log .*: " * bool(
+        topic
+    )
+    with pytest.raises(InputError, match=f"{name}: {said}no flight in it$"), about_flight(Path(name)):
+        raise InputError("no flight in it")
+
+
+def test_what_comes_behind_a_slash_names_a_clock_in_a_group_alone() -> None:
+    time = np.linspace(0.0, 5.0, 500)
+    assert LogTable({"": {"data/x": np.cos(time), "data/t": time}}, {}).time_column == "data/t"
+    assert LogTable({"": {"gear deg/sec": 3 * time, "log_time": time}}, {}).time_column == "log_time"
 
 
 def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
