@@ -98,7 +98,7 @@ class Signs:
 
     def slower(self, most_hz: float) -> "Signs":
         """Take no more samples a second than are asked for; of each few the first."""
-        every = max(1, int(1 / (most_hz * self.period) + 0.01))
+        every = max(1, int(1 / (most_hz * self.period)))
         held = {each.name: getattr(self, each.name) for each in fields(self)}
         return replace(self, **{name: own[::every] for name, own in held.items() if own is not None})
 
