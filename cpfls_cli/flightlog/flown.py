@@ -242,9 +242,9 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
         high = first + np.flatnonzero(risen[first:after])
         if len(high):
             # What climbs or sinks without a pause from or to there flies as well.
-            stands = np.append(-1, np.flatnonzero(~rises[first : high[0]]))[-1]
+            still = np.append(-1, np.flatnonzero(~rises[first : high[0]]))[-1]
             lands = np.append(np.flatnonzero(~sinks[high[-1] : after]), after - high[-1] - 1)[0]
-            off[first + stands + 1 : high[-1] + lands + 1] = True
+            off[first + still + 1 : high[-1] + lands + 1] = True
     return smoothed(off, period, _SHORT_S)
 
 
