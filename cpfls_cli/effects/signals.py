@@ -11,7 +11,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
-from cpfls_cli.result import about, described_fields, result
+from cpfls_cli.result import BODY, WORLD, about, described_fields, result
 from cpfls_cli.vehicle.motion import Instant
 from cpfls_cli.vehicle.rotors import BodyWrench, allocation_matrix, body_wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -327,7 +327,6 @@ def white_noise(values: Array) -> Array:
 
 
 GIVEN, TRAINING, HELD_OUT = "given", "training", "held-out"  # Roles of flights: of a comparison, and of a diagnosis.
-_BODY, _WORLD = "body (FLU)", "world (z up)"
 
 
 @result
@@ -342,24 +341,24 @@ class RecordedFlight:
     )
     slow_rotors: str = about("what rotors that are logged rarely do not show, and the remedy", default="")
     time: Array = about("time on the clock of the flight", "sample", unit="s")
-    body_rate: Array = about("body rates p, q, r, as logged", "sample", "axis", unit="rad/s", frame=_BODY)
+    body_rate: Array = about("body rates p, q, r, as logged", "sample", "axis", unit="rad/s", frame=BODY)
     attitude: Array | None = about(
         "roll, pitch, yaw", "sample", "axis", unit="rad", frame="Euler angles (intrinsic ZYX)", default=None
     )
-    velocity: Array | None = about("velocity", "sample", "axis", unit="m/s", frame=_WORLD, default=None)
-    position: Array | None = about("position", "sample", "axis", unit="m", frame=_WORLD, default=None)
-    acceleration: Array | None = about("acceleration", "sample", "axis", unit="m/s^2", frame=_WORLD, default=None)
+    velocity: Array | None = about("velocity", "sample", "axis", unit="m/s", frame=WORLD, default=None)
+    position: Array | None = about("position", "sample", "axis", unit="m", frame=WORLD, default=None)
+    acceleration: Array | None = about("acceleration", "sample", "axis", unit="m/s^2", frame=WORLD, default=None)
     specific_force: Array | None = about(
-        "what an accelerometer senses", "sample", "axis", unit="m/s^2", frame=_BODY, default=None
+        "what an accelerometer senses", "sample", "axis", unit="m/s^2", frame=BODY, default=None
     )
     rotor_speed: Array | None = about(
-        "rotor speeds, measured or commanded", "sample", "rotor", unit="rad/s", frame=_BODY, default=None
+        "rotor speeds, measured or commanded", "sample", "rotor", unit="rad/s", frame=BODY, default=None
     )
     stated_torque: Array | None = about(
-        "torque of a log without rotor speeds", "sample", "axis", unit="N m", frame=_BODY, default=None
+        "torque of a log without rotor speeds", "sample", "axis", unit="N m", frame=BODY, default=None
     )
     stated_thrust: Array | None = about(
-        "thrust of such a log, along body z", "sample", unit="N", frame=_BODY, default=None
+        "thrust of such a log, along body z", "sample", unit="N", frame=BODY, default=None
     )
     voltage: Array | None = about("of the battery, as a share of the full one", "sample", default=None)
     setpoint_position: Array | None = about(
@@ -367,7 +366,7 @@ class RecordedFlight:
         "sample",
         "axis",
         unit="m",
-        frame=_WORLD,
+        frame=WORLD,
         default=None,
     )
 

@@ -22,7 +22,7 @@ from cpfls_cli.playback.balances import BANDS, band_windows
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.result import About
+from cpfls_cli.result import BODY, About
 from cpfls_cli.rounding import largest, less
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES
@@ -42,11 +42,8 @@ _MOST_NOISE = 0.1
 """Of the power of a band that may be noise of the sensors: with more, the residual is the noise's error."""
 
 
-_BODY = "body (FLU)"
-
-
 def _by_axis(text: str, unit: str = "1") -> About:
-    return About(text, ("axis",), unit=unit, frame=_BODY, gaps=True)
+    return About(text, ("axis",), unit=unit, frame=BODY, gaps=True)
 
 
 class LoopBounds(NamedTuple):
@@ -60,7 +57,7 @@ class LoopBounds(NamedTuple):
     explained: Annotated[Array, _by_axis("share of the rotation in a band that torque explains, the least")]
     band_hz: Annotated[Array, About("ends of bands, about", ("loop band", "2"), unit="Hz")] = np.zeros((0, 2))
     by_band: Annotated[
-        Array, About("share of the rotation that torque explains", ("loop band", "axis"), frame=_BODY, gaps=True)
+        Array, About("share of the rotation that torque explains", ("loop band", "axis"), frame=BODY, gaps=True)
     ] = np.zeros((0, 3))
     turning: Annotated[Array, _by_axis("body rate, root mean square", "rad/s")] = np.full(3, np.nan)
     missed: Annotated[

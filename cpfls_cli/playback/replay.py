@@ -27,7 +27,7 @@ from cpfls_cli.playback.errors import (
 )
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, contradictions_of
 from cpfls_cli.playback.player import Player, Runs, free_runs, still_runs
-from cpfls_cli.result import about, part, result
+from cpfls_cli.result import BODY, WORLD, about, part, result
 
 SIGNALS = ("position", "velocity", "attitude", "body_rate")
 """What errors are of, in the order of the compiled runs."""
@@ -391,7 +391,6 @@ USUAL = "usual"
 _WORST = 5
 """Windows that are listed."""
 _DRAWN_RUNS = 12
-_BODY, _WORLD = "body (FLU)", "world (z up)"
 
 
 @result
@@ -416,8 +415,8 @@ class WorstRun:
     start_s: float = about("begin of the window, on the clock of the flight", unit="s")
     error_rad_s: float = about("mean norm of the error of the body rate over the horizon", unit="rad/s")
     nothing_moves_rad_s: float = about("the same if nothing moves", unit="rad/s")
-    measured: Array = about("body rate of the flight", "sample", "axis", unit="rad/s", frame=_BODY, brief=False)
-    model: Array = about("body rate of the model", "sample", "axis", unit="rad/s", frame=_BODY, brief=False)
+    measured: Array = about("body rate of the flight", "sample", "axis", unit="rad/s", frame=BODY, brief=False)
+    model: Array = about("body rate of the model", "sample", "axis", unit="rad/s", frame=BODY, brief=False)
 
 
 @result
@@ -426,13 +425,13 @@ class DrawnRuns:
 
     flight: str = about("name of the flight")
     start_s: Array = about("begin of each run, on the clock of the flight", "run", unit="s")
-    measured: Array = about("body rate of the flight", "run", "sample", "axis", unit="rad/s", frame=_BODY, brief=False)
-    model: Array = about("body rate of the model", "run", "sample", "axis", unit="rad/s", frame=_BODY, brief=False)
+    measured: Array = about("body rate of the flight", "run", "sample", "axis", unit="rad/s", frame=BODY, brief=False)
+    model: Array = about("body rate of the model", "run", "sample", "axis", unit="rad/s", frame=BODY, brief=False)
     measured_position: Array | None = about(
-        "position of the flight", "run", "sample", "axis", unit="m", frame=_WORLD, brief=False, default=None
+        "position of the flight", "run", "sample", "axis", unit="m", frame=WORLD, brief=False, default=None
     )
     model_position: Array | None = about(
-        "position of the model", "run", "sample", "axis", unit="m", frame=_WORLD, brief=False, default=None
+        "position of the model", "run", "sample", "axis", unit="m", frame=WORLD, brief=False, default=None
     )
 
 
