@@ -13,6 +13,7 @@ from cpfls_cli.flightlog.names import BY_HAND
 from cpfls_cli.flightlog.repair import SignalTable, fill, increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
 from cpfls_cli.flightlog.stretches import live_rows
+from cpfls_cli.units import STANDARD_GRAVITY
 
 _OF_HOVER = 0.6  # Share of the level at hover below which rotors idle.
 _OF_LARGEST = 0.5  # Share of the largest level above which rotors carry the vehicle.
@@ -20,18 +21,15 @@ _SHORT_S = 1.0  # Shorter pauses are part of a flight, and shorter flights none.
 _OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05  # Above the ground it flies: as a share of the highest, and in m.
 _CLIMBS_M_S = 0.2  # Rate at which no estimate of height drifts for long.
 _MARGIN_S = 0.5  # Left out after take-off and before landing, where the ground pushes.
-# Below the first a vehicle stands, whatever an estimate of its height does; below the second it has to move.
-_STILL_RAD_S, _SOFT_RAD_S, _STILL_M = 0.005, 0.02, 0.3
-# Vibration on a bench at most, how far the mean of noise may be beyond what its number of samples makes it, and the
-# range of leans above which a vehicle moves.
-_SHAKES_RAD_S, _OF_NOISE, _LEANS_RAD = 0.3, 1.3, 0.01
-# Ranges of leans and of slow forces, in weights, of what surely moves; of slow forces of what does not, and of the
-# height that is estimated for it.
-_FAR_RAD, _PUSHED, _UNPUSHED, _DRIFT_M = 0.2, 0.3, 0.03, 1.0
+# Below the first rate of all a vehicle does not turn; means of rates, rad/s, and of forces, in weights, that nothing on
+# the ground has, and how far those of noise may be beyond what its number of samples makes them.
+_STILL_RAD_S, _SOFT_RAD_S, _PUSHED, _OF_NOISE = 0.005, 0.02, 0.03, 1.3
+# Rate of an estimated height on the ground at most; range of heights and leans that no hover keeps to where nothing
+# else is known, and of leans that no estimate has where no force is.
+_DRIFTS_M_S, _UNMOVED_M, _UNMOVED_RAD, _FAR_RAD = 0.12, 0.01, 0.01, 0.2
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
 # vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
 _SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
-_UNMOVED_M = 0.01  # Range of heights that no hover keeps to.
 # Range of squared commands, over their mean, whose thrust is felt in the air, unless it climbs by so many m; and the
 # share of it that is felt where something else holds the vehicle.
 _WORKS, _CLIMBS_M, _UNFELT = 1.0, 3.0, 0.12
@@ -147,10 +145,10 @@ def find_flown(signs: Signs) -> FlownPart:
     active = _lifted(signs, smoothed(active & ~rests.carried, signs.period, _SHORT_S))
     if not active.any():
         return _no_flight(f"{how} throughout")
-    if _still(signs, active):
-        return _no_flight("the vehicle neither turns nor moves")
     if held := _held(signs, active):
         return _no_flight(f"{held}, as on a test stand")
+    if _still(signs, active):
+        return _no_flight("the vehicle neither turns nor moves")
     return _longest(signs, active, rests, how)
 
 
@@ -249,25 +247,45 @@ def _off_the_ground(turning: BoolArray, height: Array, period: float) -> BoolArr
 
 
 def _still(signs: Signs, active: BoolArray) -> bool:
-    """Tell whether a vehicle whose rotors turn stands on the ground or is bound to a bench."""
-    height = signs.height
-    rises = 0.0 if height is None else float(np.ptp(height[active]))
-    leans, pushed = _leans(signs, active), _pushed(signs, active)
-    level = leans is not None and leans < _LEANS_RAD
-    if signs.turning is None or signs.slow is None:
-        return height is not None and (rises < _UNMOVED_M or (level and rises <= _STILL_M))
-    turning = float(np.sqrt(np.mean(signs.turning[active] ** 2)))
-    # Vibration of the rotors is no turning: its mean is that of noise.
-    slow = float(np.sqrt(np.mean(signs.slow[active] ** 2)))
-    shakes = turning < _SHAKES_RAD_S and slow < _OF_NOISE * turning / np.sqrt(SLOW_S / signs.period)
-    # An estimate of height drifts on the ground; what neither leans nor is pushed has not moved.
-    drifts = level and pushed is not None and pushed < _UNPUSHED and rises < _DRIFT_M
-    # Where a gyroscope reads next to nothing, of a dead one as of a simulated hover, leans, force and height say more.
-    if turning < _STILL_RAD_S:
-        lifts = (pushed is None or pushed >= _UNPUSHED) and rises > _STILL_M
-        return not (lifts or (leans or 0.0) > _FAR_RAD or (pushed or 0.0) > _PUSHED)
-    soft = turning < _SOFT_RAD_S
-    return (rises <= _STILL_M and ((shakes and (level or leans is None)) or soft)) or (soft and drifts)
+    """Tell whether a vehicle whose rotors turn stands on the ground or is bound to a bench.
+
+    Its rates and forces are those of vibration, and its height changes no faster than an estimate drifts, or so fast
+    that it would be felt.
+    """
+    if signs.rate is None:
+        height, leans = signs.height, _leans(signs, active)
+        return height is not None and float(np.ptp(height[active])) < _UNMOVED_M and (leans or 0.0) < _UNMOVED_RAD
+    if _moves(signs.rate, active, signs.period, (_SOFT_RAD_S, LIVELY_RAD_S)):
+        return False
+    if signs.felt is None:
+        return not ((_leans(signs, active) or 0.0) > _FAR_RAD or _climbs(signs, active, np.inf))
+    pushed = float(
+        np.ptp(averaged(signs.felt - np.median(signs.felt, axis=0), signs.period, SLOW_S)[active], axis=0).max()
+    )
+    return not (
+        _moves(signs.felt, active, signs.period, (_PUSHED, np.inf)) or _climbs(signs, active, max(pushed, _PUSHED))
+    )
+
+
+def _moves(values: Array, active: BoolArray, period: float, sizes: tuple[float, float]) -> bool:
+    """Tell whether slow means of what a sensor reads are above the first size and the mean of noise, or the second."""
+    values = np.where(active[:, None], values - np.median(values[active], axis=0), 0.0)
+    shakes, slow = (
+        np.sqrt((each[active] ** 2).sum(axis=1).mean()) for each in (values, averaged(values, period, SLOW_S))
+    )
+    return bool(slow > np.clip(_OF_NOISE * shakes / np.sqrt(max(1, round(SLOW_S / period))), *sizes))
+
+
+def _climbs(signs: Signs, active: BoolArray, felt: float) -> bool:
+    """Tell whether a height changes faster than it drifts, by accelerations, in weights, that were felt."""
+    second = max(1, round(1 / signs.period))
+    if signs.height is None or len(active) <= 2 * second:
+        return False
+    span, inner = second * signs.period, active[second:] & active[:-second]
+    rates = (signs.height[second:] - signs.height[:-second]) / span
+    needed = np.abs(rates[second:] - rates[:-second]) / span / STANDARD_GRAVITY
+    both = inner[second:] & inner[:-second]
+    return bool(np.abs(rates)[inner].max(initial=0.0) > _DRIFTS_M_S and needed[both].max(initial=0.0) < felt)
 
 
 def _held(signs: Signs, active: BoolArray) -> str:
@@ -322,14 +340,6 @@ def _leans(signs: Signs, active: BoolArray) -> float | None:
         return None
     upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[inner]), 0.0, 1.0)
     return float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95])))
-
-
-def _pushed(signs: Signs, active: BoolArray) -> float | None:
-    """Give the range of what an accelerometer feels, in weights, without vibration."""
-    inner = _inner(signs, active)
-    if signs.felt is None or not inner.any():
-        return None
-    return float(np.ptp(averaged(signs.felt, signs.period, SLOW_S)[inner], axis=0).max())
 
 
 def _inner(signs: Signs, active: BoolArray) -> BoolArray:
