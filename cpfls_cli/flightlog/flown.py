@@ -203,9 +203,13 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         if felt is not None:
             lively |= felt < _FALLS
         # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
-        turns_on = smoothed(level > ALIVE, signs.period, _LONGEST_CUT_S)
+        lively &= smoothed(level > ALIVE, signs.period, _LONGEST_CUT_S)
         first, last = np.flatnonzero(carrying)[[0, -1]]
-        carrying[first:last] |= (lively & turns_on)[first:last]
+        carrying[first:last] |= lively[first:last]
+        if felt is None:
+            # Once off the ground it hovers between flips and climbs, which are above it, at the usual level of a flight.
+            flight = smoothed(carrying, signs.period, _LONGEST_CUT_S)
+            carrying[first:] |= level[first:] > _OF_HOVER * (np.median(level[flight]) if flight.any() else hover)
     return smoothed(carrying, signs.period, _SHORT_S)
 
 
