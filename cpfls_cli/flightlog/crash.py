@@ -272,22 +272,17 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     troubled, hits, strained = (first + np.flatnonzero(own) for own in marked)
     stops = _stops_in_the_air(signs, after)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
-    # What falls since its rotors stopped hits the ground later.
-    lost = lost and not (stops and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S)
     # Who flips and lands, or ends the log in a flip, has lost nothing.
-    if lost and (len(hits) or lies_then or stops or _ignores_rotors(signs, part, int(troubled[0]))):
+    if lost and (lies_then or _ignores_rotors(signs, part, int(troubled[0]))):
         return _crash(signs, troubled, hits, strained)
     if rests_then:
         return {"rests with its rotors on": after}
     if stops:
-        hit = next((hit for fall, hit in _falls(signs) if 0 <= (fall - after) * signs.period < _THEN_S), None)
-        if hit is None and signs.felt is not None:
-            # By a force that its flight never had.
-            size = np.linalg.norm(signs.felt, axis=1)
-            least = max(HARD, BEYOND * float(size[slice(*part)].max()))
-            struck = after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
-            hit = int(struck[0]) if len(struck) else None
-        return {"rotors stop in the air": after} | ({} if hit is None else {"impact": hit})
+        # It hits by a force that its flight never had.
+        size = np.zeros(0) if signs.felt is None else np.linalg.norm(signs.felt, axis=1)
+        least = max(HARD, BEYOND * float(size[slice(*part)].max(initial=0.0)))
+        struck = after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
+        return {"rotors stop in the air": after} | ({"impact": int(struck[0])} if len(struck) else {})
     return {}
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from cpfls_cli.flightlog.crash import Signs
 from cpfls_cli.flightlog.flown import find_flown
@@ -275,3 +276,281 @@ def test_what_is_cut_is_said_of_what_does_not_fly():
         "the last 5.5 s are cut",
         "it also flies at 5.0 to 14.0 s; import.crop_s takes one stretch, the longest",
     ]
+
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def inside(time, begin, end, value, outside=0.0):
+    """A value from one time to another, numbers or rows."""
+    during = (time >= begin) & (time < end)
+    return np.where(during if np.size(value) in (1, len(time)) else during[:, None], value, outside)
+
+
+def signs_of(time, *, rotors=0.5, rate=0.3, rolls=0.0, noise=0.0, force=None, shakes=0.05, lean=None, height=None):
+    """Rotors, size of gentle turning and a roll, rad/s, force in weights, lean, height; noise of both sensors."""
+    rng, still = np.random.default_rng(0), 0 * time
+    waves = np.column_stack([np.sin(2 * time), np.cos(1.5 * time), 0.2 * np.sin(time)])
+    turns = waves * np.reshape(rate, (-1, 1)) + np.outer(still + rolls, [1.0, 0.0, 0.0])
+    return Signs(
+        time=time,
+        rotors=np.broadcast_to(np.reshape(rotors, (-1, 1 if np.ndim(rotors) < 2 else 4)), (len(time), 4)),
+        height=None if height is None else still + height,
+        body_rate=turns + np.reshape(noise, (-1, 1)) * rng.standard_normal(waves.shape),
+        upright=None if lean is None else np.cos(still + lean),
+        force=None if force is None else force + shakes * rng.standard_normal(waves.shape),
+    )
+
+
+def slow_climb(noise, lean=None):
+    """Ten metres in a minute, in a simulation: nothing but its height shows that it flies."""
+
+    def made(time):
+        s = time / 60
+        height = 10 + 10 * (6 * s**5 - 15 * s**4 + 10 * s**3)
+        felt = 1 + np.gradient(np.gradient(height, time), time) / 9.81
+        leans = None if lean is None else lean * np.sin(time / 5)
+        level = np.sqrt(felt) / 2
+        return {"rotors": level, "rate": 0, "noise": noise, "height": height, "lean": leans} | calm(felt)
+
+    return made
+
+
+def calm(felt):
+    return {"force": np.outer(felt, UP), "shakes": 0.002}
+
+
+def hover(noise):
+    """A few centimetres and hundredths of a rad about one place."""
+
+    def made(time):
+        force = UP + 0.05 * np.outer(np.sin(0.3 * time), [1, 0, 0])
+        slow = {"height": 1 + 0.05 * np.sin(0.3 * time), "lean": 0.02 + 0.03 * np.sin(0.2 * time)}
+        return {"rate": 0, "noise": noise, "force": force, "shakes": 0.01} | slow
+
+    return made
+
+
+def acrobatics(*known, idle=0.06, noise=0.0, hand=0.0):
+    """Two flights, between which it stands for 20 s."""
+
+    def made(time):
+        flies = inside(time, 3, 30, 1) + inside(time, 50, 77, 1) > 0
+        force = np.outer(np.where(flies, 1 + 0.8 * np.sin(2 * time), 1.0), UP)
+        signs = {"force": force, "height": np.convolve(np.where(flies, 5.0, 0.0), np.ones(100) / 100, "same")}
+        level = np.where(flies, 0.5, idle)
+        return {"rotors": level, "rate": np.where(flies, 3.0, hand), "noise": noise} | {
+            name: signs[name] for name in known
+        }
+
+    return made
+
+
+def profile(drag):
+    """Up at 10 m/s and down at 8 m/s by turns, with a drag so large, 1/m."""
+
+    def made(time):
+        asked = np.where(time % 150 < 75, 10.0, -8.0)
+        speed = lfilter([0.01], [1, -0.99], asked)
+        felt = 1 + np.gradient(speed, time) / 9.81
+        level = 0.4 * np.sqrt(np.maximum(felt + drag * speed * np.abs(speed) / 9.81, 0.05))
+        height = 100 + 0.01 * np.cumsum(speed)
+        return {"rotors": level, "rate": 0.1, "height": height, "force": np.outer(felt, UP), "shakes": 0.03}
+
+    return made
+
+
+def dead_rotor(begin, end):
+    """The third rotor reads zero."""
+    return lambda time: {
+        "rotors": (0.5 + 0.05 * np.sin(time))[:, None] * inside(time, begin, end, [1, 1, 0, 1], 1.0),
+        "force": UP,
+        "height": 5 + np.sin(time / 3),
+    }
+
+
+def bump(at, rows=1, **more):
+    return lambda time: {"force": inside(time, at, at + 0.01 * rows, [4.6, 0, 1], UP)} | more
+
+
+def bench(time, noise, **more):
+    return {"rotors": 0.4, "rate": 0, "noise": noise, "lean": 0.03 + 0 * time, "force": UP, "shakes": 0.02} | more
+
+
+def turned_over(shakes, rises):
+    """A bench whose attitude turns over, and height drifts."""
+    return lambda time: bench(time, 0.05, rate=0.02, shakes=shakes / 9.81, lean=0.15 * time, height=rises * time)
+
+
+def lies(seconds, *known):
+    """It hits the ground at 20 s, and lies on its side with its rotors on for so long."""
+
+    def made(time):
+        signs = {"force": inside(time, 0, 20, UP, [0, 1, 0]), "lean": inside(time, 20, np.inf, np.pi / 2 + 0.2)}
+        turns = {"rate": inside(time, 0, 20, 0.3), "rolls": inside(time, 20, 20.4, 4)}
+        return {"rotors": inside(time, 0, 20 + seconds, 0.5)} | turns | {name: signs[name] for name in known}
+
+    return made
+
+
+ALL, APART = ((0, np.inf),), ((3, 30), (50, 77))
+NO_MOMENT, RESTS = (), ("rests with its rotors on",)
+READ = {
+    **{
+        f"a slow climb, noise {own}": (60, slow_climb(*own), ALL)
+        for own in ((0.006, 0.002), (0.02, 0.002), (0.02, 0.03), (0.05,))
+    },
+    "a steady climb": (
+        60,
+        lambda t: {"rate": 0, "noise": 0.003, "height": 2 * t, "lean": 0.005 * np.sin(t)} | calm(1 + 0 * t),
+        ALL,
+    ),
+    "a dead gyroscope that climbs": (40, lambda t: {"rate": 0, "noise": 0.001, "height": 0.2 * t}, ALL),
+    "likewise, at one force": (40, lambda t: {"rate": 0, "noise": 0.001, "height": 0.2 * t} | calm(1 + 0 * t), ALL),
+    "likewise, that leans": (
+        40,
+        lambda t: (
+            {"rate": 0, "noise": 0.001, "height": 5 + np.sin(0.3 * t), "lean": 0.25 + 0.25 * np.sin(0.3 * t)}
+            | calm(1 + 0 * t)
+        ),
+        ALL,
+    ),
+    **{f"a calm hover, noise {noise}": (40, hover(noise), ALL) for noise in (0.0023, 0.009, 0.018)},
+    **{
+        f"idling that shakes by {noise}, {known}": (80, acrobatics(*known, noise=noise / np.sqrt(3)), APART)
+        for noise in (0.15, 0.25, 0.4)
+        for known in ((), ("force",), ("force", "height"))
+    },
+    "idling that is moved by hand": (80, acrobatics(hand=0.3), APART),
+    "carried by hand between two flights": (80, acrobatics("force", idle=0.0, hand=2.0), APART),
+    "moved with idling rotors, then a calm hover": (
+        120,
+        lambda t: {"rotors": inside(t, 70, 110, 0.5, 0.06), "rate": inside(t, 70, 110, 0.1, 0.5)},
+        ((70, 110),),
+    ),
+    "a flight, then moved with idling rotors": (
+        60,
+        lambda t: {"rotors": inside(t, 3, 20, 0.5, inside(t, 20, 50, 0.07)), "rate": inside(t, 3, 20, 1.0, 0.35)},
+        ((3, 20),),
+    ),
+    "acrobatics that end in a calm hover": (
+        45,
+        lambda t: {
+            "rotors": inside(
+                t, 2, 30, np.where(t % 2 < 0.5, 0.75, np.where(t % 2 < 1.2, 0.05, 0.2)), inside(t, 30, 45, 0.19)
+            ),
+            "rate": inside(t, 2, 30, 5.0, inside(t, 30, 45, 0.2)),
+        },
+        ((2, np.inf),),
+    ),
+    "a rotor that reads zero": (40, dead_rotor(0, 40), ALL),
+    "a rotor that reads zero for a while": (40, dead_rotor(15, 25), ALL),
+    **{
+        f"a cruise with trim {trim}": (
+            60,
+            lambda t, trim=trim: {
+                "rotors": 0.3 * (1 + np.outer(inside(t, 15, 45, trim), [1, -1, -1, 1])),
+                "lean": inside(t, 15, 45, 0.5),
+                "force": inside(t, 15, 45, [-0.4, 0, 0.9], UP),
+            },
+            ALL,
+        )
+        for trim in (0.2, 0.35, 0.45)
+    },
+    **{
+        f"a board tilted by {tilt} deg, trim {trim}": (
+            40,
+            lambda t, tilt=tilt, trim=trim: {
+                "rotors": [trim],
+                "force": np.array([np.sin(np.radians(tilt)), 0, np.cos(np.radians(tilt))]),
+            },
+            ALL,
+        )
+        for tilt in (20, 90)
+        for trim in ((0.4, 0.4, 0.2, 0.2), (0.45, 0.27, 0.27, 0.21))
+    },
+    **{f"a sideways jolt at {at} s": (40, bump(at), ALL) for at in (10, 30.5, 38.5, 39.5)},
+    **{f"a longer one at {at} s": (40, bump(at, 6, height=10), ALL) for at in (36, 38.5, 39.5)},
+    **{
+        f"a punch along {axis} before the log ends": (
+            40,
+            lambda t, axis=axis: {
+                "rotors": 0.4 * np.sqrt(inside(t, 38.3, 38.8, 4, 1)),
+                "force": np.outer(inside(t, 38.3, 38.8, 4, 1), np.eye(3)[axis]),
+            },
+            ALL,
+        )
+        for axis in (0, 2)
+    },
+    **{
+        f"a bench that is bumped, noise {noise}": (
+            60,
+            lambda t, noise=noise: bench(
+                t,
+                noise,
+                lean=0.03 + inside(t, 30, 31.5, 0.02),
+                force=UP + np.outer(inside(t, 30, 31.5, 0.02), [1, 0, 0]),
+                shakes=0.15,
+            ),
+            (),
+        )
+        for noise in (0.02, 0.1)
+    },
+    **{
+        f"a bench whose height drifts, noise {noise}": (
+            60,
+            lambda t, noise=noise: bench(t, noise, height=0.025 * t),
+            (),
+        )
+        for noise in (0.02, 0.1)
+    },
+    "a bench whose height runs away": (60, lambda t: bench(t, 0.005, height=100 * np.sin(0.3 * t) ** 2), ()),
+    **{
+        f"a bench whose attitude turns over, {own}": (60, turned_over(*own), ())
+        for own in ((0.1, 0), (0.5, 0.1), (1, 0), (3, 0.1))
+    },
+    **{f"up and down, drag {drag}": (300, profile(drag), ALL) for drag in (0.03, 0.08)},
+    "a landing with uneven rotors": (
+        60,
+        lambda t: {
+            "rotors": 0.5 + np.outer(inside(t, 30, 60, 0.15), [1, 1, -1, -1]),
+            "rate": inside(t, 0, 30, 0.3, 0.006),
+            "force": UP,
+            "shakes": 0.03,
+            "height": np.clip(30 - t, 0, 3),
+        },
+        ((0, 30),),
+        RESTS,
+    ),
+    **{
+        f"on its side for {seconds} s, {known}": (26 + seconds, lies(seconds, *known), ((0, 20),), RESTS)
+        for seconds in (0.8, 1.6, 2.5)
+        for known in (("lean",), ("force", "lean"))
+    },
+    **{
+        f"a throttle cut for {seconds} s": (
+            40,
+            lambda t, seconds=seconds: {
+                "rotors": inside(t, 20, 20 + seconds, 0, 0.5),
+                "rate": 1.0,
+                "force": np.outer(inside(t, 20, 20 + seconds, 0.05, 1), UP),
+                "shakes": 0.02,
+                "height": 60 - 4.9 * np.clip(t - 20, 0, seconds) ** 2,
+            },
+            ALL,
+        )
+        for seconds in (2.0, 2.8)
+    },
+}
+
+
+@pytest.mark.parametrize("case", READ.values(), ids=READ)
+def test_what_flies_of_drawn_flights(case):
+    """Each is read by one rule too many or too few easily; from s to s, and how it ends early."""
+    seconds, made, spans, *moments = case
+    time = np.arange(0.0, seconds, 0.01)
+    found = find_flown(signs_of(time, **made(time)))
+    assert found.flies == bool(spans)
+    assert [name for name, _ in found.moments] == list(*moments)
+    ends = np.array(found.stretches_s).reshape(-1, 2)
+    assert ends == pytest.approx(np.clip(spans, 0, time[-1]).reshape(-1, 2), abs=0.75)
