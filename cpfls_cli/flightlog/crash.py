@@ -124,12 +124,12 @@ def upright_of(attitude: Array | None, quaternion: Array | None, order: Literal[
 
 
 def averaged(values: Array, period: float, seconds: float) -> Array:
-    """Average values, shape (time,) or (time, column), over so many s around each sample, beyond the ends over 0."""
+    """Average values, shape (time,) or (time, column), over so many s around each sample."""
     width = max(1, round(seconds / period))
     if len(values) < width:
         return np.broadcast_to(values.mean(axis=0), values.shape)
     window = np.ones(width) / width
-    return np.asarray(correlate1d(np.asarray(values, dtype=float), window, axis=0, mode="constant"))
+    return np.asarray(correlate1d(np.asarray(values, dtype=float), window, axis=0, mode="mirror"))
 
 
 def smoothed(marked: BoolArray, period: float, shortest_s: float) -> BoolArray:

@@ -24,9 +24,9 @@ _MARGIN_S = 0.5  # Left out after take-off and before landing, where the ground 
 # Below the first rate of all a vehicle does not turn; means of rates, rad/s, and of forces, in weights, that nothing on
 # the ground has, and how far those of noise may be beyond what its number of samples makes them.
 _STILL_RAD_S, _SOFT_RAD_S, _PUSHED, _OF_NOISE = 0.005, 0.02, 0.03, 1.3
-# Rate of an estimated height on the ground at most; range of heights and leans that no hover keeps to where nothing
-# else is known, and of leans that no estimate has where no force is.
-_DRIFTS_M_S, _UNMOVED_M, _UNMOVED_RAD, _FAR_RAD = 0.12, 0.01, 0.01, 0.2
+# Rate of an estimated height on the ground at most; range of leans that no estimate has there, and of heights, m, and
+# leans, rad, that no hover keeps to.
+_DRIFTS_M_S, _FAR_RAD, _UNMOVED = 0.12, 0.2, 0.01
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
 # vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
 _SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
@@ -207,7 +207,7 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         first, last = np.flatnonzero(carrying)[[0, -1]]
         carrying[first:last] |= lively[first:last]
         if felt is None:
-            # Once off the ground it hovers between flips and climbs, which are above it, at the usual level of a flight.
+            # Once off the ground it hovers at the usual level of a flight, which its flips and climbs are above.
             flight = smoothed(carrying, signs.period, _LONGEST_CUT_S)
             carrying[first:] |= level[first:] > _OF_HOVER * (np.median(level[flight]) if flight.any() else hover)
     return smoothed(carrying, signs.period, _SHORT_S)
@@ -257,18 +257,13 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     that it would be felt.
     """
     if signs.rate is None:
-        height, leans = signs.height, _leans(signs, active)
-        return height is not None and float(np.ptp(height[active])) < _UNMOVED_M and (leans or 0.0) < _UNMOVED_RAD
-    if _moves(signs.rate, active, signs.period, (_SOFT_RAD_S, LIVELY_RAD_S)):
+        height = signs.height
+        return height is not None and max(float(np.ptp(height[active])), _leans(signs, active)) < _UNMOVED
+    if _moves(signs.rate, active, signs.period, (_SOFT_RAD_S, LIVELY_RAD_S)) or _climbs(signs, active):
         return False
     if signs.felt is None:
-        return not ((_leans(signs, active) or 0.0) > _FAR_RAD or _climbs(signs, active, np.inf))
-    pushed = float(
-        np.ptp(averaged(signs.felt - np.median(signs.felt, axis=0), signs.period, SLOW_S)[active], axis=0).max()
-    )
-    return not (
-        _moves(signs.felt, active, signs.period, (_PUSHED, np.inf)) or _climbs(signs, active, max(pushed, _PUSHED))
-    )
+        return _leans(signs, active) < _FAR_RAD
+    return not _moves(signs.felt, active, signs.period, (_PUSHED, np.inf))
 
 
 def _moves(values: Array, active: BoolArray, period: float, sizes: tuple[float, float]) -> bool:
@@ -280,16 +275,17 @@ def _moves(values: Array, active: BoolArray, period: float, sizes: tuple[float, 
     return bool(slow > np.clip(_OF_NOISE * shakes / np.sqrt(max(1, round(SLOW_S / period))), *sizes))
 
 
-def _climbs(signs: Signs, active: BoolArray, felt: float) -> bool:
-    """Tell whether a height changes faster than it drifts, by accelerations, in weights, that were felt."""
+def _climbs(signs: Signs, active: BoolArray) -> bool:
+    """Tell whether a height changes faster than it drifts, by accelerations that are felt."""
     second = max(1, round(1 / signs.period))
     if signs.height is None or len(active) <= 2 * second:
         return False
-    span, inner = second * signs.period, active[second:] & active[:-second]
-    rates = (signs.height[second:] - signs.height[:-second]) / span
+    most, span = np.inf, second * signs.period
+    if signs.felt is not None:
+        most = max(_PUSHED, float(np.ptp(averaged(signs.felt, signs.period, SLOW_S)[active], axis=0).max()))
+    rates = np.where(active[second:] & active[:-second], signs.height[second:] - signs.height[:-second], np.nan) / span
     needed = np.abs(rates[second:] - rates[:-second]) / span / STANDARD_GRAVITY
-    both = inner[second:] & inner[:-second]
-    return bool(np.abs(rates)[inner].max(initial=0.0) > _DRIFTS_M_S and needed[both].max(initial=0.0) < felt)
+    return bool(np.nanmax(np.abs(rates), initial=0.0) > _DRIFTS_M_S and np.nanmax(needed, initial=0.0) < most)
 
 
 def _held(signs: Signs, active: BoolArray) -> str:
@@ -326,32 +322,22 @@ def _held(signs: Signs, active: BoolArray) -> str:
 
 def _unfelt(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle feels no more where its rotors work much more."""
-    inner = _inner(signs, active)
     climbs = signs.height is not None and float(np.ptp(signs.height[active])) > _CLIMBS_M
-    if signs.level is None or signs.felt is None or climbs or not inner.any():
+    if signs.level is None or signs.felt is None or climbs:
         return False
-    squares, felt = (averaged(each, signs.period, SLOW_S)[inner] for each in (signs.level**2, signs.felt))
+    squares, felt = (averaged(each, signs.period, SLOW_S)[active] for each in (signs.level**2, signs.felt))
     thrust = np.median(felt, axis=0)
     ranges = (np.ptp(np.quantile(each, [0.05, 0.95])) for each in (squares / squares.mean(), felt @ thrust))
     works, feels = map(float, ranges)
     return works > _WORKS and feels < _UNFELT * works * float(thrust @ thrust)
 
 
-def _leans(signs: Signs, active: BoolArray) -> float | None:
-    """Give the range of leans, rad, without their vibration."""
-    inner = _inner(signs, active)
-    if signs.upright is None or not inner.any():
-        return None
-    upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[inner]), 0.0, 1.0)
+def _leans(signs: Signs, active: BoolArray) -> float:
+    """Give the range of leans, rad, without their vibration; 0 where none are known."""
+    if signs.upright is None:
+        return 0.0
+    upright = np.clip(np.abs(averaged(signs.upright, signs.period, SLOW_S)[active]), 0.0, 1.0)
     return float(np.ptp(np.quantile(np.arccos(upright), [0.05, 0.95])))
-
-
-def _inner(signs: Signs, active: BoolArray) -> BoolArray:
-    """Leave out the ends of a log, whose means go beyond it."""
-    edge = round(SLOW_S / signs.period)
-    inner = active.copy()
-    inner[:edge] = inner[len(inner) - edge :] = False
-    return inner
 
 
 def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> FlownPart:
