@@ -280,10 +280,10 @@ def _climbs(signs: Signs, active: BoolArray) -> bool:
     second = max(1, round(1 / signs.period))
     if signs.height is None or len(active) <= 2 * second:
         return False
-    most, span = np.inf, second * signs.period
+    most, span, height = np.inf, second * signs.period, averaged(signs.height, signs.period, SLOW_S)
     if signs.felt is not None:
         most = max(_PUSHED, float(np.ptp(averaged(signs.felt, signs.period, SLOW_S)[active], axis=0).max()))
-    rates = np.where(active[second:] & active[:-second], signs.height[second:] - signs.height[:-second], np.nan) / span
+    rates = np.where(active[second:] & active[:-second], height[second:] - height[:-second], np.nan) / span
     needed = np.abs(rates[second:] - rates[:-second]) / span / STANDARD_GRAVITY
     return bool(np.nanmax(np.abs(rates), initial=0.0) > _DRIFTS_M_S and np.nanmax(needed, initial=0.0) < most)
 
