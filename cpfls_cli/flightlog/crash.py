@@ -278,11 +278,12 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     if rests_then:
         return {"rests with its rotors on": after}
     if stops:
-        # It hits by a force that its flight never had.
+        # It ends a fall, or has a force that its flight never had.
+        struck = [hit for fall, hit in _falls(signs) if 0 <= (fall - after) * signs.period < _THEN_S]
         size = np.zeros(0) if signs.felt is None else np.linalg.norm(signs.felt, axis=1)
         least = max(HARD, BEYOND * float(size[slice(*part)].max(initial=0.0)))
-        struck = after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)
-        return {"rotors stop in the air": after} | ({"impact": int(struck[0])} if len(struck) else {})
+        struck += (after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)).tolist()
+        return {"rotors stop in the air": after} | ({"impact": struck[0]} if struck else {})
     return {}
 
 

@@ -24,9 +24,9 @@ _MARGIN_S = 0.5  # Left out after take-off and before landing, where the ground 
 # Below the first rate of all a vehicle does not turn; means of rates, rad/s, and of forces, in weights, that nothing on
 # the ground has, and how far those of noise may be beyond what its number of samples makes them.
 _STILL_RAD_S, _SOFT_RAD_S, _PUSHED, _OF_NOISE = 0.005, 0.02, 0.03, 1.3
-# Rate of an estimated height on the ground at most; range of leans that no estimate has there, and of heights, m, and
-# leans, rad, that no hover keeps to.
-_DRIFTS_M_S, _FAR_RAD, _UNMOVED = 0.12, 0.2, 0.01
+# Rate of an estimated height on the ground at most, and its range where no force changes; range of leans that no
+# estimate has there, and of heights, m, and leans, rad, that no hover keeps to.
+_DRIFTS_M_S, _DRIFTS_M, _FAR_RAD, _UNMOVED = 0.12, 1.0, 0.2, 0.01
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
 # vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
 _SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
@@ -276,16 +276,17 @@ def _moves(values: Array, active: BoolArray, period: float, sizes: tuple[float, 
 
 
 def _climbs(signs: Signs, active: BoolArray) -> bool:
-    """Tell whether a height changes faster than it drifts, by accelerations that are felt."""
+    """Tell whether a height changes faster and farther than it drifts, by accelerations that are felt."""
     second = max(1, round(1 / signs.period))
     if signs.height is None or len(active) <= 2 * second:
         return False
-    most, span, height = np.inf, second * signs.period, averaged(signs.height, signs.period, SLOW_S)
+    span, height, pushed = second * signs.period, averaged(signs.height, signs.period, SLOW_S), np.inf
     if signs.felt is not None:
-        most = max(_PUSHED, float(np.ptp(averaged(signs.felt, signs.period, SLOW_S)[active], axis=0).max()))
+        pushed = float(np.ptp(averaged(signs.felt, signs.period, SLOW_S)[active], axis=0).max())
     rates = np.where(active[second:] & active[:-second], height[second:] - height[:-second], np.nan) / span
-    needed = np.abs(rates[second:] - rates[:-second]) / span / STANDARD_GRAVITY
-    return bool(np.nanmax(np.abs(rates), initial=0.0) > _DRIFTS_M_S and np.nanmax(needed, initial=0.0) < most)
+    needed = np.nanmax(np.abs(rates[second:] - rates[:-second]), initial=0.0) / span / STANDARD_GRAVITY
+    far = pushed > _PUSHED or float(np.ptp(height[active])) > _DRIFTS_M
+    return bool(far and np.nanmax(np.abs(rates), initial=0.0) > _DRIFTS_M_S and needed < max(pushed, _PUSHED))
 
 
 def _held(signs: Signs, active: BoolArray) -> str:

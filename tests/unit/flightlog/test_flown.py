@@ -399,6 +399,12 @@ def lies(seconds, *known):
     return made
 
 
+def stops(time):
+    """Its rotors stop at 30 s, and it hits the ground less hard than something hit it in flight."""
+    force = inside(time, 10, 10.04, 12 * UP, inside(time, 30, 31.2, 0 * UP, inside(time, 31.2, 31.24, 8 * UP, UP)))
+    return {"rotors": inside(time, 0, 30, 0.5), "rate": inside(time, 0, 30, 0.3), "force": force, "shakes": 0.02}
+
+
 ALL, APART = ((0, np.inf),), ((3, 30), (50, 77))
 RESTS = ("rests with its rotors on",)
 READ = {
@@ -476,6 +482,7 @@ READ = {
         (),
     ),
     "a bench whose height drifts": (60, lambda t: bench(t, 0.02, height=0.025 * t), ()),
+    "a bench whose height sinks": (60, lambda t: bench(t, 0.003, height=np.clip(9 - 0.3 * t, 0, 0.7)), ()),
     "a bench whose height runs away": (60, lambda t: bench(t, 0.005, height=100 * np.sin(0.3 * t) ** 2), ()),
     **{
         f"a bench whose attitude turns over, {own}": (60, turned_over(*own), ())
@@ -499,6 +506,7 @@ READ = {
         for seconds in (0.8, 1.6, 2.5)
         for known in (("lean",), ("force", "lean"))
     },
+    "rotors that stop": (40, stops, ((0, 30),), ("rotors stop in the air", "impact")),
     "a throttle cut": (
         40,
         lambda t: {
