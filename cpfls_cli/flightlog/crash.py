@@ -166,7 +166,7 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
     calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
     lies = calm & _off_its_feet(signs, flies)
-    rests = calm & (lies | _stuck(signs, flies))
+    rests = calm & (lies | (active & _stuck(signs, flies)))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
     # A mean over a time says as much of all of it.
     carried = held | binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)

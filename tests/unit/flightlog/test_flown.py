@@ -489,6 +489,11 @@ READ = {
         for own in ((0.1, 0), (0.5, 0.1), (1, 0), (3, 0.1))
     },
     **{f"up and down, drag {drag}": (300, profile(drag), ALL) for drag in (0.03, 0.08)},
+    "a landing of a trimmed vehicle": (
+        40,
+        lambda t: {"rotors": np.outer(inside(t, 0, 30, 1.0), (0.8, 0.8, 0.2, 0.2)), "rate": inside(t, 0, 30, 0.3)},
+        ((0, 30),),
+    ),
     "a landing with uneven rotors": (
         60,
         lambda t: {
