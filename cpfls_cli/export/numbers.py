@@ -113,6 +113,9 @@ def _weighed(wrench: Vector, rotors: int) -> Array:
 
 
 _MOVING = {each for factors in TERMS for each in factors}
+_KNOWN = ("", *_AXES, "|u|", "|p|", "|q|", "|r|")
+_FACTORS = np.transpose([[_KNOWN.index(each) for each in (*factors, "", "")[:2]] for factors in TERMS])
+"""Places of both factors of each term; of one, or of none, others are 1."""
 
 
 def weights_of_model(model: VehicleModel) -> Array:
@@ -122,11 +125,9 @@ def weights_of_model(model: VehicleModel) -> Array:
 
 def motion_terms(air: Array, rate: Array) -> Array:
     """Evaluate the terms of the motion, shape (time, terms), of velocity through the air and rate, body frame, SI."""
-    sizes = {f"|{axis}|": np.abs(own) for axis, own in zip("pqr", rate.T, strict=True)}
-    values = dict(zip(_AXES, [*air.T, *rate.T], strict=True)) | sizes | {"|u|": np.linalg.norm(air, axis=1)}
-    return np.stack(
-        [math.prod((values[each] for each in factors), start=np.ones(len(air))) for factors in TERMS], axis=1
-    )
+    known = [np.ones(len(air)), *air.T, *rate.T, np.linalg.norm(air, axis=1), *np.abs(rate.T)]
+    first, second = np.stack(known)[_FACTORS]
+    return (first * second).T
 
 
 _ROLL, _PITCH, _YAW, _UP = 0, 1, 2, 5
