@@ -14,7 +14,7 @@ from cpfls_cli.dynamics import CELLS, InertiaFunctions, InertiaModel, body_inert
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.numbers import Numbers, motion_terms, spins, weights_of, weights_of_model
+from cpfls_cli.export.numbers import Numbers, motion_terms, spins, weights_by_part, weights_of_model
 from cpfls_cli.export.points import parts_of
 from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import Body, MeasuredMotion, PlaybackFlight
@@ -140,7 +140,7 @@ class Held:
     def whole(cls, model: VehicleModel) -> Self:
         """Hold everything."""
         acting = model.parts
-        parts = weights_of(acting, model.vehicle)
+        parts = weights_by_part(model)
         others = tuple(one for one in acting if one.name not in parts)
         levers = tuple(one for one in acting if one.of_all_forces)
         return cls(
@@ -166,7 +166,7 @@ class Held:
     def wrench(self, air: Array, rate: Array, rotor: Array) -> Array:
         """Compute torque and force, shape (samples, 6), N m and N, body frame."""
         by_rotor = np.tensordot(motion_terms(air, rate), self.weights, (1, 1))
-        total = np.einsum("tcu,tu->tc", by_rotor, rotor)
+        total: Array = np.einsum("tcu,tu->tc", by_rotor, rotor)
         if self.beyond:
             for column, component in enumerate(self._traced((*air.T, *rate.T, *rotor[:, 1:].T))):
                 total[:, column] += component
@@ -298,7 +298,7 @@ def _left(model: VehicleModel, whole: Held, holds: Holds) -> Iterator[tuple[str,
     rotors = model.rotors
     columns = {_ROTORS: slice(1 + rotors, 1 + 2 * rotors), _LINEAR: slice(1, 1 + rotors)}
     columns[_SLOW] = slice(1 + 3 * rotors, None)
-    parts = weights_of(model.parts, model.vehicle)
+    parts = weights_by_part(model)
     for name in (one.name for one in model.parts):
         title = CATALOGUE[name].title if name in CATALOGUE else _LEARNED
         if name == "rotors":
