@@ -224,6 +224,10 @@ def beyond_chance(chance: Array, value: float) -> float:
     return float((1 + (chance >= value).sum()) / (1 + len(chance)))
 
 
+_Part = tuple[Array, list[IntArray], IntArray]
+"""Directions, the numbers of each kind that they move, and which of them are losses."""
+
+
 class _Space:
     """Densities of numbers under no change and under each one, as mixtures of normal ones."""
 
@@ -263,32 +267,44 @@ class _Space:
         base = rows[:, :0] if given is None else given
         known: dict[tuple[bytes, ...], Array] = {}
 
-        def density(own: Array, losses: int) -> Array:
-            return self._density(rows, np.hstack([base, own]), base.shape[1] + np.arange(losses), known)
+        def density(key: tuple[bytes, ...], part: _Part) -> Array:
+            if key not in known:
+                known[key] = self._density(rows, *part)
+            return known[key]
+
+        without = self._moved(base, _NONE)
+
+        def gained(own: Array, losses: int) -> Array:
+            moved = self._moved(np.hstack([base, own]), base.shape[1] + np.arange(losses))
+            total = np.zeros(rows.shape[1])
+            # What neither moves is as likely with a change as without.
+            for one, other, sign in ((moved, without, 1), (without, moved, -1)):
+                for key in (key for key in one if key not in other):
+                    total += sign * density(key, one[key])
+            return total
 
         widths = np.log([[share] for _, share in _WIDTHS])
-        each = [
-            _total(widths + [density(width * self.white[index], self.listed[index].losses) for width, _ in _WIDTHS])
-            for index in of
-        ]
-        return np.array(each) - self._density(rows, base, _NONE, known)
+        return np.array(
+            [
+                _total(widths + [gained(width * self.white[index], self.listed[index].losses) for width, _ in _WIDTHS])
+                for index in of
+            ]
+        )
 
-    def _density(
-        self, rows: Array, directions: Array, losses: IntArray, known: dict[tuple[bytes, ...], Array]
-    ) -> Array:
-        """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,).
+    def _density(self, rows: Array, directions: Array, kinds: Sequence[IntArray], losses: IntArray) -> Array:
+        """Compute the logarithm of the density of whitened rows, but for what all have in common, shape (row,)."""
+        return _total(self._posterior(rows, directions, kinds, losses)[0])
+
+    def _moved(self, directions: Array, losses: IntArray) -> dict[tuple[bytes, ...], _Part]:
+        """Part numbers into such that no direction moves together, by what tells them apart.
 
         `losses`, shape (loss,): directions whose sizes are nearly always above 0.
-        `known`: densities of parts, which changes have in common; what is not there is added.
         """
-        total = np.zeros(rows.shape[1])
+        found: dict[tuple[bytes, ...], _Part] = {}
         for kinds, columns in self._parts(directions):
             own, lost = directions[:, columns], np.flatnonzero((columns[:, None] == losses).any(axis=1))
-            key = (np.concatenate(kinds).tobytes(), own.tobytes(), lost.tobytes())
-            if key not in known:
-                known[key] = _total(self._posterior(rows, own, kinds, lost)[0])
-            total += known[key]
-        return total
+            found[np.concatenate(kinds).tobytes(), own.tobytes(), lost.tobytes()] = own, kinds, lost
+        return found
 
     def _parts(self, directions: Array) -> list[tuple[list[IntArray], IntArray]]:
         """Part the kinds into such that no direction moves together: the numbers of each kind, and the directions."""
@@ -434,6 +450,11 @@ def _found(held: _Held, chance: Array, cable: float) -> list[tuple[Cause, Found]
     other.
     """
     space, row, _, _ = held
+
+    @cache
+    def believed(*there: int) -> Array:
+        return _beliefs(space, row, there)
+
     chosen: list[int] = []
     while len(chosen) < _MOST:
         evidence = _evidence_given(space, row, space.searched, chosen) + space.searched_prior
@@ -444,7 +465,7 @@ def _found(held: _Held, chance: Array, cable: float) -> list[tuple[Cause, Found]
         # What came first was chosen for what the others do too.
         for _ in range(2 * len(chosen)):
             others = chosen[1:]
-            beliefs = _beliefs(space, row, others)
+            beliefs = believed(*sorted(others))
             of_name = _by_name(space, beliefs)
             most = max(of_name, key=lambda name: of_name[name])
             chosen = [*others, max(space.ways(most), key=lambda at: beliefs[at])]
@@ -452,7 +473,7 @@ def _found(held: _Held, chance: Array, cable: float) -> list[tuple[Cause, Found]
         return []
     found = []
     for index in chosen:
-        beliefs = _beliefs(space, row, [other for other in chosen if other != index])
+        beliefs = believed(*sorted({*chosen} - {index}))
         cause, of_name = space.listed[index], _by_name(space, beliefs)
         order = sorted(of_name, key=lambda name: -of_name[name])
         listed = (name for name in order if name != cause.name and of_name[name] >= LISTED)

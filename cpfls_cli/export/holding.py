@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -13,7 +14,7 @@ from cpfls_cli.dynamics import CELLS, InertiaFunctions, InertiaModel, body_inert
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.numbers import Numbers, motion_terms, spins, weights_of, weights_of_model
+from cpfls_cli.export.numbers import Numbers, motion_terms, spins, weights_by_part, weights_of_model
 from cpfls_cli.export.points import parts_of
 from cpfls_cli.inertia import nearest_body
 from cpfls_cli.playback.flight import Body, MeasuredMotion, PlaybackFlight
@@ -24,7 +25,8 @@ from cpfls_cli.playback.windows import Flown, Rotors, Runs, Steps, errors_of_run
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.vehicle.motion import Acting, Vehicle
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.vehicle.values import ARRAYS, Vector
+from cpfls_cli.vehicle.tracing import Graph, traced_in_two
+from cpfls_cli.vehicle.values import Each, Vector, add, plus
 
 HORIZON_S = 0.5
 """How far ahead the size of what is missing is stated."""
@@ -138,7 +140,7 @@ class Held:
     def whole(cls, model: VehicleModel) -> Self:
         """Hold everything."""
         acting = model.parts
-        parts = weights_of(acting, model.vehicle)
+        parts = weights_by_part(model)
         others = tuple(one for one in acting if one.name not in parts)
         levers = tuple(one for one in acting if one.of_all_forces)
         return cls(
@@ -163,14 +165,23 @@ class Held:
 
     def wrench(self, air: Array, rate: Array, rotor: Array) -> Array:
         """Compute torque and force, shape (samples, 6), N m and N, body frame."""
-        terms = motion_terms(air, rate)
-        total = np.stack([np.einsum("tu,tu->t", terms @ own, rotor) for own in self.weights], axis=1)
-        speed, square, turning, slow = rotor[:, 1:].T.reshape(4, len(self.vehicle.rotors), -1)
-        motion = (tuple(air.T), tuple(rate.T), speed, turning, slow + square)
-        for _, wrench in parts_of(self.beyond, self.vehicle, motion, ARRAYS):
-            for column, component in enumerate(wrench):
+        by_rotor = np.tensordot(motion_terms(air, rate), self.weights, (1, 1))
+        total: Array = np.einsum("tcu,tu->tc", by_rotor, rotor)
+        if self.beyond:
+            for column, component in enumerate(self._traced((*air.T, *rate.T, *rotor[:, 1:].T))):
                 total[:, column] += component
         return total
+
+    @cached_property
+    def _traced(self) -> Callable[[tuple[Array, ...]], Vector]:
+        """Trace what is no sum of weights as one function of arrays: air velocity, rate, and terms of the rotors."""
+        graph = Graph()
+        moved = graph.inputs("moved", 6 + 4 * len(self.vehicle.rotors))
+        speed, square, turning, slow = np.reshape(np.array(moved[6:], dtype=object), (4, -1))
+        rotors = (Each(speed), Each(turning), Each(map(plus, slow, square)))
+        parts = parts_of(self.beyond, self.vehicle, (moved[:3], moved[3:6], *rotors))
+        step = traced_in_two(graph, ("of_none", ()), {"moved": moved}, [add(*(wrench for _, wrench in parts))])(())
+        return lambda given: step(given)[0]
 
     def along(self, flight: PlaybackFlight) -> Array:
         """Compute torque and force along a measured motion, shape (time, 6), N m and N, body frame."""
@@ -287,7 +298,7 @@ def _left(model: VehicleModel, whole: Held, holds: Holds) -> Iterator[tuple[str,
     rotors = model.rotors
     columns = {_ROTORS: slice(1 + rotors, 1 + 2 * rotors), _LINEAR: slice(1, 1 + rotors)}
     columns[_SLOW] = slice(1 + 3 * rotors, None)
-    parts = weights_of(model.parts, model.vehicle)
+    parts = weights_by_part(model)
     for name in (one.name for one in model.parts):
         title = CATALOGUE[name].title if name in CATALOGUE else _LEARNED
         if name == "rotors":

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from itertools import combinations_with_replacement, product
 
 import numpy as np
@@ -113,20 +113,27 @@ def _weighed(wrench: Vector, rotors: int) -> Array:
 
 
 _MOVING = {each for factors in TERMS for each in factors}
+_KNOWN = ("", *_AXES, "|u|", "|p|", "|q|", "|r|")
+_FACTORS = np.transpose([[_KNOWN.index(each) for each in (*factors, "", "")[:2]] for factors in TERMS])
+"""Places of both factors of each term; of one, or of none, others are 1."""
+
+
+@lru_cache(maxsize=8)
+def weights_by_part(model: VehicleModel) -> dict[str, Array]:
+    """Weigh the terms of all parts of a model, see `weights_of`; remembered, for each target asks several times."""
+    return weights_of(model.parts, model.vehicle)
 
 
 def weights_of_model(model: VehicleModel) -> Array:
     """Weigh the terms of all that is a sum of weights, shape (6, terms, 1 + 4 rotors)."""
-    return np.asarray(sum(weights_of(model.parts, model.vehicle).values()))
+    return np.asarray(sum(weights_by_part(model).values()))
 
 
 def motion_terms(air: Array, rate: Array) -> Array:
     """Evaluate the terms of the motion, shape (time, terms), of velocity through the air and rate, body frame, SI."""
-    sizes = {f"|{axis}|": np.abs(own) for axis, own in zip("pqr", rate.T, strict=True)}
-    values = dict(zip(_AXES, [*air.T, *rate.T], strict=True)) | sizes | {"|u|": np.linalg.norm(air, axis=1)}
-    return np.stack(
-        [math.prod((values[each] for each in factors), start=np.ones(len(air))) for factors in TERMS], axis=1
-    )
+    known = [np.ones(len(air)), *air.T, *rate.T, np.linalg.norm(air, axis=1), *np.abs(rate.T)]
+    first, second = np.stack(known)[_FACTORS]
+    return np.asarray(first * second).T
 
 
 _ROLL, _PITCH, _YAW, _UP = 0, 1, 2, 5

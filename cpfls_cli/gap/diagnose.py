@@ -120,7 +120,7 @@ def diagnose(
             flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
             across = gusts.found.size[3:5]
             searched = _named(flights, settings, rng, progress)
-            named = _by_instruments(searched, given, across)
+            named = _judged_with_lags(_significant(searched, given), given, across)
             if _wrong_inertia(named):
                 named = _at_stated_inertia(searched, flights, given, across) or named
             gusts = _gusts(named, given, settings)
@@ -259,13 +259,8 @@ def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | No
     return air(found.hypothesis, found.estimates.linear, found.block, given, settings)
 
 
-def _by_instruments(named: _Named, given: Instruments, across: Array) -> _Named:
-    """Judge what was named with the numbers that instruments identify, without what is 0 by them.
-
-    A loop that answers gusts looks like a lag, so lags are named where they are significant by instruments.
-
-    `across`: gusts along x and y, shape (2,), N.
-    """
+def _significant(named: _Named, given: Instruments) -> _Named:
+    """Give what was named the numbers that instruments identify, without what is 0 by them."""
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
     while True:
         found = by_instruments(fit, given)
@@ -288,16 +283,29 @@ def _by_instruments(named: _Named, given: Instruments, across: Array) -> _Named:
             refusals.append(Refusal(effect.name, f"by instruments {what} may be 0"))
         fit = fewer
     loose = tuple(effect.name for effect in unidentified(fit, found))
+    sure = {each.effect.name: chance for each, chance in kept if np.isfinite(chance)}
+    by_them = named.judgement._replace(found=found)
+    return named._replace(judgement=by_them, refusals=refusals, sure=sure, unidentified=loose)
+
+
+def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Named:
+    """Judge what is significant by instruments, and name lags where they are.
+
+    A loop that answers gusts looks like a lag.
+
+    `across`: gusts along x and y, shape (2,), N.
+    """
+    found, refusals = named.judgement.found, named.refusals
     lags = decided_by_instruments(found, named.effects, given)
-    judgement = judge.judge(with_lean(lags.found, across))
+    judgement = named.judge.judge(with_lean(lags.found, across))
     if not lags.chances:
-        refusals += [
+        refusals = refusals + [
             Refusal(each.effect.name, "a loop that answers gusts looks alike, and instruments do not identify it")
             for each in found.hypothesis.chosen
             if each.effect.is_lag
         ]
-    sure = {each.effect.name: chance for each, chance in kept if np.isfinite(chance)} | lags.chances
-    return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure, unidentified=loose)
+    sure = {**named.sure, **lags.chances}
+    return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure)
 
 
 def _at_stated_inertia(named: _Named, flights: _Flights, given: Instruments, across: Array) -> _Named | None:
@@ -313,9 +321,11 @@ def _at_stated_inertia(named: _Named, flights: _Flights, given: Instruments, acr
     for scored in rank_effects(held, chosen, tried, found.settings, None, floor=found.floor).ranking:
         fit = fitted(held, scored.chosen, found.floor, found.settings)
         fit = fit._replace(hypothesis=system(flights.training, fit.hypothesis.chosen))
-        other = _by_instruments(named._replace(judgement=named.judgement._replace(found=fit)), given, across)
-        if scored.candidate.effect.name in other.sure and not _wrong_inertia(other):
-            return other
+        kept = _significant(named._replace(judgement=named.judgement._replace(found=fit)), given)
+        if scored.candidate.effect.name in kept.sure:
+            other = _judged_with_lags(kept, given, across)
+            if not _wrong_inertia(other):
+                return other
     return None
 
 

@@ -65,7 +65,8 @@ def space(listed, freedom=6.0, kinds=("thrust",) * 3):
 def test_density_of_no_change_is_a_multivariate_t_of_each_kind():
     own, covariance = space([], kinds=["thrust"] * 3 + ["delay"] * 2)
     rows = np.random.default_rng(1).normal(size=(5, 5)) * np.linspace(0.2, 3.0, 5)[:, None]
-    result = own._density(own.whitened(rows.T), np.zeros((5, 0)), np.arange(0), {})
+    parts = own._moved(np.zeros((5, 0)), np.arange(0)).values()
+    result = sum(own._density(own.whitened(rows.T), *part) for part in parts)
     expected = sum(
         multivariate_t(shape=covariance[part, part], df=6.0).logpdf(rows[:, part]) for part in (np.s_[:3], np.s_[3:])
     )
