@@ -382,7 +382,7 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         return
     inertia = symmetric(signals.vehicle.inertia_kg_m2)
     momentum = signals.body_rate @ inertia
-    turned = own.derivative(momentum) + own.average(rotations.cross(signals.body_rate, momentum))
+    turned = own.balance(rotations.cross(signals.body_rate, momentum), momentum)
     assert signals.torque is not None, "rotor speeds are there"
     assert signals.thrust is not None, "rotor speeds are there"
     found = _followed(own, inside, turned, np.column_stack([signals.torque, signals.thrust]))
@@ -478,7 +478,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     assert signals.thrust is not None, "rotor speeds are there"
     # Over the vehicle's own mass, for a load's is a share of that.
     drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
-    left = (own.derivative(signals.velocity[:, :2]) - own.average(drives))[inside]
+    left = own.balance(-drives, signals.velocity[:, :2])[inside]
     drag = own.average(signals.velocity[:, :2])[inside]
     columns = _LOAD.columns
     assert columns is not None, "the load pulls"

@@ -21,6 +21,7 @@ from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rounding import less
 from cpfls_cli.simulation.model import late_effects
+from cpfls_cli.vehicle.rotors import with_factors
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -82,7 +83,7 @@ def thrust_put_in(refit: Refit, vehicle: VehicleSettings) -> VehicleSettings:
     Result: the same vehicle where no thrust is named.
     """
     scale, _, yaw = _of_thrust(refit)
-    return vehicle if scale == 1.0 else _lifting(vehicle, scale, scale if yaw else 1.0)
+    return vehicle if scale == 1.0 else with_factors(vehicle, scale, scale if yaw else 1.0)
 
 
 def above_thrust(refit: Refit, first: Refit, vehicle: VehicleSettings) -> tuple[Refit, VehicleSettings]:
@@ -106,7 +107,7 @@ def above_thrust(refit: Refit, first: Refit, vehicle: VehicleSettings) -> tuple[
         for each in refit.estimates.parameters
     )
     model, estimates = replace(refit.model, parameters=parameters), replace(refit.estimates, parameters=numbers)
-    return replace(refit, model=model, estimates=estimates), _lifting(vehicle, rest, rest if yaw else 1.0)
+    return replace(refit, model=model, estimates=estimates), with_factors(vehicle, rest, rest if yaw else 1.0)
 
 
 def _of_thrust(refit: Refit) -> tuple[float, list[str], bool]:
@@ -120,16 +121,6 @@ def _of_thrust(refit: Refit) -> tuple[float, list[str], bool]:
     # What flights do not show has no width beyond rounding.
     yaw = about_z is None or not less(1 + about_z.low, 1 + about_z.high) or "inertia_z" in right
     return 1.0 + numbers["thrust_scale"].value, right, yaw
-
-
-def _lifting(vehicle: VehicleSettings, thrust: float, yaw: float) -> VehicleSettings:
-    rotors = (
-        replace(
-            each, thrust_factor_n_s2=thrust * each.thrust_factor_n_s2, drag_factor_n_m_s2=yaw * each.drag_factor_n_m_s2
-        )
-        for each in vehicle.rotors
-    )
-    return replace(vehicle, rotors=tuple(rotors))
 
 
 def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:

@@ -44,6 +44,7 @@ from cpfls_cli.playback.parameters import (
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse
 from cpfls_cli.playback.windows import STATES, Flown, Rotors, Slopes
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
+from cpfls_cli.vehicle.rotors import with_factors
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import Graph, Symbol, array_symbols, traced_in_two
 from cpfls_cli.vehicle.values import (
@@ -109,29 +110,17 @@ class VehicleAt:
     @cached_property
     def vehicle(self) -> VehicleSettings:
         """The vehicle with what was found as its own numbers."""
-        thrust, drag, stated = self.get(THRUST, 1.0), self.get(DRAG, 1.0), self.free.vehicle
-        rotors = tuple(
-            replace(
-                rotor,
-                thrust_factor_n_s2=rotor.thrust_factor_n_s2 * thrust,
-                drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * drag,
-            )
-            for rotor in stated.rotors
-        )
+        found = with_factors(self.free.vehicle, self.get(THRUST, 1.0), self.get(DRAG, 1.0))
         xx, yy, zz, xy, xz, yz = (float(self.inertia[entry]) for entry in INERTIA_ENTRIES)
         inertia = (xx, yy, zz, xy, xz, yz)
-        return replace(stated, mass_kg=self.mass, rotors=rotors, inertia_kg_m2=inertia, unknown=())
+        return replace(found, mass_kg=self.mass, inertia_kg_m2=inertia, unknown=())
 
     @cached_property
     def effects(self) -> tuple[ModelEffect, ...]:
         """Effects, their coefficients counted on this vehicle and not on the stated one: some share its thrust."""
-        effects, stated = [], self.free.vehicle
+        effects = []
         # As runs fly them: with the stated thrust, and a drag that changed by as much more than the thrust.
-        rotors = tuple(
-            replace(each, drag_factor_n_m_s2=each.drag_factor_n_m_s2 * self._acting_number(DRAG_OVER_THRUST))
-            for each in stated.rotors
-        )
-        flown = replace(stated, rotors=rotors)
+        flown = with_factors(self.free.vehicle, 1.0, self._acting_number(DRAG_OVER_THRUST))
         for block in self.free.effects:
             before, found = (unit_wrenches(block, vehicle) for vehicle in (flown, self.vehicle))
             ratio = (before * found).sum(axis=(1, 2)) / (found**2).sum(axis=(1, 2))

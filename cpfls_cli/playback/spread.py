@@ -25,7 +25,7 @@ from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
 from cpfls_cli.playback.vehicle import FoundNumber, FoundVehicle, bodily
-from cpfls_cli.vehicle.rotors import figures_of_vehicle
+from cpfls_cli.vehicle.rotors import figures_of_vehicle, with_factors
 from cpfls_cli.vehicle_limits import broken_limits
 
 MOMENTS = tuple(f"inertia.{name}" for name in INERTIA_PARAMETERS[:3])
@@ -250,20 +250,12 @@ def model_at(model: VehicleModel, numbers: Sequence[FoundNumber], row: Array) ->
     values = dict(zip((number.name for number in numbers), row.tolist(), strict=True))
     begun = {number.name: number.value for number in numbers}
     thrust, drag = (values[name] / begun[name] if name in begun else 1.0 for name in (THRUST, DRAG))
-    rotors = tuple(
-        replace(
-            rotor,
-            thrust_factor_n_s2=rotor.thrust_factor_n_s2 * thrust,
-            drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * drag,
-        )
-        for rotor in model.vehicle.rotors
-    )
     xx, yy, zz, xy, xz, yz = _inertia(model, values).tolist()
     response = model.response
     slow = {name: values.get(own, getattr(response, name)) for own, name in _SLOW_NAMES}
     return replace(
         model,
-        vehicle=replace(model.vehicle, rotors=rotors, inertia_kg_m2=(xx, yy, zz, xy, xz, yz)),
+        vehicle=replace(with_factors(model.vehicle, thrust, drag), inertia_kg_m2=(xx, yy, zz, xy, xz, yz)),
         thrust_linear=_thrust_linear(model, numbers, values),
         response=replace(
             response, lag_s=values.get(LAG, response.lag_s), delay_s=values.get(DELAY, response.delay_s), **slow

@@ -124,10 +124,7 @@ class WeakFlight:
 
     def averaged(self, columns: Columns) -> Array:
         """Average columns, or a residual, over the windows, shape (window, 6, ...)."""
-        rows = self.windows.average(columns.direct)
-        if columns.momentum is not None:
-            rows = rows + self.windows.derivative(columns.momentum)
-        return self.of_channels(rows)
+        return self.of_channels(self.windows.balance(columns.direct, columns.momentum))
 
     @cached_property
     def innovations(self) -> WeakFlight:

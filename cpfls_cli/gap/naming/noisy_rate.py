@@ -12,7 +12,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import FEWEST_BLOCKS, MOST_BLOCKS, contiguous
 from cpfls_cli.effects.signals import white_noise
 from cpfls_cli.gap.balance.balance_system import residual_along
-from cpfls_cli.gap.balance.noise_floor import modulated
 from cpfls_cli.gap.naming.estimate import NamedFit, estimates_of, places_of
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.rounding import tied
@@ -87,7 +86,7 @@ class _Balance:
         highest = int(min(ends) * samples * self.period)
         if highest < FEWEST_SAMPLES:
             return
-        at = modulated(own, np.arange(1, highest) / (samples * self.period))
+        at = own.modulated(np.arange(1, highest) / (samples * self.period))
         self.hop, self.average, self.differentiate = own.hop, at.weight / size, -at.slope / size
         power, fine = np.abs(np.fft.fft(self.average, 4 * samples, axis=0)).T ** 2, np.fft.fftfreq(4 * samples)
         near = np.abs(fine) < (highest + 3) / samples

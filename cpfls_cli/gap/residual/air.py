@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from weakref import ref
 
 import numpy as np
 
@@ -116,7 +117,8 @@ def known_motion(flights: Sequence[Signals]) -> Instruments:
 
     Flights that were asked to stay where they are, and did, were asked for nothing that moves.
     """
-    return flights[0].once((known_motion, *flights), lambda: _known_motion(flights))
+    # A flight that holds itself would be freed only by the garbage collector.
+    return flights[0].once((known_motion, *map(ref, flights)), lambda: _known_motion(flights))
 
 
 def _known_motion(recorded: Sequence[Signals]) -> Instruments:

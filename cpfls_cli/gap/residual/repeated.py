@@ -286,12 +286,14 @@ class RepeatedRuns:
         length = max(block_length(samples * band.period) / band.period, float(len(band.weight)))
         found: dict[tuple[int, int], Array] = {}
         for number, other in self.pairs:
-            middles = np.arange(band.count(len(cut[number]))) * band.hop + len(band.weight) // 2
+            middles = band.middles([slice(0, len(cut[number]))])
             first, place = repeats.path(number, len(cut[number]))
             # Too short a run has no window.
             if not len(middles):
                 continue
-            mine, theirs = _averaged(band, cut[number]), _averaged(band, repeats.at(number, other, cut[other]))
+            mine, theirs = (
+                band.balance(*each.swapaxes(0, 1)) for each in (cut[number], repeats.at(number, other, cut[other]))
+            )
             known = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(place[middles])
             block = np.where(known, place[middles] // length, -1)
             for each in np.unique(block[known]):
@@ -303,7 +305,10 @@ class RepeatedRuns:
         """Estimate the mean squares of a gap by white noise, shape (6, band); NaN behind a filter."""
         numbers = sorted({self.given.runs[number].flight for number in self.used})
         bands = [band.windows.alternating() for band in self.bands]
-        squares = [[np.mean(_averaged(band, sides[number])[:, 0] ** 2, axis=0) for band in bands] for number in numbers]
+        squares = [
+            [np.mean(band.balance(*sides[number][:, :, 0].swapaxes(0, 1)) ** 2, axis=0) for band in bands]
+            for number in numbers
+        ]
         filtered = np.any([np.isfinite(flights[number].cut_off) for number in numbers], axis=0)
         return np.where(filtered[:, None], np.nan, np.mean(squares, axis=0).T)
 
@@ -345,15 +350,10 @@ def _bands(period: float) -> Iterator[Band]:
 
 
 def _sides(residual: Columns, motion: Columns) -> Array:
-    """Arrange residual and inertial side, each as momentum and direct term, shape (time, 2, 2, 6)."""
+    """Arrange direct term and momentum, each of residual and inertial side, shape (time, 2, 2, 6)."""
     none = np.zeros_like(residual.direct)
-    parts = [(none if each.momentum is None else each.momentum, each.direct) for each in (residual, motion)]
-    return np.stack([np.stack(each, axis=1) for each in parts], axis=1)
-
-
-def _averaged(band: Windows, sides: Array) -> Array:
-    """Average both sides over windows, shape (window, 2, 6)."""
-    return band.derivative(sides[:, :, 0]) + band.average(sides[:, :, 1])
+    momenta = [none if each.momentum is None else each.momentum for each in (residual, motion)]
+    return np.stack([np.stack(each, axis=1) for each in ((residual.direct, motion.direct), momenta)], axis=1)
 
 
 def _products(mine: Array, theirs: Array) -> Array:

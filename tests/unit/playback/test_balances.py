@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.playback.balances import Balances, PastBalances, averaged
+from cpfls_cli.playback.balances import Balances, PastBalances
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.model import Airflow
@@ -93,7 +93,9 @@ def test_the_residual_is_what_the_model_leaves_of_the_motion(flights):
     bands = len(balances.bands_hz)
     for number, band in enumerate(balances.bands):
         changing, acting = (momentum, torque) if number < bands else (STATED.mass_kg * motion.velocity, force)
-        residual = averaged(band, flight, changing, changes=True) + averaged(band, flight, acting)
+        residual = band.over(flight.stretches, band.derivative, changing) + band.over(
+            flight.stretches, band.average, acting
+        )
         assert sums.xtx[:, number, :, 0, 0].sum(axis=0) == pytest.approx((residual**2).sum(axis=0), rel=1e-9)
 
 
