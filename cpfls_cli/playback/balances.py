@@ -91,7 +91,7 @@ class Equations:
         """Check whether those of another vehicle follow: its rotors respond alike, and it has no other numbers."""
         own, free = self.at.free, other.at.free
         # Numbers of a remainder mean something else with other rules; those of no remainder have none.
-        rules = own.key[2:] == free.key[2:] or LEARNED.keys().isdisjoint(free.blocks)
+        rules = own.rules == free.rules or LEARNED.keys().isdisjoint(free.blocks)
         alike = own.vehicle == free.vehicle and rules and self.at.response == other.at.response
         # Only what is not 0 is differentiated by times of the response.
         return alike and {*free.index} <= {*own.index} and (not other.at.times or other._in_use <= self._in_use)

@@ -18,7 +18,7 @@ from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
 from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, six_parameters, symmetric
 from cpfls_cli.playback.flight import Body, PlaybackFlight
-from cpfls_cli.playback.model import Airflow, ModelEffect, VehicleModel, learned_wrench, of_thrust
+from cpfls_cli.playback.model import ModelEffect, VehicleModel, learned_wrench, of_thrust
 from cpfls_cli.playback.parameters import (
     AS_STATED,
     COUNTED,
@@ -216,12 +216,12 @@ class VehicleAt:
         pushed : bool
             Whether something pushes on top.
         """
-        function = traced_step(*self.free.key, translates, pushed)((period, *self.values.tolist()))
+        function = traced_step(self.free, translates, pushed)((period, *self.values.tolist()))
         return Flown(Vehicle(self.free.vehicle, ()), self._body, traced=function)
 
     def slopes(self, pushes: int = 0) -> Slopes:
         """Differentiate its accelerations by all numbers, or by those of what pushes on top."""
-        numbers, places, function = traced_slopes(*self.free.key, pushes)
+        numbers, places, function = traced_slopes(self.free, pushes)
         return Slopes(numbers, places, function(tuple(self.values.tolist())))
 
     @cached_property
@@ -323,15 +323,10 @@ class _Traced:
 
 @lru_cache(maxsize=256)
 def traced_step(
-    vehicle: VehicleSettings,
-    blocks: tuple[str, ...],
-    breakpoints: tuple[float, ...],
-    order: int,
-    translates: bool,
-    pushed: bool,
+    free: FreeNumbers, translates: bool, pushed: bool
 ) -> Callable[..., Callable[..., tuple[Vector, Vector]]]:
     """Make a function of a period and of numbers that gives one of a step of the vehicle; see `Flown.traced`."""
-    own = _Traced(FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order)))
+    own = _Traced(free)
     period, state, rotors = *own.graph.inputs("period", 1), own.graph.inputs("state", 18), own.inputs("rotors", 3)
     push = own.graph.inputs("push", 6 if pushed else 0)
     step = own.flown.stepped(state, Rotors(rotors[0], rotors[1], rotors[2], push or None), period, translates)
@@ -341,13 +336,12 @@ def traced_step(
 
 @lru_cache(maxsize=256)
 def traced_slopes(
-    vehicle: VehicleSettings, blocks: tuple[str, ...], breakpoints: tuple[float, ...], order: int, pushes: int
+    free: FreeNumbers, pushes: int
 ) -> tuple[int, tuple[tuple[int, int], ...], Callable[..., Callable[..., Vector]]]:
     """Make a function of the numbers that gives derivatives of the accelerations; see `Slopes`.
 
     With so many `pushes` on top it is differentiated by those, and not by the numbers of the vehicle.
     """
-    free = FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order))
     own = _Traced(free, differentiated=not pushes)
     motion, rotors = own.graph.inputs("motion", 15), own.inputs("rotors", 3)
     times_of = [free.index[name] for name in TIMES if name in free.index and not pushes]

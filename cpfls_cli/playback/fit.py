@@ -333,7 +333,7 @@ class SideBySide:
         flown = legs(self.flown(at), self.runs, self.steps(at))
         if len(self.owner) > MOST_RUNS:
             return flown
-        key = (at.free.key, at.values.tobytes())
+        key = (at.free, at.values.tobytes())
         if self._last.get("key") != key:
             self._last.update(key=key, legs=list(flown))
         found: list[Leg] = self._last["legs"]

@@ -9,11 +9,10 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.balances import Balances, PastBalances
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.instruments import instruments
-from cpfls_cli.playback.model import Airflow
-from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, blocks_of
+from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, Rules, blocks_of
 from tests.builders.playback_flights import STATED, flown, truth
 
-FREE = FreeNumbers(STATED, blocks_of(STATED), Airflow(np.array([0.0, 1.0]), 0))
+FREE = FreeNumbers(STATED, blocks_of(STATED), Rules(1, 0))
 NAMED = replace(FREE, chosen=tuple(block for block in FREE.chosen if block not in LEARNED))
 
 
