@@ -28,7 +28,6 @@ from cpfls_cli.playback.parameters import (
     LAG,
     LAW,
     LEARNED,
-    LOG_COUNTED,
     LOG_INERTIA,
     LOG_MASS,
     MASS,
@@ -60,6 +59,14 @@ from cpfls_cli.vehicle.values import (
     zero,
 )
 
+_POSITIVE = {
+    **{log: (f"inertia.{name}", "kg m^2") for log, name in zip(LOG_INERTIA, INERTIA_PARAMETERS, strict=False)},
+    THRUST: ("thrust_factor", "N s^2"),
+    DRAG: ("drag_factor", "N m s^2"),
+    LOG_MASS: ("mass", "kg"),
+    SLOW: ("slow_actuation.slow_s", "s"),
+}
+"""Numbers of a fit that people know by another name and unit, and that cannot be below 0."""
 TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
 """Times of the response that numbers are."""
 DRAG_OVER_THRUST = "drag_over_thrust"
@@ -147,35 +154,27 @@ class VehicleAt:
     @property
     def physical(self) -> dict[str, Physical]:
         """All numbers as people know them, in order: moments of inertia, factors of the first rotor, SI."""
-        free, inertia, rotor = self.free, self.inertia, self.free.vehicle.rotors[0]
-        coefficients = dict(self.coefficients)
+        free, rotor = self.free, self.free.vehicle.rotors[0]
+        entries = (self.inertia.item(entry) for entry in INERTIA_ENTRIES)
+        stated = dict(zip((*LOG_INERTIA, *PRODUCT_NAMES), entries, strict=True))
+        stated |= {
+            THRUST: self.get(THRUST, 1.0) * rotor.thrust_factor_n_s2,
+            DRAG: self.get(DRAG, 1.0) * rotor.drag_factor_n_m_s2,
+            LOG_MASS: self.mass,
+        }
+        others = {SLOW: self.response.slow_s, **self.coefficients}
         for effect in self.effects:
             names = (number.name for number in free.of_block(effect.name))
-            coefficients |= dict(zip(names, effect.coefficients.tolist(), strict=True))
+            others |= dict(zip(names, effect.coefficients.tolist(), strict=True))
         found: dict[str, Physical] = {}
         for number, value in zip(free.numbers, self.values.tolist(), strict=True):
-            name, stated = number.name, number.block not in free.vehicle.unknown
-            if name in LOG_INERTIA:
-                axis = LOG_INERTIA.index(name)
-                known = Physical(float(inertia[axis, axis]), "kg m^2", positive=True, stated=stated)
-                found[f"inertia.{INERTIA_PARAMETERS[axis]}"] = known
-            elif name in PRODUCT_NAMES:
-                row, column = INERTIA_ENTRIES[3 + PRODUCT_NAMES.index(name)]
-                found[name] = Physical(float(inertia[row, column]), "kg m^2", stated=True)
-            elif name == THRUST:
-                factor = value * rotor.thrust_factor_n_s2
-                found["thrust_factor"] = Physical(factor, "N s^2", positive=True, stated=stated)
-            elif name == DRAG:
-                factor = value * rotor.drag_factor_n_m_s2
-                found["drag_factor"] = Physical(factor, "N m s^2", positive=True, stated=stated)
-            elif name in LOG_COUNTED:
-                found[name] = Physical(value, "")
-            elif name == LOG_MASS:
-                found["mass"] = Physical(self.mass, "kg", positive=True, stated=True)
-            elif name == SLOW:
-                found["slow_actuation.slow_s"] = Physical(float(np.exp(value)), "s", positive=True)
-            else:
-                found[name] = Physical(coefficients.get(name, value), number.unit)
+            name, unit = _POSITIVE.get(number.name, (number.name, number.unit))
+            found[name] = Physical(
+                stated.get(number.name, others.get(number.name, value)),
+                unit,
+                positive=number.name in _POSITIVE,
+                stated=number.name in stated and number.block not in free.vehicle.unknown,
+            )
         return found
 
     def rotor_terms(self, flight: PlaybackFlight, samples: IntArray, by: str = "") -> Array:
@@ -391,6 +390,15 @@ class Group(NamedTuple):
     differs: tuple[str, ...]
 
 
+def _column(name: str) -> cached_property[Array]:
+    """Gather what all numbers have by a name, shape (number,)."""
+
+    def column(free: JointNumbers) -> Array:
+        return np.array([getattr(number, name) for number in free.numbers], dtype=float)
+
+    return cached_property(column)
+
+
 @dataclass(frozen=True)
 class JointNumbers:
     """The free numbers of all configurations: those of the vehicle of the config, then what others have of theirs."""
@@ -426,38 +434,19 @@ class JointNumbers:
         """Place of each number by name."""
         return {number.name: place for place, number in enumerate(self.numbers)}
 
-    @cached_property
-    def starts(self) -> Array:
-        """Stated numbers, shape (number,)."""
-        return self._column("start")
-
-    @cached_property
-    def scales(self) -> Array:
-        """Natural sizes of changes, shape (number,)."""
-        return self._column("scale")
-
-    @cached_property
-    def lows(self) -> Array:
-        """Lower bounds, shape (number,)."""
-        return self._column("low")
-
-    @cached_property
-    def highs(self) -> Array:
-        """Upper bounds, shape (number,)."""
-        return self._column("high")
-
-    @cached_property
-    def spreads(self) -> Array:
-        """Standard deviations of what is believed before, in scales, shape (number,)."""
-        return self._column("spread")
+    starts = _column("start")
+    """Stated numbers."""
+    scales = _column("scale")
+    """Natural sizes of changes."""
+    lows, highs = _column("low"), _column("high")
+    """Bounds."""
+    spreads = _column("spread")
+    """Standard deviations of what is believed before, in scales."""
 
     @cached_property
     def prior(self) -> Prior:
         """What is believed before flights are seen, in scales."""
         return Prior(self.starts / self.scales, self.spreads / np.sqrt(PRIOR))
-
-    def _column(self, name: str) -> Array:
-        return np.array([getattr(number, name) for number in self.numbers], dtype=float)
 
     def named(self, values: Array) -> dict[str, float]:
         """Name values."""

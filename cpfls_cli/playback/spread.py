@@ -20,7 +20,7 @@ from cpfls_cli.inertia import (
     six_parameters,
     symmetric,
 )
-from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
+from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
@@ -286,15 +286,15 @@ def _gusts_drawn(
 ) -> Iterator[Gusts | None]:
     """Draw the gusts of each vehicle."""
     gusts = found.disturbance
-    known = None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES))
-    if known is None:
+    if gusts is None or gusts.gusts is None:
         yield from [None] * len(heavier)
         return
-    size = _factors_drawn(known.size, known.low, known.high, rng.standard_normal(heavier.shape))
-    memory = _factors_drawn(known.memory, known.memory_low, known.memory_high, rng.standard_normal(heavier.shape))
+    normal = rng.standard_normal((2, *heavier.shape))[..., : len(gusts.size)]
+    size = _factors_drawn(gusts.size, gusts.low, gusts.high, normal[0])
+    memory = _factors_drawn(gusts.memory, gusts.memory_low, gusts.memory_high, normal[1])
     white = np.zeros(len(GUST_AXES)) if model.gusts is None else model.gusts.white
     for own, own_size, own_memory in zip(heavier, size, memory, strict=True):
-        yield Gusts(own_size * own, own_memory, white * own)
+        yield Gusts.known(own_size * own[: len(own_size)], own_memory)._replace(white=white * own)
 
 
 _NORMAL = 1.959964
