@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics import inertia_tensor, positive_definite
+from cpfls_cli.dynamics import positive_definite
 from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.hooks import VehicleParts
@@ -16,7 +16,7 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, Refit, plain
 from cpfls_cli.gap.naming.causes import of_thrust
-from cpfls_cli.inertia import INERTIA_ENTRIES
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rounding import less
@@ -31,7 +31,7 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleM
     `vehicle`: that the effects were fitted with.
     Result: with the inertia of before where the one that comes with the effects is that of no body.
     """
-    given, fuzzy = inertia_tensor(vehicle), extended.base
+    given, fuzzy = symmetric(vehicle.inertia_kg_m2), extended.base
     parts, times = _parts(extended, vehicle)
     corrected = given + inertia_correction(extended.parameters, vehicle)
     effects = (*_numbers(extended.parameters, vehicle, corrected), *(ModelEffect(*each) for each in parts.effects))
@@ -128,7 +128,7 @@ def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
 
     `vehicle`: that they were fitted with. Raises ComputationError.
     """
-    inertia = inertia_tensor(vehicle) + _parts(extended, vehicle)[0].inertia
+    inertia = symmetric(vehicle.inertia_kg_m2) + _parts(extended, vehicle)[0].inertia
     if extended.base is None and not positive_definite(inertia[None]).all():
         raise ComputationError("not extended: with the named effects, the inertia is not that of any body")
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS, block_length, half_width, jackknife_error
-from cpfls_cli.dynamics import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, negligible, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.settings import COUNTS
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, fitting_bands
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.instruments import Instruments, instruments
@@ -261,7 +261,7 @@ class RepeatedRuns:
             low=np.array([band.low for band in self.bands]),
             high=np.array([band.high for band in self.bands]),
             noise=np.where(known, self._noise(flights, sides), np.nan),
-            resists=np.array([*np.diag(inertia_tensor(body)), *[body.mass_kg] * 3]),
+            resists=np.array([*np.diag(symmetric(body.inertia_kg_m2)), *[body.mass_kg] * 3]),
             flights=tuple(dict.fromkeys(self.names[self.given.runs[number].flight] for number in self.used)),
             paths=sum(not set(path).isdisjoint(self.used) for path in self.given.repeats.paths()),
             runs=len(self.used),
