@@ -14,7 +14,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.estimation.estimate import Prior
-from cpfls_cli.gauss_newton import damped_step, minimised
+from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.playback.evaluation import JointNumbers, VehicleAt
 from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight, motion_at
 from cpfls_cli.playback.model import VehicleModel
@@ -165,7 +165,7 @@ class Fitted(FittedNumbers):
 
 @dataclass(frozen=True)
 class FitPoint:
-    """A fit at values of its numbers; see `cpfls_cli.gauss_newton.Point`.
+    """A fit at values of its numbers.
 
     `loss` is without the prior, which is in scales. `derivatives` gives gradient and Hessian: they cost ten times the
     loss, and a step that fails, or is the last one, needs none.
@@ -193,6 +193,11 @@ class FitPoint:
         """Of the objective, in scales of the numbers."""
         return self._in_scales[1]
 
+    def step(self, damping: float, bounds: tuple[Array, Array]) -> Array:
+        """Solve for a damped step within bounds, in scales of the numbers."""
+        room = ((bound - self.values) / self.scales for bound in bounds)
+        return damped_step(self.hessian, self.gradient, damping, *room)
+
     @cached_property
     def _in_scales(self) -> tuple[Array, Array]:
         (gradient, hessian), scales, prior = self.derivatives(), self.scales, self.prior
@@ -200,6 +205,62 @@ class FitPoint:
             gradient * scales - prior.pull(self.values / scales),
             hessian * scales[:, None] * scales + np.diag(prior.precision),
         )
+
+
+_DAMPING = 1e-3
+"""Share of the diagonal: that of the first step of a fit, nearly a Gauss-Newton step."""
+
+_DAMPING_UP, _DAMPING_DOWN, _LEAST_DAMPING = 6.0, 5.0, 1e-9
+"""It is raised by more than it is lowered, so that it settles."""
+
+_TRIES = 8
+"""Of one step: the damping is a million times larger then, and a step that still fails is rounding."""
+
+
+def minimised(
+    evaluate: Callable[[Array], FitPoint],
+    point: FitPoint,
+    bounds: tuple[Array, Array],
+    steps: int,
+    tolerance: float,
+    damping: float = _DAMPING,
+) -> FitPoint:
+    """Minimise an objective by damped steps within bounds.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Gives the point at values.
+    point : FitPoint
+        To start from.
+    bounds : tuple of array, shape (number,)
+    steps : int
+        At most.
+    tolerance : float
+        Relative decrease of the objective, by a step or expected of an undamped one, below which it has come to its
+        end.
+    damping : float
+        Share of the diagonal at first.
+    """
+    for _ in range(steps):
+        if tolerance:
+            # By how much the quadratic model falls with a step that is hardly damped.
+            step = point.step(_LEAST_DAMPING, bounds)
+            if -step @ (point.gradient + 0.5 * point.hessian @ step) < tolerance * point.objective:
+                break
+        for _ in range(_TRIES):
+            step = point.scales * point.step(damping, bounds)
+            following = evaluate(np.clip(point.values + step, *bounds))
+            if following.objective < point.objective:
+                break
+            damping *= _DAMPING_UP
+        else:
+            break
+        damping = max(damping / _DAMPING_DOWN, _LEAST_DAMPING)
+        decrease, point = point.objective - following.objective, following
+        if decrease < tolerance * point.objective:
+            break
+    return point
 
 
 def fit(
@@ -244,7 +305,7 @@ def fit_parts(
         def evaluated(values: Array) -> FitPoint:
             return at(tuple(values.tolist())).mean(kept)
 
-        return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
+        return minimised(evaluated, point, bounds, steps, tolerance)
 
     every = part >= 0
     values = dict.fromkeys(tuple(np.clip(free.values(known), *bounds).tolist()) for known in starts)
@@ -478,9 +539,6 @@ _QUICK = 100
 
 _UNSEEN = 3.0
 """How many times as fast about an axis a part turns, at least, that is nothing like the others."""
-
-_DAMPING = 1e-3
-"""Share of the diagonal: that of the first step of a fit."""
 
 
 def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> list[list[FitWindows]]:

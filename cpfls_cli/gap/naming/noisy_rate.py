@@ -114,7 +114,8 @@ class _Balance:
         named = {each.name: float(value) for each, value in zip(self.effect.shapes, shapes, strict=True)}
         assert self.effect.filters is not None, "asked for"
         passing = self.effect.filters(named, self.period)
-        return self._rows([passing.along(each) for each in self.momenta], self.differentiate), passing.gain(self.turn)
+        column = self._rows([passing.along(each) for each in self.momenta], self.differentiate)
+        return column, passing.gain(np.exp(-self.turn))
 
     def _products(self, columns: Sequence[Array]) -> Array:
         """Multiply torque of the rest, inertial torque and columns, shape (window, frequency, 3, side, side)."""
