@@ -288,12 +288,9 @@ def _estimates(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Itera
 def _averaged(names: list[str], values: Array, flies: BoolArray, of: Callable[[Array], Array]) -> _Numbers:
     """Compute numbers of means over a flight, with their errors by blocks of it left out."""
     flown = values[flies]
-    block = contiguous(len(flown), ENOUGH_BLOCKS)
-    sums = np.array([flown[block == number].sum(axis=0) for number in range(ENOUGH_BLOCKS)])
-    count = np.bincount(block, minlength=ENOUGH_BLOCKS).reshape(-1, *(1,) * (flown.ndim - 1))
     with np.errstate(divide="ignore", invalid="ignore"):
-        left_out = np.array([of(mean) for mean in (sums.sum(axis=0) - sums) / (count.sum() - count)])
-        return names, of(flown.mean(axis=0)), jackknife_error(left_out)
+        whole, left_out = leaving_out(lambda kept: of(flown[kept].mean(axis=0)), len(flown), ENOUGH_BLOCKS)
+        return names, whole, jackknife_error(left_out)
 
 
 def _thrust_shares(signals: Signals) -> Array:

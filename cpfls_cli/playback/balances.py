@@ -179,7 +179,7 @@ class Equations:
             return found
 
         response, index = self.at.response, self.at.free.index
-        slopes = {index[name]: filled(response.slope_at_samples, TIMES[name]) for name in self.at.times}
+        slopes = {index[name]: filled(response.terms_at_samples, TIMES[name]) for name in self.at.times}
         if SLOW in index:
             # The number is the logarithm of the slow time.
             slopes[index[SLOW]] *= response.slow_s

@@ -192,7 +192,7 @@ class VehicleAt:
         if not by:
             return np.asarray(flight.rotor_terms(*self.times_of_response)[samples])
         response, slow = self.response, SLOW in self.free.index
-        slopes = flight.of_speeds(partial(response.slope_by_step, by=TIMES[by], slow=slow))
+        slopes = flight.of_speeds(partial(response.terms_by_step, by=TIMES[by], slow=slow))
         # The number is the logarithm of the slow time.
         return np.asarray(slopes[samples] * (response.slow_s if by == SLOW else 1.0))
 
