@@ -99,19 +99,18 @@ def windows_of(
     In errors of "rate stays" a quiet flight would rule the fit, in plain errors the liveliest. All times in s; a step
     of runs is one sample at least.
     """
-    periods = [flight.motion.period for flight in flights]
-    every = [max(1, int(min(step_s, horizon_s) / period + 1e-9)) for period in periods]
-    horizons = [max(1, round(horizon_s / (own * period))) for own, period in zip(every, periods, strict=True)]
-    starts = [
-        flight.starts(own * horizon, max(1, round(interval_s / period)))
-        for flight, own, horizon, period in zip(flights, every, horizons, periods, strict=True)
-    ]
-    scales = [rate_stays(*each) for each in zip(flights, starts, horizons, every, strict=True)]
-    lively = np.array([scale.mean(axis=0) for scale in scales])
+    found = []
+    for flight in flights:
+        period = flight.motion.period
+        every = max(1, int(min(step_s, horizon_s) / period + 1e-9))
+        horizon = max(1, round(horizon_s / (every * period)))
+        starts = flight.starts(every * horizon, max(1, round(interval_s / period)))
+        found.append((flight, starts, rate_stays(flight, starts, horizon, every), every))
+    lively = np.array([scale.mean(axis=0) for *_, scale, _ in found])
     weight = np.sqrt(lively.max(axis=0) / np.where(lively > 0, lively, np.inf))
     return [
-        FitWindows(flight, start, loss_of(flight, scale * np.where(own > 0, own, 1.0)), step)
-        for flight, start, scale, own, step in zip(flights, starts, scales, weight, every, strict=True)
+        FitWindows(flight, starts, loss_of(flight, scale * np.where(own > 0, own, 1.0)), every)
+        for (flight, starts, scale, every), own in zip(found, weight, strict=True)
     ]
 
 

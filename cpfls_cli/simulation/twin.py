@@ -519,21 +519,21 @@ def compared(
     def found(index: int) -> TwinChannel:
         own, other = measured[:, index], simulated[:, index]
         estimate, judged, follows = _answers(flight, _input_of(flight, asked, index), own, other, instrument)
-        rms = root_mean_square((own - other)[:, None])[0]
+        rms = float(root_mean_square(own - other))
         following, floor, least = np.full_like(own, np.nan), np.nan, np.nan
         if follows is not None:
             following = follows
-            floor = float(np.sqrt(max(rms**2 - root_mean_square(following[:, None])[0] ** 2, 0.0)))
-            least = _LEAST * float(root_mean_square(own[:, None], about_mean=True)[0])
+            floor = float(np.sqrt(max(rms**2 - float(root_mean_square(following)) ** 2, 0.0)))
+            least = _LEAST * float(root_mean_square(own, about_mean=True))
         difference, followed = (
-            np.array([root_mean_square(values[each, None])[0] for each in cut]) for values in (own - other, following)
+            np.array([root_mean_square(values[each]) for each in cut]) for values in (own - other, following)
         )
         apart = _is_apart(difference, followed, floor, least)
         first = np.flatnonzero(apart)
         unknown = np.zeros(0, dtype=complex)
         return TwinChannel(
             **vars(judged),
-            rms=float(rms),
+            rms=rms,
             floor=floor,
             first_apart_s=float(flight.time[cut[first[0]].start]) if len(first) else np.nan,
             frequency=np.zeros(0) if estimate is None else estimate.frequency,
@@ -597,7 +597,7 @@ def windows(flight: LoggedFlight) -> list[slice]:
 
 
 def root_mean_square(values: Array, *, about_mean: bool = False) -> Array:
-    """Take the root mean square of each column where it is known, NaN where nowhere."""
+    """Take the root mean square over time where it is known, NaN where nowhere."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     held = np.where(known, values, 0.0)

@@ -171,16 +171,9 @@ def _lags_and_delay(
     model: VehicleModel | None, effects: SimulatedEffects, rotor_lag: float
 ) -> tuple[float, float, float]:
     """Give lag, delay, and the time of slow actuation, s, of all between command and torque."""
-    lags = [
-        one.effect.actuation.lag(one.values)
-        for one in effects.ordered
-        if one.effect.actuation is not None and one.effect.actuation.lag is not None
-    ]
-    delays = [
-        one.values[one.effect.shapes[0].name]
-        for one in effects.ordered
-        if one.effect.actuation is not None and one.effect.actuation.delay is not None
-    ]
+    acting = [(one.effect.actuation, one) for one in effects.ordered if one.effect.actuation is not None]
+    lags = [each.lag(one.values) for each, one in acting if each.lag is not None]
+    delays = [one.values[one.effect.shapes[0].name] for each, one in acting if each.delay is not None]
     if model is None:
         return rotor_lag, 0.0, 1.0
     behind = model.response

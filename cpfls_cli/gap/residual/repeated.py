@@ -15,11 +15,11 @@ from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, negligible, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.gap.residual.air import moved_from_outside
 from cpfls_cli.gap.settings import COUNTS
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, fitting_bands
-from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.instruments import Instruments, instruments
+from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.result import about, result
 from cpfls_cli.weak_form.windows import Windows
 
@@ -222,18 +222,15 @@ class RepeatedRuns:
         are any.
         None where no flight repeats another.
         """
-        different = list(without_copies(recorded))
-        flights = [LoggedFlight.of(each).playback for each in recorded]
-        given = instruments(flights)
-        runs = given.runs
+        given = moved_from_outside(recorded)
         pairs = [
             pair
             for path in given.repeats.paths()
             for pair in permutations(path, 2)
-            if pair[1] in given.repeats.places[pair[0]] and all(runs[each].flight in different for each in pair)
+            if pair[1] in given.repeats.places[pair[0]]
         ]
         seen = len(recorded) - unseen
-        judged = [pair for pair in pairs if any(runs[each].flight >= seen for each in pair)]
+        judged = [pair for pair in pairs if any(given.runs[each].flight >= seen for each in pair)]
         bands = tuple(_bands(recorded[0].period))
         if not pairs or not bands:
             return None
@@ -328,13 +325,6 @@ def _with_errors(sums: Array) -> Array:
         return np.full((2, 5, 6), np.nan)
     whole = sums.sum(axis=0)
     return np.array([shares(whole), jackknife_error(shares(whole - sums))])
-
-
-def without_copies(flights: Sequence[Signals]) -> Iterator[int]:
-    """Give the numbers of flights without copies: in a copy noise is repeatable, too."""
-    for number, each in enumerate(flights):
-        if not any(np.array_equal(each.body_rate, one.body_rate) for one in flights[:number]):
-            yield number
 
 
 def _bands(period: float) -> Iterator[Band]:
