@@ -21,18 +21,12 @@ from cpfls_cli.regressor.regressor import InertiaValues, Motion, Regressor
 from cpfls_cli.regressor.structure import ModelStructure
 from cpfls_cli.result import BODY, EULER, about, part
 from cpfls_cli.rotations import wrapped
-from cpfls_cli.vehicle.settings import VehicleSettings
 
 VERTICAL = 0.1
 """|cos(pitch)| below which the nose points up or down, so that Euler angles hardly determine the body's axes."""
 
 # Shares of the largest eigenvalue. Near a vertical pitch a body's own smallest one is not larger than the second.
 _ROUNDING, _VERTICAL_ROUNDING = 1e-9, 0.01
-
-
-def inertia_tensor(vehicle: VehicleSettings) -> Array:
-    """Build the inertia tensor of a vehicle, shape (3, 3), kg m^2, body frame."""
-    return symmetric(vehicle.inertia_kg_m2)
 
 
 def inertia_matrix(attitude: Array, inertia: Array) -> Array:

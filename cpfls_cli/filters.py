@@ -47,9 +47,8 @@ class SecondOrder:
         )
         return cls(over / under[0], under / under[0], upper[2])
 
-    def gain(self, turn: Array) -> Array:
-        """Give its gain at complex turns a sample, ``j w dt``."""
-        back = np.exp(-turn)
+    def gain(self, back: Numbers) -> Numbers:
+        """Give its gain at ``back = 1 / z``, ``exp(-j w dt)`` of a frequency w and a sample dt."""
         return np.asarray(np.polyval(self.over[::-1], back) / np.polyval(self.under[::-1], back))
 
     def settled(self, value: Numbers) -> Numbers:

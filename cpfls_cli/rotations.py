@@ -236,22 +236,3 @@ def multiply(matrices: Array, vectors: Array) -> Array:
 def wrapped(angle: Array) -> Array:
     """Wrap angles of any shape, rad, to [-pi, pi)."""
     return np.asarray(np.mod(angle + np.pi, 2 * np.pi) - np.pi, dtype=float)
-
-
-def turns(vector: Array) -> Array:
-    """Compute the rotations ``exp [a]_x``.
-
-    Parameters
-    ----------
-    vector : array, shape (samples, 3), rad
-
-    Returns
-    -------
-    array, shape (samples, 3, 3)
-    """
-    angle, (x, y, z) = np.linalg.norm(vector, axis=1), vector.T
-    along = np.sinc(angle / np.pi)
-    twice = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    (i, j, k), xy, xz, yz = along * vector.T, twice * (x * y), twice * (x * z), twice * (y * z)
-    xx, yy, zz = (1.0 - twice * (one * one + other * other) for one, other in ((y, z), (x, z), (x, y)))
-    return np.stack([xx, xy - k, xz + j, xy + k, yy, yz - i, xz - j, yz + i, zz], axis=1).reshape(-1, 3, 3)

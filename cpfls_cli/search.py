@@ -26,7 +26,8 @@ from cpfls_cli.evolution.archive import Archive, Evaluate, Evaluation
 from cpfls_cli.evolution.engine import EvolutionState, History
 from cpfls_cli.files import is_hdf5
 from cpfls_cli.identification.search import SearchRun, SearchStep, Stop, StopReason, Unfinished, is_end
-from cpfls_cli.playback.structure import Judged, Kept, Rules, Solution, Structure
+from cpfls_cli.playback.parameters import Rules
+from cpfls_cli.playback.structure import Judged, Kept, Solution, Structure
 from cpfls_cli.result import about, part, result
 from cpfls_cli.store import Origin, format_name, read, write
 from cpfls_cli.workers.workforce import WorkerError, Workforce, employ, require_address

@@ -10,8 +10,9 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.config.load import load_study
 from cpfls_cli.config.study import Study
-from cpfls_cli.dynamics import inertia_tensor, newton_euler_torque
+from cpfls_cli.dynamics import newton_euler_torque
 from cpfls_cli.identification.data import TorqueData
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.trajectory.planning import plan
@@ -31,7 +32,9 @@ def paper_flight() -> TorqueData:
     study = paper_study()
     path = plan(study.trajectory, gravity=study.vehicle.gravity_m_s2)
     motion = Motion(path.attitude, path.attitude_rate, path.attitude_acceleration)
-    return TorqueData(path.time, motion, newton_euler_torque(*vars(motion).values(), inertia_tensor(study.vehicle)))
+    return TorqueData(
+        path.time, motion, newton_euler_torque(*vars(motion).values(), symmetric(study.vehicle.inertia_kg_m2))
+    )
 
 
 @lru_cache

@@ -110,9 +110,8 @@ class AxisLaw:
 def chain(filters: tuple[Filter, ...], back: Numbers, period: float) -> Numbers:
     """Multiply the responses of filters at ``back = 1 / z``, shape (frequency,)."""
     total = np.ones_like(back)
-    powers = back ** np.arange(3)[:, None]
-    for section in (each.section(period) for each in filters):
-        total = total * (section.over @ powers) / (section.under @ powers)
+    for each in filters:
+        total = total * each.section(period).gain(back)
     return total
 
 

@@ -20,10 +20,8 @@ from cpfls_cli.errors import ComputationError
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.stepping import Machine
 from cpfls_cli.vehicle.tracing import SYMBOLS
-from cpfls_cli.vehicle.values import ARRAYS, Functions, Value, Vector
+from cpfls_cli.vehicle.values import ARRAYS, Functions, Tangent, Value, Vector
 
-_CHANGE = 1e-4
-"""Step of a derivative along a thrust curve."""
 _HALVES = 40
 """Times that the range is halved to invert a thrust curve that only grows."""
 _LEAST_YAW = 1e-12
@@ -244,9 +242,7 @@ class Motors:
 
     def speed_slope(self, share: float) -> float:
         """Differentiate `speed_at`, rad/s for one unit of the share."""
-        ends = min(max(share, _CHANGE), 1 - _CHANGE) + np.array([-_CHANGE, _CHANGE])
-        low, high = self.curve.signal(ends)
-        return float((high - low) / (2 * _CHANGE) * self.speed_max)
+        return float(self.curve.signal(Tangent(share, {0: 1.0})).by[0]) * self.speed_max
 
 
 _ZERO = 1e-7

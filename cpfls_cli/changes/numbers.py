@@ -288,12 +288,9 @@ def _estimates(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Itera
 def _averaged(names: list[str], values: Array, flies: BoolArray, of: Callable[[Array], Array]) -> _Numbers:
     """Compute numbers of means over a flight, with their errors by blocks of it left out."""
     flown = values[flies]
-    block = contiguous(len(flown), ENOUGH_BLOCKS)
-    sums = np.array([flown[block == number].sum(axis=0) for number in range(ENOUGH_BLOCKS)])
-    count = np.bincount(block, minlength=ENOUGH_BLOCKS).reshape(-1, *(1,) * (flown.ndim - 1))
     with np.errstate(divide="ignore", invalid="ignore"):
-        left_out = np.array([of(mean) for mean in (sums.sum(axis=0) - sums) / (count.sum() - count)])
-        return names, of(flown.mean(axis=0)), jackknife_error(left_out)
+        whole, left_out = leaving_out(lambda kept: of(flown[kept].mean(axis=0)), len(flown), ENOUGH_BLOCKS)
+        return names, whole, jackknife_error(left_out)
 
 
 def _thrust_shares(signals: Signals) -> Array:
@@ -382,7 +379,7 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         return
     inertia = symmetric(signals.vehicle.inertia_kg_m2)
     momentum = signals.body_rate @ inertia
-    turned = own.derivative(momentum) + own.average(rotations.cross(signals.body_rate, momentum))
+    turned = own.balance(rotations.cross(signals.body_rate, momentum), momentum)
     assert signals.torque is not None, "rotor speeds are there"
     assert signals.thrust is not None, "rotor speeds are there"
     found = _followed(own, inside, turned, np.column_stack([signals.torque, signals.thrust]))
@@ -478,7 +475,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     assert signals.thrust is not None, "rotor speeds are there"
     # Over the vehicle's own mass, for a load's is a share of that.
     drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
-    left = (own.derivative(signals.velocity[:, :2]) - own.average(drives))[inside]
+    left = own.balance(-drives, signals.velocity[:, :2])[inside]
     drag = own.average(signals.velocity[:, :2])[inside]
     columns = _LOAD.columns
     assert columns is not None, "the load pulls"

@@ -243,8 +243,8 @@ def effective_blocks(information: Array) -> float:
     return float(max(known.sum() ** 2 / max(float((known**2).sum()), _TINY), 2.0))
 
 
-def positive_ratio(numerator: Array, denominator: Array, confidence: float = 0.975) -> tuple[float, float]:
-    """Give the interval of a positive ratio of sums by Fieller, Anderson and Rubin: right for a weak denominator too.
+def positive_ratio(numerator: Array, denominator: Array) -> tuple[float, float]:
+    """Give the 95 % interval of a positive ratio of sums by Fieller, Anderson and Rubin, also for a weak denominator.
 
     It is what the ratio x may be for which ``sum (numerator - x denominator)`` is not significantly other than 0; from
     0, and to infinity, where that bounds nothing.
@@ -255,7 +255,7 @@ def positive_ratio(numerator: Array, denominator: Array, confidence: float = 0.9
         Independent contributions to both sums.
     """
     blocks = len(numerator)
-    critical = float(half_width(np.array(1.0), blocks, confidence)) ** 2
+    critical = float(half_width(np.array(1.0), blocks)) ** 2
     n, d = float(numerator.sum()), float(denominator.sum())
     apart = np.stack([numerator - n / blocks, denominator - d / blocks])
     (nn, nd), (_, dd) = apart @ apart.T * blocks / (blocks - 1)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.dynamics import inertia_tensor, positive_definite
+from cpfls_cli.dynamics import positive_definite
 from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.hooks import VehicleParts
@@ -16,11 +16,12 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, Refit, plain
 from cpfls_cli.gap.naming.causes import of_thrust
-from cpfls_cli.inertia import INERTIA_ENTRIES
+from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.rounding import less
 from cpfls_cli.simulation.model import late_effects
+from cpfls_cli.vehicle.rotors import with_factors
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -30,7 +31,7 @@ def whole_vehicle(extended: ExtendedModel, vehicle: VehicleSettings) -> VehicleM
     `vehicle`: that the effects were fitted with.
     Result: with the inertia of before where the one that comes with the effects is that of no body.
     """
-    given, fuzzy = inertia_tensor(vehicle), extended.base
+    given, fuzzy = symmetric(vehicle.inertia_kg_m2), extended.base
     parts, times = _parts(extended, vehicle)
     corrected = given + inertia_correction(extended.parameters, vehicle)
     effects = (*_numbers(extended.parameters, vehicle, corrected), *(ModelEffect(*each) for each in parts.effects))
@@ -82,7 +83,7 @@ def thrust_put_in(refit: Refit, vehicle: VehicleSettings) -> VehicleSettings:
     Result: the same vehicle where no thrust is named.
     """
     scale, _, yaw = _of_thrust(refit)
-    return vehicle if scale == 1.0 else _lifting(vehicle, scale, scale if yaw else 1.0)
+    return vehicle if scale == 1.0 else with_factors(vehicle, scale, scale if yaw else 1.0)
 
 
 def above_thrust(refit: Refit, first: Refit, vehicle: VehicleSettings) -> tuple[Refit, VehicleSettings]:
@@ -106,7 +107,7 @@ def above_thrust(refit: Refit, first: Refit, vehicle: VehicleSettings) -> tuple[
         for each in refit.estimates.parameters
     )
     model, estimates = replace(refit.model, parameters=parameters), replace(refit.estimates, parameters=numbers)
-    return replace(refit, model=model, estimates=estimates), _lifting(vehicle, rest, rest if yaw else 1.0)
+    return replace(refit, model=model, estimates=estimates), with_factors(vehicle, rest, rest if yaw else 1.0)
 
 
 def _of_thrust(refit: Refit) -> tuple[float, list[str], bool]:
@@ -122,22 +123,12 @@ def _of_thrust(refit: Refit) -> tuple[float, list[str], bool]:
     return 1.0 + numbers["thrust_scale"].value, right, yaw
 
 
-def _lifting(vehicle: VehicleSettings, thrust: float, yaw: float) -> VehicleSettings:
-    rotors = (
-        replace(
-            each, thrust_factor_n_s2=thrust * each.thrust_factor_n_s2, drag_factor_n_m_s2=yaw * each.drag_factor_n_m_s2
-        )
-        for each in vehicle.rotors
-    )
-    return replace(vehicle, rotors=tuple(rotors))
-
-
 def require_body(extended: ExtendedModel, vehicle: VehicleSettings) -> None:
     """Refuse effects with which the inertia is that of no body.
 
     `vehicle`: that they were fitted with. Raises ComputationError.
     """
-    inertia = inertia_tensor(vehicle) + _parts(extended, vehicle)[0].inertia
+    inertia = symmetric(vehicle.inertia_kg_m2) + _parts(extended, vehicle)[0].inertia
     if extended.base is None and not positive_definite(inertia[None]).all():
         raise ComputationError("not extended: with the named effects, the inertia is not that of any body")
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, IntArray
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import block_length
 from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -35,6 +35,7 @@ from cpfls_cli.vehicle.values import (
     transposed,
     value_of,
 )
+from cpfls_cli.weak_form.resampling import marked_rows
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
 _MASS = "mass"
@@ -90,7 +91,7 @@ class Equations:
         """Check whether those of another vehicle follow: its rotors respond alike, and it has no other numbers."""
         own, free = self.at.free, other.at.free
         # Numbers of a remainder mean something else with other rules; those of no remainder have none.
-        rules = own.key[2:] == free.key[2:] or LEARNED.keys().isdisjoint(free.blocks)
+        rules = own.rules == free.rules or LEARNED.keys().isdisjoint(free.blocks)
         alike = own.vehicle == free.vehicle and rules and self.at.response == other.at.response
         # Only what is not 0 is differentiated by times of the response.
         return alike and {*free.index} <= {*own.index} and (not other.at.times or other._in_use <= self._in_use)
@@ -178,7 +179,7 @@ class Equations:
             return found
 
         response, index = self.at.response, self.at.free.index
-        slopes = {index[name]: filled(response.slope_at_samples, TIMES[name]) for name in self.at.times}
+        slopes = {index[name]: filled(response.terms_at_samples, TIMES[name]) for name in self.at.times}
         if SLOW in index:
             # The number is the logarithm of the slow time.
             slopes[index[SLOW]] *= response.slow_s
@@ -391,8 +392,8 @@ class Balances:
             place = path[middles]
             block = np.where(np.isfinite(known).all(axis=1), self._block(number, place), -1)
             for each in np.unique(block[block >= 0]).tolist():
-                mine, theirs = (taken(values, block == each) for values in (own, known))
-                at = self.blocks[first, each]
+                at, rows_there = self.blocks[first, each], marked_rows(block == each)
+                mine, theirs = own[rows_there], known[rows_there]
                 for axis, columns in zip(sums, slices, strict=True):
                     x, z = mine[:, columns], theirs[:, columns]
                     for total, (one, other) in zip(axis[:, at], ((z, x), (x, x), (z, z)), strict=True):
@@ -416,13 +417,15 @@ class Balances:
         known = {number: windowed(band, self.flights[number], form, each) for number, each in others.items()}
         known |= self._expected(band, {number: own[number] for number in self.asked})
         for number in self.path:
-            yield Rows(number, own[number], known[number], middles_of(band, self.flights[number]))
+            yield Rows(number, own[number], known[number], band.middles(self.flights[number].stretches))
 
     def _expected(self, band: Windows, own: dict[int, Array]) -> dict[int, Array]:
         """Predict balances from what was asked for."""
         apart = round(_OF_WINDOW * band.hop / (1 - OVERLAP))
         asked = {
-            number: averaged(band, self.flights[number], past_setpoints(self.asked[number], band.period, apart))
+            number: band.over(
+                self.flights[number].stretches, band.average, past_setpoints(self.asked[number], band.period, apart)
+            )
             for number in own
         }
         return first_stage_fit_by_run(asked, own)
@@ -440,39 +443,13 @@ def band_windows(period: float, short_s: float, long_s: float | None) -> Windows
     return short if long_s is None else short.less(windows(period, long_s, OVERLAP))
 
 
-def middles_of(band: Windows, flight: PlaybackFlight) -> IntArray:
-    """Give the sample in the middle of each window, shape (window,)."""
-    half = len(band.weight) // 2
-    return np.concatenate(
-        [
-            stretch.start + np.arange(band.count(stretch.stop - stretch.start)) * band.hop + half
-            for stretch in flight.stretches
-        ]
-    )
-
-
-def averaged(band: Windows, flight: PlaybackFlight, values: Array, *, changes: bool = False) -> Array:
-    """Average signals over windows, or their derivatives, shape (window, column)."""
-    seen = band.derivative if changes else band.average
-    long = (part for part in flight.stretches if band.count(part.stop - part.start))
-    return np.concatenate([np.zeros((0, values.shape[1])), *(seen(values[part]) for part in long)])
-
-
 def windowed(band: Windows, flight: PlaybackFlight, form: Form, signals: Balanced) -> Array:
     """Lay windows over what is balanced, shape (window, column)."""
-    acted, changed = averaged(band, flight, signals.acting), averaged(band, flight, signals.changing, changes=True)
+    acted = band.over(flight.stretches, band.average, signals.acting)
     rows = np.zeros((len(acted), len(form.columns)))
     rows[:, form.acting] = acted
-    rows[:, form.changing] += changed
+    rows[:, form.changing] += band.over(flight.stretches, band.derivative, signals.changing)
     return rows
-
-
-def taken(values: Array, there: BoolArray) -> Array:
-    """Take rows: a view where they follow one another, as a copy takes as long as what is made of them."""
-    rows = np.flatnonzero(there)
-    if len(rows) and rows[-1] - rows[0] + 1 == len(rows):
-        return values[rows[0] : rows[-1] + 1]
-    return values[rows]
 
 
 class PastBalances(Balances):
@@ -504,8 +481,14 @@ class PastBalances(Balances):
 
     def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Balanced]) -> Any:
         """Average all columns over windows, by stretch, each as its own flight."""
+        (band, *_) = bands
         return [
-            (number, part, averaged(bands[0], part, _seen(part)), windowed(bands[0], part, form, signals[number]))
+            (
+                number,
+                part,
+                band.over(part.stretches, band.average, _seen(part)),
+                windowed(band, part, form, signals[number]),
+            )
             for number in self.path
             for part in (replace(self.flights[number], stretches=(each,)) for each in self.flights[number].stretches)
         ]
@@ -527,7 +510,7 @@ class PastBalances(Balances):
         seen = [each for _, _, each, _ in kept]
         new, expected, _ = innovations(rows, [own[..., 0] for own in rows], seen, _PER_WINDOW, _BEFORE)
         for (number, part, *_), own, predicted in zip(kept, new, expected, strict=True):
-            middles = middles_of(band, part)
+            middles = band.middles(part.stretches)
             flat, known = (each.reshape(len(own), -1) for each in (own, predicted))
             yield Rows(number, flat, known, middles[len(middles) - len(own) :])
 

@@ -25,7 +25,6 @@ from cpfls_cli.playback.evaluation import JointNumbers
 from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Instruments
-from cpfls_cli.playback.model import Airflow
 from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -309,7 +308,7 @@ class _Search(NamedTuple):
     def free(self, blocks: Sequence[str]) -> JointNumbers:
         """Give the numbers of some blocks."""
         chosen = tuple(block for block in blocks if block not in self.vehicle.unknown)
-        return JointNumbers(FreeNumbers(self.vehicle, chosen, Airflow(np.zeros(0), 0)))
+        return JointNumbers(FreeNumbers(self.vehicle, chosen))
 
     def problem(self, free: JointNumbers, values: Array, bands: BoolArray, held: Set[str]) -> _Problem:
         """Take the balances at values of the numbers."""

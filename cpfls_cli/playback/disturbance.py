@@ -22,7 +22,6 @@ from cpfls_cli.blocks import BLOCK_S, ENOUGH_BLOCKS, block_length, contiguous, h
 from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
 from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.playback.balances import middles_of
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
 from cpfls_cli.playback.innovations import MOST_PREDICTED, PER_WINDOW, blows, residual_innovations
@@ -117,40 +116,27 @@ class _Powers(NamedTuple):
 
 
 class _Band(NamedTuple):
-    """Pieces of flights, and the frequencies that they are taken apart into.
-
-    `turns` in rad/s; `weight` and `slope`, shape (sample, frequency), are kernels of the average and of the derivative,
-    which is moved onto them.
-    """
+    """Pieces of flights, and waves of the frequencies in rad/s that they are taken apart into."""
 
     pieces: Windows
     turns: Array
-    weight: _Complex
-    slope: _Complex
+    waves: Windows
 
     @classmethod
     def of(cls, period: float, length_s: float) -> _Band:
         pieces = windows(period, length_s, _OVERLAP)
-        size = len(pieces.weight)
-        top = min(_TOP_HZ, _TOP_SHARE / period)
-        turns = np.asarray(2 * np.pi / (size * period) * np.arange(int(top * size * period) + 1), dtype=float)
-        wave = np.exp(-1j * period * np.outer(np.arange(size), turns))
-        slope = pieces.slope[:, None] - 1j * turns * pieces.weight[:, None]
-        kernels = [np.asarray(kernel * wave, dtype=np.complex128) for kernel in (pieces.weight[:, None], slope)]
-        return cls(pieces, turns, *kernels)
+        size, top = len(pieces.weight), min(_TOP_HZ, _TOP_SHARE / period)
+        hertz = np.arange(int(top * size * period) + 1) / (size * period)
+        return cls(pieces, 2 * np.pi * hertz, pieces.modulated(hertz))
 
-    def laid(self, flight: PlaybackFlight, values: Array, kernel: _Complex) -> Array:
-        """Lay a kernel over values, shape (time, column) to (piece, column, frequency)."""
-        parts = [
-            self.pieces.laid(values[part], kernel)
-            for part in flight.stretches
-            if self.pieces.count(part.stop - part.start)
-        ]
-        return np.concatenate([np.zeros((0, values.shape[1], kernel.shape[1])), *parts])
+    def averaged(self, flight: PlaybackFlight, values: Array) -> Array:
+        """Average values over pieces, shape (time, column) to (piece, column, frequency)."""
+        return self.waves.over(flight.stretches, self.waves.average, values)
 
-    def left(self, flight: PlaybackFlight, sides: Array) -> Array:
-        """Take what both sides of a balance differ by, shape (time, 2, axis) to (piece, axis, frequency)."""
-        return -self.laid(flight, sides[:, 0], self.slope) - self.laid(flight, sides[:, 1], self.weight)
+
+def _left(band: Windows, flight: PlaybackFlight, sides: Array) -> Array:
+    """Take what both sides of a balance differ by over windows, shape (time, 2, axis) to (window, axis, ...)."""
+    return band.over(flight.stretches, lambda each: band.balance(-each[:, 1], each[:, 0]), sides)
 
 
 def find_gusts(
@@ -208,7 +194,7 @@ def _by_past(found: FoundGusts, bound: FoundGusts, given: Instruments, sides: Se
         moves = [motion.rate, motion.rotation[:, 2], *([motion.velocity] if len(found.size) > 3 else [])]
         signals = np.hstack([flight.speed**2, *moves])
         for own_part in (each for each in flight.stretches if seen.count(each.stop - each.start)):
-            left.append(seen.derivative(own[own_part, 0]) - seen.average(own[own_part, 1]))
+            left.append(seen.balance(-own[own_part, 1], own[own_part, 0]))
             signals_seen.append(seen.average(signals[own_part]))
     if not left:
         return bound
@@ -305,9 +291,9 @@ def _share_predicted(powers: _Powers) -> tuple[Array, Array]:
 
 def _powers(sides: Sequence[Array], given: Instruments, band: _Band, instrument_kind: InstrumentKind) -> _Powers:
     """Take the power of the non-repeatable residual, by block of a run."""
-    left = [band.left(flight, own) for flight, own in zip(given.flown, sides, strict=True)]
+    left = [_left(band.waves, flight, own) for flight, own in zip(given.flown, sides, strict=True)]
     if instrument_kind == "repeats":
-        beside = [band.left(flight, given.repeats.others(n, sides)) for n, flight in enumerate(given.flown)]
+        beside = [_left(band.waves, flight, given.repeats.others(n, sides)) for n, flight in enumerate(given.flown)]
     elif instrument_kind == "setpoints":
         beside = _expected(given, left, band)
     else:
@@ -319,7 +305,7 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, instrument_
     for flight, own, known in zip(given.flown, left, beside, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
         both = np.stack([(own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2], axis=1)
-        block = (middles_of(band.pieces, flight)[there] - len(band.weight) // 2) * period // block_s
+        block = (band.pieces.middles(flight.stretches)[there] - len(band.pieces.weight) // 2) * period // block_s
         each_left.append(both[:, 1])
         numbers, windows = np.unique(block, return_counts=True)
         sums += [both[block == each].sum(axis=0) for each in numbers]
@@ -336,7 +322,7 @@ def _predicted_parts(
     flat = [own.reshape(len(own), -1) for own in values]
     if instrument_kind == "repeats":
         flat = [given.repeats.others(number, flat) for number in range(len(flat))]
-    laid = [band.laid(flight, columns, band.weight) for flight, columns in zip(given.flown, flat, strict=True)]
+    laid = [band.averaged(flight, columns) for flight, columns in zip(given.flown, flat, strict=True)]
     if instrument_kind == "setpoints":
         laid = _expected(given, laid, band)
     known = np.concatenate([each[np.isfinite(each).all(axis=(1, 2))] for each in laid])
@@ -368,7 +354,7 @@ def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Ar
     if not numbers:
         return [np.nan * own for own in left]
     asked = np.concatenate(
-        [band.laid(given.flown[number], np.asarray(given.setpoints[number]), band.weight) for number in numbers]
+        [band.averaged(given.flown[number], np.asarray(given.setpoints[number])) for number in numbers]
     )
     instrument = (asked[:, :, None] * late).reshape(len(asked), -1, len(band.turns)).swapaxes(1, 2)
     instrument = instrument / np.maximum(np.sqrt((np.abs(instrument) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)
@@ -398,7 +384,7 @@ class _Axis:
         self._power, self._count = power, count
         self._mean = power.sum(axis=0) / count.sum()
         # Power of white noise, as acceleration and through a derivative.
-        self._noise = np.array([(np.abs(kernel) ** 2).sum(axis=0) for kernel in (band.weight, band.slope)])
+        self._noise = np.array([(np.abs(kernel) ** 2).sum(axis=0) for kernel in (band.waves.weight, band.waves.slope)])
         self._process = GaussMarkov.seen_by(band.pieces.weight, self._period, band.turns)
 
     def bound(self) -> Array:

@@ -18,7 +18,7 @@ from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
 from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, six_parameters, symmetric
 from cpfls_cli.playback.flight import Body, PlaybackFlight
-from cpfls_cli.playback.model import Airflow, ModelEffect, VehicleModel, learned_wrench, of_thrust
+from cpfls_cli.playback.model import ModelEffect, VehicleModel, learned_wrench, of_thrust
 from cpfls_cli.playback.parameters import (
     AS_STATED,
     COUNTED,
@@ -28,7 +28,6 @@ from cpfls_cli.playback.parameters import (
     LAG,
     LAW,
     LEARNED,
-    LOG_COUNTED,
     LOG_INERTIA,
     LOG_MASS,
     MASS,
@@ -44,6 +43,7 @@ from cpfls_cli.playback.parameters import (
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse
 from cpfls_cli.playback.windows import STATES, Flown, Rotors, Slopes
 from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, rotor_wrench
+from cpfls_cli.vehicle.rotors import with_factors
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import Graph, Symbol, array_symbols, traced_in_two
 from cpfls_cli.vehicle.values import (
@@ -59,6 +59,14 @@ from cpfls_cli.vehicle.values import (
     zero,
 )
 
+_POSITIVE = {
+    **{log: (f"inertia.{name}", "kg m^2") for log, name in zip(LOG_INERTIA, INERTIA_PARAMETERS, strict=False)},
+    THRUST: ("thrust_factor", "N s^2"),
+    DRAG: ("drag_factor", "N m s^2"),
+    LOG_MASS: ("mass", "kg"),
+    SLOW: ("slow_actuation.slow_s", "s"),
+}
+"""Numbers of a fit that people know by another name and unit, and that cannot be below 0."""
 TIMES: Mapping[str, TimeOfResponse] = {DELAY: "delay_s", LAG: "lag_s", SLOW: "slow_s"}
 """Times of the response that numbers are."""
 DRAG_OVER_THRUST = "drag_over_thrust"
@@ -109,29 +117,17 @@ class VehicleAt:
     @cached_property
     def vehicle(self) -> VehicleSettings:
         """The vehicle with what was found as its own numbers."""
-        thrust, drag, stated = self.get(THRUST, 1.0), self.get(DRAG, 1.0), self.free.vehicle
-        rotors = tuple(
-            replace(
-                rotor,
-                thrust_factor_n_s2=rotor.thrust_factor_n_s2 * thrust,
-                drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * drag,
-            )
-            for rotor in stated.rotors
-        )
+        found = with_factors(self.free.vehicle, self.get(THRUST, 1.0), self.get(DRAG, 1.0))
         xx, yy, zz, xy, xz, yz = (float(self.inertia[entry]) for entry in INERTIA_ENTRIES)
         inertia = (xx, yy, zz, xy, xz, yz)
-        return replace(stated, mass_kg=self.mass, rotors=rotors, inertia_kg_m2=inertia, unknown=())
+        return replace(found, mass_kg=self.mass, inertia_kg_m2=inertia, unknown=())
 
     @cached_property
     def effects(self) -> tuple[ModelEffect, ...]:
         """Effects, their coefficients counted on this vehicle and not on the stated one: some share its thrust."""
-        effects, stated = [], self.free.vehicle
+        effects = []
         # As runs fly them: with the stated thrust, and a drag that changed by as much more than the thrust.
-        rotors = tuple(
-            replace(each, drag_factor_n_m_s2=each.drag_factor_n_m_s2 * self._acting_number(DRAG_OVER_THRUST))
-            for each in stated.rotors
-        )
-        flown = replace(stated, rotors=rotors)
+        flown = with_factors(self.free.vehicle, 1.0, self._acting_number(DRAG_OVER_THRUST))
         for block in self.free.effects:
             before, found = (unit_wrenches(block, vehicle) for vehicle in (flown, self.vehicle))
             ratio = (before * found).sum(axis=(1, 2)) / (found**2).sum(axis=(1, 2))
@@ -158,35 +154,27 @@ class VehicleAt:
     @property
     def physical(self) -> dict[str, Physical]:
         """All numbers as people know them, in order: moments of inertia, factors of the first rotor, SI."""
-        free, inertia, rotor = self.free, self.inertia, self.free.vehicle.rotors[0]
-        coefficients = dict(self.coefficients)
+        free, rotor = self.free, self.free.vehicle.rotors[0]
+        entries = (self.inertia.item(entry) for entry in INERTIA_ENTRIES)
+        stated = dict(zip((*LOG_INERTIA, *PRODUCT_NAMES), entries, strict=True))
+        stated |= {
+            THRUST: self.get(THRUST, 1.0) * rotor.thrust_factor_n_s2,
+            DRAG: self.get(DRAG, 1.0) * rotor.drag_factor_n_m_s2,
+            LOG_MASS: self.mass,
+        }
+        others = {SLOW: self.response.slow_s, **self.coefficients}
         for effect in self.effects:
             names = (number.name for number in free.of_block(effect.name))
-            coefficients |= dict(zip(names, effect.coefficients.tolist(), strict=True))
+            others |= dict(zip(names, effect.coefficients.tolist(), strict=True))
         found: dict[str, Physical] = {}
         for number, value in zip(free.numbers, self.values.tolist(), strict=True):
-            name, stated = number.name, number.block not in free.vehicle.unknown
-            if name in LOG_INERTIA:
-                axis = LOG_INERTIA.index(name)
-                known = Physical(float(inertia[axis, axis]), "kg m^2", positive=True, stated=stated)
-                found[f"inertia.{INERTIA_PARAMETERS[axis]}"] = known
-            elif name in PRODUCT_NAMES:
-                row, column = INERTIA_ENTRIES[3 + PRODUCT_NAMES.index(name)]
-                found[name] = Physical(float(inertia[row, column]), "kg m^2", stated=True)
-            elif name == THRUST:
-                factor = value * rotor.thrust_factor_n_s2
-                found["thrust_factor"] = Physical(factor, "N s^2", positive=True, stated=stated)
-            elif name == DRAG:
-                factor = value * rotor.drag_factor_n_m_s2
-                found["drag_factor"] = Physical(factor, "N m s^2", positive=True, stated=stated)
-            elif name in LOG_COUNTED:
-                found[name] = Physical(value, "")
-            elif name == LOG_MASS:
-                found["mass"] = Physical(self.mass, "kg", positive=True, stated=True)
-            elif name == SLOW:
-                found["slow_actuation.slow_s"] = Physical(float(np.exp(value)), "s", positive=True)
-            else:
-                found[name] = Physical(coefficients.get(name, value), number.unit)
+            name, unit = _POSITIVE.get(number.name, (number.name, number.unit))
+            found[name] = Physical(
+                stated.get(number.name, others.get(number.name, value)),
+                unit,
+                positive=number.name in _POSITIVE,
+                stated=number.name in stated and number.block not in free.vehicle.unknown,
+            )
         return found
 
     def rotor_terms(self, flight: PlaybackFlight, samples: IntArray, by: str = "") -> Array:
@@ -204,7 +192,7 @@ class VehicleAt:
         if not by:
             return np.asarray(flight.rotor_terms(*self.times_of_response)[samples])
         response, slow = self.response, SLOW in self.free.index
-        slopes = flight.of_speeds(partial(response.slope_by_step, by=TIMES[by], slow=slow))
+        slopes = flight.of_speeds(partial(response.terms_by_step, by=TIMES[by], slow=slow))
         # The number is the logarithm of the slow time.
         return np.asarray(slopes[samples] * (response.slow_s if by == SLOW else 1.0))
 
@@ -227,12 +215,12 @@ class VehicleAt:
         pushed : bool
             Whether something pushes on top.
         """
-        function = traced_step(*self.free.key, translates, pushed)((period, *self.values.tolist()))
+        function = traced_step(self.free, translates, pushed)((period, *self.values.tolist()))
         return Flown(Vehicle(self.free.vehicle, ()), self._body, traced=function)
 
     def slopes(self, pushes: int = 0) -> Slopes:
         """Differentiate its accelerations by all numbers, or by those of what pushes on top."""
-        numbers, places, function = traced_slopes(*self.free.key, pushes)
+        numbers, places, function = traced_slopes(self.free, pushes)
         return Slopes(numbers, places, function(tuple(self.values.tolist())))
 
     @cached_property
@@ -334,15 +322,10 @@ class _Traced:
 
 @lru_cache(maxsize=256)
 def traced_step(
-    vehicle: VehicleSettings,
-    blocks: tuple[str, ...],
-    breakpoints: tuple[float, ...],
-    order: int,
-    translates: bool,
-    pushed: bool,
+    free: FreeNumbers, translates: bool, pushed: bool
 ) -> Callable[..., Callable[..., tuple[Vector, Vector]]]:
     """Make a function of a period and of numbers that gives one of a step of the vehicle; see `Flown.traced`."""
-    own = _Traced(FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order)))
+    own = _Traced(free)
     period, state, rotors = *own.graph.inputs("period", 1), own.graph.inputs("state", 18), own.inputs("rotors", 3)
     push = own.graph.inputs("push", 6 if pushed else 0)
     step = own.flown.stepped(state, Rotors(rotors[0], rotors[1], rotors[2], push or None), period, translates)
@@ -352,13 +335,12 @@ def traced_step(
 
 @lru_cache(maxsize=256)
 def traced_slopes(
-    vehicle: VehicleSettings, blocks: tuple[str, ...], breakpoints: tuple[float, ...], order: int, pushes: int
+    free: FreeNumbers, pushes: int
 ) -> tuple[int, tuple[tuple[int, int], ...], Callable[..., Callable[..., Vector]]]:
     """Make a function of the numbers that gives derivatives of the accelerations; see `Slopes`.
 
     With so many `pushes` on top it is differentiated by those, and not by the numbers of the vehicle.
     """
-    free = FreeNumbers(vehicle, blocks, Airflow(np.array(breakpoints), order))
     own = _Traced(free, differentiated=not pushes)
     motion, rotors = own.graph.inputs("motion", 15), own.inputs("rotors", 3)
     times_of = [free.index[name] for name in TIMES if name in free.index and not pushes]
@@ -408,6 +390,15 @@ class Group(NamedTuple):
     differs: tuple[str, ...]
 
 
+def _column(name: str) -> cached_property[Array]:
+    """Gather what all numbers have by a name, shape (number,)."""
+
+    def column(free: JointNumbers) -> Array:
+        return np.array([getattr(number, name) for number in free.numbers], dtype=float)
+
+    return cached_property(column)
+
+
 @dataclass(frozen=True)
 class JointNumbers:
     """The free numbers of all configurations: those of the vehicle of the config, then what others have of theirs."""
@@ -443,38 +434,19 @@ class JointNumbers:
         """Place of each number by name."""
         return {number.name: place for place, number in enumerate(self.numbers)}
 
-    @cached_property
-    def starts(self) -> Array:
-        """Stated numbers, shape (number,)."""
-        return self._column("start")
-
-    @cached_property
-    def scales(self) -> Array:
-        """Natural sizes of changes, shape (number,)."""
-        return self._column("scale")
-
-    @cached_property
-    def lows(self) -> Array:
-        """Lower bounds, shape (number,)."""
-        return self._column("low")
-
-    @cached_property
-    def highs(self) -> Array:
-        """Upper bounds, shape (number,)."""
-        return self._column("high")
-
-    @cached_property
-    def spreads(self) -> Array:
-        """Standard deviations of what is believed before, in scales, shape (number,)."""
-        return self._column("spread")
+    starts = _column("start")
+    """Stated numbers."""
+    scales = _column("scale")
+    """Natural sizes of changes."""
+    lows, highs = _column("low"), _column("high")
+    """Bounds."""
+    spreads = _column("spread")
+    """Standard deviations of what is believed before, in scales."""
 
     @cached_property
     def prior(self) -> Prior:
         """What is believed before flights are seen, in scales."""
         return Prior(self.starts / self.scales, self.spreads / np.sqrt(PRIOR))
-
-    def _column(self, name: str) -> Array:
-        return np.array([getattr(number, name) for number in self.numbers], dtype=float)
 
     def named(self, values: Array) -> dict[str, float]:
         """Name values."""

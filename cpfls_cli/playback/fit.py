@@ -14,7 +14,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.estimation.estimate import Prior
-from cpfls_cli.gauss_newton import damped_step, minimised
+from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.playback.evaluation import JointNumbers, VehicleAt
 from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight, motion_at
 from cpfls_cli.playback.model import VehicleModel
@@ -99,19 +99,18 @@ def windows_of(
     In errors of "rate stays" a quiet flight would rule the fit, in plain errors the liveliest. All times in s; a step
     of runs is one sample at least.
     """
-    periods = [flight.motion.period for flight in flights]
-    every = [max(1, int(min(step_s, horizon_s) / period + 1e-9)) for period in periods]
-    horizons = [max(1, round(horizon_s / (own * period))) for own, period in zip(every, periods, strict=True)]
-    starts = [
-        flight.starts(own * horizon, max(1, round(interval_s / period)))
-        for flight, own, horizon, period in zip(flights, every, horizons, periods, strict=True)
-    ]
-    scales = [rate_stays(*each) for each in zip(flights, starts, horizons, every, strict=True)]
-    lively = np.array([scale.mean(axis=0) for scale in scales])
+    found = []
+    for flight in flights:
+        period = flight.motion.period
+        every = max(1, int(min(step_s, horizon_s) / period + 1e-9))
+        horizon = max(1, round(horizon_s / (every * period)))
+        starts = flight.starts(every * horizon, max(1, round(interval_s / period)))
+        found.append((flight, starts, rate_stays(flight, starts, horizon, every), every))
+    lively = np.array([scale.mean(axis=0) for *_, scale, _ in found])
     weight = np.sqrt(lively.max(axis=0) / np.where(lively > 0, lively, np.inf))
     return [
-        FitWindows(flight, start, loss_of(flight, scale * np.where(own > 0, own, 1.0)), step)
-        for flight, start, scale, own, step in zip(flights, starts, scales, weight, every, strict=True)
+        FitWindows(flight, starts, loss_of(flight, scale * np.where(own > 0, own, 1.0)), every)
+        for (flight, starts, scale, every), own in zip(found, weight, strict=True)
     ]
 
 
@@ -165,7 +164,7 @@ class Fitted(FittedNumbers):
 
 @dataclass(frozen=True)
 class FitPoint:
-    """A fit at values of its numbers; see `cpfls_cli.gauss_newton.Point`.
+    """A fit at values of its numbers.
 
     `loss` is without the prior, which is in scales. `derivatives` gives gradient and Hessian: they cost ten times the
     loss, and a step that fails, or is the last one, needs none.
@@ -193,6 +192,11 @@ class FitPoint:
         """Of the objective, in scales of the numbers."""
         return self._in_scales[1]
 
+    def step(self, damping: float, bounds: tuple[Array, Array]) -> Array:
+        """Solve for a damped step within bounds, in scales of the numbers."""
+        room = ((bound - self.values) / self.scales for bound in bounds)
+        return damped_step(self.hessian, self.gradient, damping, *room)
+
     @cached_property
     def _in_scales(self) -> tuple[Array, Array]:
         (gradient, hessian), scales, prior = self.derivatives(), self.scales, self.prior
@@ -200,6 +204,62 @@ class FitPoint:
             gradient * scales - prior.pull(self.values / scales),
             hessian * scales[:, None] * scales + np.diag(prior.precision),
         )
+
+
+_DAMPING = 1e-3
+"""Share of the diagonal: that of the first step of a fit, nearly a Gauss-Newton step."""
+
+_DAMPING_UP, _DAMPING_DOWN, _LEAST_DAMPING = 6.0, 5.0, 1e-9
+"""It is raised by more than it is lowered, so that it settles."""
+
+_TRIES = 8
+"""Of one step: the damping is a million times larger then, and a step that still fails is rounding."""
+
+
+def minimised(
+    evaluate: Callable[[Array], FitPoint],
+    point: FitPoint,
+    bounds: tuple[Array, Array],
+    steps: int,
+    tolerance: float,
+    damping: float = _DAMPING,
+) -> FitPoint:
+    """Minimise an objective by damped steps within bounds.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Gives the point at values.
+    point : FitPoint
+        To start from.
+    bounds : tuple of array, shape (number,)
+    steps : int
+        At most.
+    tolerance : float
+        Relative decrease of the objective, by a step or expected of an undamped one, below which it has come to its
+        end.
+    damping : float
+        Share of the diagonal at first.
+    """
+    for _ in range(steps):
+        if tolerance:
+            # By how much the quadratic model falls with a step that is hardly damped.
+            step = point.step(_LEAST_DAMPING, bounds)
+            if -step @ (point.gradient + 0.5 * point.hessian @ step) < tolerance * point.objective:
+                break
+        for _ in range(_TRIES):
+            step = point.scales * point.step(damping, bounds)
+            following = evaluate(np.clip(point.values + step, *bounds))
+            if following.objective < point.objective:
+                break
+            damping *= _DAMPING_UP
+        else:
+            break
+        damping = max(damping / _DAMPING_DOWN, _LEAST_DAMPING)
+        decrease, point = point.objective - following.objective, following
+        if decrease < tolerance * point.objective:
+            break
+    return point
 
 
 def fit(
@@ -244,7 +304,7 @@ def fit_parts(
         def evaluated(values: Array) -> FitPoint:
             return at(tuple(values.tolist())).mean(kept)
 
-        return minimised(evaluated, point, free.scales, bounds, steps, tolerance)
+        return minimised(evaluated, point, bounds, steps, tolerance)
 
     every = part >= 0
     values = dict.fromkeys(tuple(np.clip(free.values(known), *bounds).tolist()) for known in starts)
@@ -333,7 +393,7 @@ class SideBySide:
         flown = legs(self.flown(at), self.runs, self.steps(at))
         if len(self.owner) > MOST_RUNS:
             return flown
-        key = (at.free.key, at.values.tobytes())
+        key = (at.free, at.values.tobytes())
         if self._last.get("key") != key:
             self._last.update(key=key, legs=list(flown))
         found: list[Leg] = self._last["legs"]
@@ -478,9 +538,6 @@ _QUICK = 100
 
 _UNSEEN = 3.0
 """How many times as fast about an axis a part turns, at least, that is nothing like the others."""
-
-_DAMPING = 1e-3
-"""Share of the diagonal: that of the first step of a fit."""
 
 
 def parts_of(flights: Sequence[PlaybackFlight], settings: PlaybackSettings) -> list[list[FitWindows]]:

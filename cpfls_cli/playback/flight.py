@@ -126,11 +126,14 @@ class PlaybackFlight:
     @cached_property
     def rotor_terms(self) -> Callable[[float, float, float | None], Array]:
         """Terms of the rotors over each step by the times of their response, of which the last few are remembered."""
+        # What is remembered does not hold the flight, which would then be freed only by the garbage collector.
+        speeds, period, hold = [self.speed[part] for part in self.stretches], self.motion.period, self.hold
 
-        def terms(delay_s: float, lag_s: float, slow_s: float | None) -> Array:
-            return self.of_speeds(rotor_terms_by_step, delay_s, lag_s, slow_s)
+        @lru_cache(maxsize=_REMEMBERED)
+        def terms(*times: Any) -> Array:
+            return np.concatenate([rotor_terms_by_step(each, period, hold, *times) for each in speeds])
 
-        return lru_cache(maxsize=_REMEMBERED)(terms)
+        return terms
 
     def of_speeds(self, terms: Callable[..., Array], *times: Any) -> Array:
         """Evaluate what follows from speeds, their sampling period, what they are between samples, and more."""

@@ -114,17 +114,6 @@ class GustRanges:
         columns = (*sizes, self.memory, self.memory_low, self.memory_high)
         return tuple(map(GustAxis, GUST_AXES, *(column.tolist() for column in columns)))
 
-    @classmethod
-    def of_known(cls, *known: Array) -> GustRanges | None:
-        """Extend what is known of gusts, in the order of `RANGES`, to all axes: none where no size is."""
-        there = np.isfinite(known[0])
-        if not there.any():
-            return None
-        columns = [np.full(len(GUST_AXES), none) for none in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)]
-        for values, own in zip(columns, known, strict=True):
-            values[: len(there)][there] = own[there]
-        return GustRanges(**dict(zip(RANGES, columns, strict=True)))
-
 
 RANGES = tuple(each.name for each in fields(GustRanges))
 """Names of the fields of `GustRanges`."""

@@ -16,7 +16,6 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.estimation.estimate import Prior
-from cpfls_cli.gauss_newton import minimised
 from cpfls_cli.playback.evaluation import PRIOR, VehicleAt
 from cpfls_cli.playback.fit import (
     FitPoint,
@@ -26,6 +25,7 @@ from cpfls_cli.playback.fit import (
     SideBySide,
     WindowSet,
     block_errors,
+    minimised,
     parts_of,
     side_by_side,
     windows_of,
@@ -96,7 +96,7 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
     ends = tuple(np.broadcast_to(end, _FIRST.shape).ravel() for end in _BOUNDS)
     point = partial(_point, at, begun, past_s)
     first = point(_FIRST.ravel())
-    found = minimised(point, first, first.scales, (ends[0], ends[1]), _STEPS, _TOLERANCE, _DAMPING)
+    found = minimised(point, first, (ends[0], ends[1]), _STEPS, _TOLERANCE, _DAMPING)
     return _observer(found.values, past_s)
 
 

@@ -222,8 +222,9 @@ def _sums(stretch: BalancedTorque, short_s: float, long_s: float) -> Iterator[Ar
     if not count:
         return
     noise = band.alternating()
-    seen, turning = band.average(torque), band.derivative(momentum) + band.average(direct)
-    unseen, trembling = noise.average(torque), noise.derivative(momentum) + noise.average(direct)
+    (seen, turning), (unseen, trembling) = (
+        (each.average(torque), each.balance(direct, momentum)) for each in (band, noise)
+    )
     products = np.stack([seen**2, seen * turning, turning**2, unseen**2, trembling**2], axis=2)
     blocks = max(1, round(count * band.hop * period / BLOCK_S))
     number = contiguous(count, blocks)

@@ -33,23 +33,6 @@ if TYPE_CHECKING:
     from cpfls_cli.regressor.regressor import InertiaValues
 
 
-class Airflow(NamedTuple):
-    """Terms of a learned remainder over the direction of the airflow; empty without rules.
-
-    `breakpoints`: peaks of the membership functions, shares of a turn, shape (rules + 1,); `order`: of the harmonics in
-    each consequent, 0 for the seesaw.
-    """
-
-    breakpoints: Array
-    order: int
-
-    @property
-    def columns(self) -> int:
-        """Count the columns of the system; none without rules."""
-        features = 1 + (2 * self.order if self.order else 1)
-        return max(len(self.breakpoints) - 1, 1) * features if len(self.breakpoints) else 0
-
-
 @result
 class Remainder:
     """What has no name: torque and force over the direction of the airflow, by a periodic fuzzy system.

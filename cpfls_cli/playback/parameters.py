@@ -14,7 +14,7 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.playback.model import Airflow, Remainder
+from cpfls_cli.playback.model import Remainder
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 INERTIA = "inertia"
@@ -150,22 +150,32 @@ def needs_velocity(block: str) -> bool:
     )
 
 
+class Rules(NamedTuple):
+    """Partition and consequents of a remainder: even rules over the circle, order of the harmonics (0: seesaw)."""
+
+    number: int
+    order: int
+
+    @property
+    def columns(self) -> int:
+        """Count the columns of the system; none without rules."""
+        return self.number * (1 + (2 * self.order or 1))
+
+
+_NO_RULES = Rules(0, 0)
+
+
 @dataclass(frozen=True)
 class FreeNumbers:
     """The numbers of a vehicle that are free, and what each adds to torque and force.
 
-    `chosen` are blocks besides those of what is not known of the vehicle; `airflow` are rules of the remainder, where
-    it is among them.
+    `chosen` are blocks besides those of what is not known of the vehicle; `rules` are those of the remainder, where it
+    is among them.
     """
 
     vehicle: VehicleSettings
     chosen: tuple[str, ...]
-    airflow: Airflow
-
-    @cached_property
-    def key(self) -> tuple[VehicleSettings, tuple[str, ...], tuple[float, ...], int]:
-        """What makes the numbers what they are, to be remembered by."""
-        return self.vehicle, self.chosen, tuple(self.airflow.breakpoints.tolist()), self.airflow.order
+    rules: Rules = _NO_RULES
 
     @cached_property
     def blocks(self) -> tuple[str, ...]:
@@ -216,7 +226,7 @@ class FreeNumbers:
         return tuple(
             Number(f"{block}.{row}_{column}_{power}", "SI", 0.0, sizes[row] / rotor, -np.inf, np.inf, 1.0)
             for row in LEARNED[block]
-            for column in range(self.airflow.columns)
+            for column in range(self.rules.columns)
             for power, rotor in ((0, hover), (1, 1.0))
         )
 
@@ -244,8 +254,8 @@ class FreeNumbers:
         """Build the remainder of some of its blocks, from their coefficients in order."""
         rows = np.array([row for block in blocks for row in LEARNED[block]], dtype=np.int64)
         return Remainder(
-            breakpoints=self.airflow.breakpoints,
-            harmonic_order=self.airflow.order,
+            breakpoints=np.linspace(0.0, 1.0, self.rules.number + 1),
+            harmonic_order=self.rules.order,
             rows=rows,
             coefficients=coefficients.reshape(len(rows), -1, 2),
         )

@@ -26,7 +26,7 @@ from cpfls_cli.playback.flight import (
 )
 from cpfls_cli.playback.model import VehicleModel, wrench_along
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.windows import MOST_RUNS, Flown, Steps, errors_of_runs, rotation_errors
+from cpfls_cli.playback.windows import MOST_RUNS, Flown, Steps, errors_of_runs, exponential, rotation_errors
 from cpfls_cli.playback.windows import Runs as FlownRuns
 from cpfls_cli.result import about, result
 
@@ -316,10 +316,15 @@ def still_runs(
         position = position + elapsed * begin.velocity
         # How far it has turned: of one that fades, as far as the rate at the start does in a shorter time.
         turned = (elapsed if np.isinf(fading_s) else fading_s * (1.0 - share)) * begin.rate
-        held = held @ rotations.turns(turned.reshape(-1, 3)).reshape(*rate.shape, 3)
+        held = held @ _turns(turned.reshape(-1, 3)).reshape(*rate.shape, 3)
     at = after[:, None] + starts
     errors = less_measured(State(position, begin.velocity, np.broadcast_to(held, (*rate.shape, 3)), rate), motion, at)
     return Runs(errors.swapaxes(0, 1), np.full(len(starts), -1))
+
+
+def _turns(vector: Array) -> Array:
+    """Compute the rotations by vectors, rad, shape (samples, 3) to (samples, 3, 3)."""
+    return np.stack(exponential(tuple(vector.T)), axis=1).reshape(-1, 3, 3)
 
 
 def less_measured(state: State, motion: MeasuredMotion, at: IntArray) -> Array:
@@ -457,7 +462,7 @@ def fly_body(course: Course, mass: float, inertia: Array, wrench: Wrench, lag: f
         linear = np.einsum("nij,nj->ni", state.rotation, force) / mass + gravity
         moment = torque - rotations.cross(state.rate, state.rate @ inertia)
         velocity, rate = state.velocity + period * linear, state.rate + period * np.linalg.solve(inertia, moment.T).T
-        turned = state.rotation @ rotations.turns(period * rate)
+        turned = state.rotation @ _turns(period * rate)
         state = State(state.position + period * velocity, velocity, turned, rate)
         speed = keep * speed + (1.0 - keep) * command
         if step % course.finer == 0:

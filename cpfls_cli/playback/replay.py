@@ -121,11 +121,14 @@ def fading(flights: Sequence[PlaybackFlight], horizon: int) -> float:
 
 
 @dataclass(frozen=True)
-class ReplayWindows:
-    """Where runs started, and how far off they were.
+class Replay:
+    """Errors of predictions of flights by horizon, and where runs started and how far off they were.
 
     Attributes
     ----------
+    models : dict of str to Prediction
+        Of `PREDICTIONS`, and `WITH_PAST` and `RATE_FADES` where all flights have them.
+    horizon_s : array, shape (horizon,), s
     flight : array of int, shape (window,)
     start : array of int, shape (window,)
         Sample of the flight.
@@ -135,6 +138,8 @@ class ReplayWindows:
         Step at which a run was stopped; -1 for those that went on.
     """
 
+    models: dict[str, Prediction]
+    horizon_s: Array
     flight: IntArray
     start: IntArray
     size: Array
@@ -145,62 +150,30 @@ class ReplayWindows:
         """How far off the model was, shape (window,), rad/s."""
         return np.asarray(self.size[PREDICTIONS.index(MODEL)])
 
-    def worst(self, horizon: int, count: int) -> list[int]:
-        """List the windows in which the model is farthest off, without overlap, the worst first.
-
-        Parameters
-        ----------
-        horizon : int
-            Samples.
-        count : int
-            At most.
-        """
+    def worst(self, count: int) -> list[int]:
+        """List at most so many windows in which the model is farthest off, without overlap, the worst first."""
         chosen: list[int] = []
         for index in np.argsort(-self.of_model, kind="stable"):
             here = self.flight[chosen] == self.flight[index]
-            if not np.any(here & (np.abs(self.start[chosen] - self.start[index]) <= horizon)):
+            if not np.any(here & (np.abs(self.start[chosen] - self.start[index]) <= len(self.horizon_s))):
                 chosen.append(int(index))
             if len(chosen) == count:
                 break
         return chosen
 
-    def typical(self, horizon: int, count: int) -> list[int]:
-        """List windows one after another that are as far off as the middle one of all such stretches is.
-
-        Parameters
-        ----------
-        horizon : int
-            Samples.
-        count : int
-            Windows, at most.
-        """
-        stretches = [part for flight in np.unique(self.flight) for part in self._stretches(int(flight), horizon, count)]
+    def typical(self, count: int) -> list[int]:
+        """List at most so many windows in a row that are as far off as the middle one of all such stretches is."""
+        stretches = [part for flight in np.unique(self.flight) for part in self._stretches(int(flight), count)]
         sizes = np.array([self.of_model[part].mean() for part in stretches])
         return stretches[int(np.argsort(sizes, kind="stable")[(len(sizes) - 1) // 2])]
 
-    def _stretches(self, flight: int, horizon: int, count: int) -> Iterator[list[int]]:
+    def _stretches(self, flight: int, count: int) -> Iterator[list[int]]:
         """Tile a flight with windows, each the first that begins behind the one before."""
         tiles: list[int] = []
         for index in np.flatnonzero(self.flight == flight):
-            if not tiles or self.start[index] >= self.start[tiles[-1]] + horizon:
+            if not tiles or self.start[index] >= self.start[tiles[-1]] + len(self.horizon_s):
                 tiles.append(int(index))
         yield from (tiles[first : first + count] for first in range(0, max(len(tiles) - count + 1, 1), count))
-
-
-@dataclass(frozen=True)
-class Replay:
-    """Errors of predictions of flights by horizon and window.
-
-    Attributes
-    ----------
-    models : dict of str to Prediction
-        Of `PREDICTIONS`, and `WITH_PAST` and `RATE_FADES` where all flights have them.
-    horizon_s : array, shape (horizon,), s
-    """
-
-    models: dict[str, Prediction]
-    horizon_s: Array
-    windows: ReplayWindows
 
     def along(self, flights: Sequence[Played], names: Mapping[str, str] | None = None) -> AlongFlights:
         """Sum up without the windows.
@@ -215,7 +188,7 @@ class Replay:
             horizon_s=self.horizon_s,
             models={new: self.models[name] for name, new in kept.items()},
             flights=tuple(played.flight.name for played in flights),
-            windows=len(self.windows.start),
+            windows=len(self.start),
             fading_s=flights[0].fading_s,
             better=where_better(flights, self),
         )
@@ -227,13 +200,12 @@ _OUTER = 0.05
 
 def where_better(flights: Sequence[Played], replayed: Replay) -> Region | None:
     """Find the speeds and rates at which a model is better than what knows no model; None where it is nowhere."""
-    windows = replayed.windows
     rivals = [row for row, name in enumerate(replayed.models) if name in WITHOUT_MODEL]
-    better = windows.of_model < windows.size[rivals].min(axis=0)
+    better = replayed.of_model < replayed.size[rivals].min(axis=0)
     if not better.any():
         return None
     motions = [played.flight.motion for played in flights]
-    places = [windows.start[better & (windows.flight == index)] for index in range(len(flights))]
+    places = [replayed.start[better & (replayed.flight == index)] for index in range(len(flights))]
 
     def span(signals: Sequence[Array]) -> Array:
         sizes = [np.linalg.norm(signal[at], axis=1) for signal, at in zip(signals, places, strict=True)]
@@ -336,15 +308,15 @@ def replay(
             parts.append(_added(sums, played, batch, index, done))
             done += len(batch)
             progress(done / total)
-    windows = ReplayWindows(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
+    flight, start, sizes, diverged = (np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True))
     horizon_s: Array = flights[0].flight.motion.period * np.arange(1.0, horizon + 1.0)
-    return Replay(sums.predictions((windows.diverged >= 0).sum(axis=1)), horizon_s, windows)
+    return Replay(sums.predictions((diverged >= 0).sum(axis=1)), horizon_s, flight, start, sizes, diverged)
 
 
 def _added(
     sums: _Sums, played: Played, starts: IntArray, flight: int, first: int
 ) -> tuple[IntArray, IntArray, Array, IntArray]:
-    """Add a batch, from this window on, to the sums; give the columns of `ReplayWindows`."""
+    """Add a batch, from this window on, to the sums; give where its windows are and how far off, as `Replay` does."""
     size = np.empty((len(sums.names), len(starts)))
     diverged = np.empty(size.shape, dtype=np.int64)
     knows = played.knows
@@ -490,10 +462,10 @@ def playback(
     warnings: Sequence[str],
 ) -> Playback:
     """Put a replay together with what was asked for, by the result's fields, and the runs that are worth a look."""
-    windows, period = found.windows, float(found.horizon_s[0])
-    after = windows.diverged[PREDICTIONS.index(MODEL)]
-    counts = np.bincount(windows.flight, minlength=len(flights)).tolist()
-    starts = np.array([flights[at].time[start] for at, start in zip(windows.flight, windows.start, strict=True)])
+    period = float(found.horizon_s[0])
+    after = found.diverged[PREDICTIONS.index(MODEL)]
+    counts = np.bincount(found.flight, minlength=len(flights)).tolist()
+    starts = np.array([flights[at].time[start] for at, start in zip(found.flight, found.start, strict=True)])
     return Playback(
         horizon_s=found.horizon_s,
         models=found.models,
@@ -510,39 +482,39 @@ def playback(
             )
             for flight, own, count in zip(flights, played, counts, strict=True)
         ),
-        window_flight=windows.flight,
+        window_flight=found.flight,
         window_start=starts,
-        window_error=windows.size,
+        window_error=found.size,
         window_diverged=np.where(after < 0, np.nan, period * (after + 1)),
-        worst=tuple(_worst(played, windows, starts, len(found.horizon_s))),
-        drawn=_drawn(played, windows, starts, len(found.horizon_s)),
+        worst=tuple(_worst(played, found, starts)),
+        drawn=_drawn(played, found, starts),
         warnings=tuple(warnings),
         contradictions=contradictions_of(flights),
     )
 
 
-def _worst(played: Sequence[Played], windows: ReplayWindows, starts: Array, horizon: int) -> Iterator[WorstRun]:
-    chosen = windows.worst(horizon, _WORST)
+def _worst(played: Sequence[Played], found: Replay, starts: Array) -> Iterator[WorstRun]:
+    chosen = found.worst(_WORST)
     ran: dict[int, tuple[Array, Array]] = {}
     # Those of a flight are played back side by side, which takes no longer than one.
-    for flight in {int(windows.flight[at]) for at in chosen}:
-        own = sorted(at for at in chosen if windows.flight[at] == flight)
-        runs = drawn_runs(played[flight], windows.start[own], horizon)
+    for flight in {int(found.flight[at]) for at in chosen}:
+        own = sorted(at for at in chosen if found.flight[at] == flight)
+        runs = drawn_runs(played[flight], found.start[own], len(found.horizon_s))
         ran |= zip(own, zip(runs["measured"], runs["model"], strict=True), strict=True)
     for at in chosen:
         measured, model = ran[at]
         yield WorstRun(
-            flight=played[windows.flight[at]].flight.name,
+            flight=played[found.flight[at]].flight.name,
             start_s=float(starts[at]),
-            error_rad_s=float(windows.of_model[at]),
-            nothing_moves_rad_s=float(windows.size[PREDICTIONS.index(NOTHING_MOVES), at]),
+            error_rad_s=float(found.of_model[at]),
+            nothing_moves_rad_s=float(found.size[PREDICTIONS.index(NOTHING_MOVES), at]),
             measured=measured,
             model=model,
         )
 
 
-def _drawn(played: Sequence[Played], windows: ReplayWindows, starts: Array, horizon: int) -> DrawnRuns:
-    chosen = windows.typical(horizon, _DRAWN_RUNS)
-    own = played[windows.flight[chosen[0]]]
-    runs = drawn_runs(own, windows.start[chosen], horizon)
+def _drawn(played: Sequence[Played], found: Replay, starts: Array) -> DrawnRuns:
+    chosen = found.typical(_DRAWN_RUNS)
+    own = played[found.flight[chosen[0]]]
+    runs = drawn_runs(own, found.start[chosen], len(found.horizon_s))
     return DrawnRuns(flight=own.flight.name, start_s=starts[chosen], **runs)

@@ -39,31 +39,31 @@ class RotorResponse:
         """Delay, lag and slow time, s."""
         return self.delay_s, self.lag_s, self.slow_s
 
-    def terms_by_step(self, speed: Array, period: float, hold: Hold) -> Array:
-        """Evaluate the terms of the rotors over each step; parameters and shape as `rotor_terms_by_step`."""
-        return np.asarray(rotor_terms_by_step(speed, period, hold, *self.times), dtype=float)
+    def terms_by_step(
+        self, speed: Array, period: float, hold: Hold, by: TimeOfResponse | None = None, *, slow: bool = True
+    ) -> Array:
+        """Evaluate the terms of the rotors over each step, or their derivatives by one of the times.
 
-    def terms_at_samples(self, speed: Array, period: float, hold: Hold) -> Array:
-        """Evaluate the terms of the rotors at the samples themselves, where torque and force are asked for.
+        Maybe without slowness; other parameters and shape as `rotor_terms_by_step`.
+        """
+        delay_s, lag_s, slow_s = self._moved(by)
+        return _slope(rotor_terms_by_step(speed, period, hold, delay_s, lag_s, slow_s if slow else None), by)
+
+    def terms_at_samples(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse | None = None) -> Array:
+        """Evaluate the terms at the samples themselves, where torque and force are asked for, or derivatives of them.
 
         A speed that stays until the next sample jumps there: taken is the middle of the jump. Parameters and shape as
-        `rotor_terms_by_step`.
+        `terms_by_step`.
         """
-        return np.asarray(_terms_at_samples(speed, period, hold, *self.times), dtype=float)
+        return _slope(_terms_at_samples(speed, period, hold, *self._moved(by)), by)
 
-    def slope_by_step(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse, *, slow: bool = True) -> Array:
-        """Differentiate `terms_by_step` by one of the times, maybe without slowness."""
-        delay_s, lag_s, slow_s = self._moved(by)
-        terms = rotor_terms_by_step(speed, period, hold, delay_s, lag_s, slow_s if slow else None)
-        return np.asarray(terms.imag / _STEP)
-
-    def slope_at_samples(self, speed: Array, period: float, hold: Hold, by: TimeOfResponse) -> Array:
-        """Differentiate `terms_at_samples` by one of the times."""
-        return np.asarray(_terms_at_samples(speed, period, hold, *self._moved(by)).imag / _STEP)
-
-    def _moved(self, by: TimeOfResponse) -> list[complex]:
+    def _moved(self, by: TimeOfResponse | None) -> list[complex]:
         times = {"delay_s": self.delay_s, "lag_s": self.lag_s, "slow_s": self.slow_s}
         return [time + 1j * _STEP if name == by else time for name, time in times.items()]
+
+
+def _slope(terms: Numbers, by: TimeOfResponse | None) -> Array:
+    return np.asarray(terms.real if by is None else terms.imag / _STEP, dtype=float)
 
 
 def _terms_at_samples(speed: Array, period: float, hold: Hold, delay_s: Any, lag_s: Any, slow_s: Any) -> Numbers:

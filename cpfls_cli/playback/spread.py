@@ -20,12 +20,12 @@ from cpfls_cli.inertia import (
     six_parameters,
     symmetric,
 )
-from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
+from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
 from cpfls_cli.playback.vehicle import FoundNumber, FoundVehicle, bodily
-from cpfls_cli.vehicle.rotors import figures_of_vehicle
+from cpfls_cli.vehicle.rotors import figures_of_vehicle, with_factors
 from cpfls_cli.vehicle_limits import broken_limits
 
 MOMENTS = tuple(f"inertia.{name}" for name in INERTIA_PARAMETERS[:3])
@@ -250,20 +250,12 @@ def model_at(model: VehicleModel, numbers: Sequence[FoundNumber], row: Array) ->
     values = dict(zip((number.name for number in numbers), row.tolist(), strict=True))
     begun = {number.name: number.value for number in numbers}
     thrust, drag = (values[name] / begun[name] if name in begun else 1.0 for name in (THRUST, DRAG))
-    rotors = tuple(
-        replace(
-            rotor,
-            thrust_factor_n_s2=rotor.thrust_factor_n_s2 * thrust,
-            drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * drag,
-        )
-        for rotor in model.vehicle.rotors
-    )
     xx, yy, zz, xy, xz, yz = _inertia(model, values).tolist()
     response = model.response
     slow = {name: values.get(own, getattr(response, name)) for own, name in _SLOW_NAMES}
     return replace(
         model,
-        vehicle=replace(model.vehicle, rotors=rotors, inertia_kg_m2=(xx, yy, zz, xy, xz, yz)),
+        vehicle=replace(with_factors(model.vehicle, thrust, drag), inertia_kg_m2=(xx, yy, zz, xy, xz, yz)),
         thrust_linear=_thrust_linear(model, numbers, values),
         response=replace(
             response, lag_s=values.get(LAG, response.lag_s), delay_s=values.get(DELAY, response.delay_s), **slow
@@ -294,15 +286,15 @@ def _gusts_drawn(
 ) -> Iterator[Gusts | None]:
     """Draw the gusts of each vehicle."""
     gusts = found.disturbance
-    known = None if gusts is None else GustRanges.of_known(*(getattr(gusts, name) for name in RANGES))
-    if known is None:
+    if gusts is None or gusts.gusts is None:
         yield from [None] * len(heavier)
         return
-    size = _factors_drawn(known.size, known.low, known.high, rng.standard_normal(heavier.shape))
-    memory = _factors_drawn(known.memory, known.memory_low, known.memory_high, rng.standard_normal(heavier.shape))
+    normal = rng.standard_normal((2, *heavier.shape))[..., : len(gusts.size)]
+    size = _factors_drawn(gusts.size, gusts.low, gusts.high, normal[0])
+    memory = _factors_drawn(gusts.memory, gusts.memory_low, gusts.memory_high, normal[1])
     white = np.zeros(len(GUST_AXES)) if model.gusts is None else model.gusts.white
     for own, own_size, own_memory in zip(heavier, size, memory, strict=True):
-        yield Gusts(own_size * own, own_memory, white * own)
+        yield Gusts.known(own_size * own[: len(own_size)], own_memory)._replace(white=white * own)
 
 
 _NORMAL = 1.959964

@@ -29,8 +29,7 @@ from cpfls_cli.playback.fit import (
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.model import Airflow
-from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, blocks_of, needs_velocity
+from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, Rules, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending, at_most, less, smallest
@@ -63,18 +62,6 @@ _ACTUATION = ("lag", "delay", "slow_actuation")
 own, and what it gains is not predicted."""
 
 
-class Rules(NamedTuple):
-    """Partition and consequents of a remainder: rules over the circle, order of the harmonics (0: seesaw)."""
-
-    number: int
-    order: int
-
-    @property
-    def airflow(self) -> Airflow:
-        """Equidistant rules."""
-        return Airflow(np.linspace(0.0, 1.0, self.number + 1), self.order)
-
-
 REMAINDERS = (Rules(1, 1), Rules(1, 2), Rules(1, 3), Rules(3, 1), Rules(4, 0))
 """Partitions of the remainder that are tried."""
 
@@ -92,7 +79,7 @@ class Structure(NamedTuple):
 
     def free(self, vehicle: VehicleSettings, groups: tuple[Group, ...] = ()) -> JointNumbers:
         """List its numbers, and what other configurations have of their own."""
-        return JointNumbers(FreeNumbers(vehicle, self.blocks, self.rules.airflow), groups)
+        return JointNumbers(FreeNumbers(vehicle, self.blocks, self.rules), groups)
 
 
 @dataclass(frozen=True)

@@ -89,13 +89,8 @@ class Responses:
         return {name: own.word for name, own in self.responses.items()}
 
 
-def no_instruments(inputs: Sequence[Array]) -> Sequence[Array | None]:
-    """Give none: what is estimated is then the response of vehicle and autopilot together."""
-    return [None] * len(inputs)
-
-
 def vehicle_responses(
-    model: VehicleModel, flights: Sequence[LoggedFlight], instruments: InstrumentSource = no_instruments
+    model: VehicleModel, flights: Sequence[LoggedFlight], instruments: InstrumentSource | None = None
 ) -> dict[str, VehicleResponse]:
     """Estimate all responses that flights show, with those of a model along the same flights.
 
@@ -105,7 +100,7 @@ def vehicle_responses(
     the response of the speeds needs no instruments. What instruments do not move is estimated without.
 
     `flights`: of one sampling period.
-    `instruments`: see `InstrumentSource`.
+    `instruments`: see `InstrumentSource`; None: of vehicle and autopilot together.
     Raises InputError if a flight lacks what the model needs, or all are too short for a window.
     """
     by_flight = [_of_flight(model, flight) for flight in flights]
@@ -113,7 +108,7 @@ def vehicle_responses(
     for name in dict.fromkeys(name for parts in by_flight for name in parts):
         own = [parts[name] for parts in by_flight if name in parts]
         # Repeats are instruments for each other: a flight that lacks the response leaves the others without.
-        if name != ROTOR_SPEED and len(own) == len(flights):
+        if instruments is not None and name != ROTOR_SPEED and len(own) == len(flights):
             given = _alike(instruments([np.concatenate([part.input for part in parts]) for parts in own]))
             own = [_with_instrument(*pair) for pair in zip(own, given, strict=True)]
         found[name] = [part for parts in own for part in parts]

@@ -8,7 +8,7 @@ the disturbance, such as a logged setpoint or the same path flown again: ``S_zy 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import ceil, floor, log10
 from typing import ClassVar, NamedTuple
 
@@ -200,6 +200,27 @@ class Stretch(NamedTuple):
     start: int = 0  # First sample, counted from where the path begins that a flight has in common with its repeats.
 
 
+def decibels(gain: Numbers) -> Array:
+    """Give the magnitude of a gain, dB; NaN where it is 0 or not known."""
+    size = np.abs(gain)
+    return np.asarray(20 * np.log10(size, where=size > 0, out=np.full(size.shape, np.nan)))
+
+
+def degrees(gain: Numbers) -> Array:
+    """Give the phase of a gain, from -180 to 180; NaN where it is 0 or not known."""
+    return np.where(np.abs(gain) > 0, np.degrees(np.angle(gain)), np.nan)
+
+
+def _shown(form: Callable[[Numbers], Array], name: str) -> property:
+    """Make a property that gives a gain of a response in a form; NaN where it has none."""
+
+    def shown(response: FrequencyResponse) -> Array:
+        own = getattr(response, name)
+        return form(np.full_like(response.gain, np.nan) if own is None else own)
+
+    return property(shown)
+
+
 @result
 class FrequencyResponse:
     """A frequency response and how far to trust it."""
@@ -227,35 +248,12 @@ class FrequencyResponse:
     )
     averages: Array = about("windows that count as independent", "frequency", gaps=True)
 
-    @property
-    def magnitude_db(self) -> Array:
-        """Magnitude of the measured response, dB, shape (frequency,)."""
-        return decibels(self.gain)
-
-    @property
-    def phase_deg(self) -> Array:
-        """Phase of the measured response, from -180 to 180 degrees, shape (frequency,)."""
-        return degrees(self.gain)
-
-    @property
-    def model_magnitude_db(self) -> Array:
-        """The same of the model; NaN without one."""
-        return decibels(np.full_like(self.gain, np.nan) if self.model is None else self.model)
-
-    @property
-    def model_phase_deg(self) -> Array:
-        """The same of the model; NaN without one."""
-        return degrees(np.full_like(self.gain, np.nan) if self.model is None else self.model)
-
-    @property
-    def direct_magnitude_db(self) -> Array:
-        """The same without instruments."""
-        return decibels(self.direct)
-
-    @property
-    def direct_phase_deg(self) -> Array:
-        """The same without instruments."""
-        return degrees(self.direct)
+    magnitude_db, phase_deg = _shown(decibels, "gain"), _shown(degrees, "gain")
+    """Magnitude in dB and phase from -180 to 180 degrees of the measured response, shape (frequency,)."""
+    model_magnitude_db, model_phase_deg = _shown(decibels, "model"), _shown(degrees, "model")
+    """The same of the model; NaN without one."""
+    direct_magnitude_db, direct_phase_deg = _shown(decibels, "direct"), _shown(degrees, "direct")
+    """The same without instruments."""
 
     @property
     def columns(self) -> dict[str, Array]:
@@ -272,17 +270,6 @@ class FrequencyResponse:
     def clearness(self) -> Array:
         """The coherence that counts, shape (frequency,)."""
         return clearness(self.coherence, self.random_error, self.averages, self.instrumented)
-
-
-def decibels(gain: Numbers) -> Array:
-    """Give the magnitude of a gain, dB; NaN where it is 0 or not known."""
-    size = np.abs(gain)
-    return np.asarray(20 * np.log10(size, where=size > 0, out=np.full(size.shape, np.nan)))
-
-
-def degrees(gain: Numbers) -> Array:
-    """Give the phase of a gain, from -180 to 180; NaN where it is 0 or not known."""
-    return np.where(np.abs(gain) > 0, np.degrees(np.angle(gain)), np.nan)
 
 
 def frequency_response(stretches: Sequence[Stretch], period: float) -> FrequencyResponse | None:

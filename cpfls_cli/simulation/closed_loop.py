@@ -106,51 +106,22 @@ def given_turning(numbers: Vector) -> Turning:
     return Turning((numbers[:3], numbers[3:6], numbers[6:9]), numbers[9:])
 
 
-class Plant:
-    """A vehicle whose derivative is evaluated state by state.
+def settled(
+    vehicle: Vehicle, model: VehicleModel | None, state: Array, speed: Array, push: Array | None = None
+) -> Array:
+    """Differentiate a state with rotors that have long turned at a speed, shape (state,).
 
-    Attributes
+    Parameters
     ----------
-    start : array, shape (state,)
-        At rest at the origin, with the bodies that it carries.
+    speed : array, shape (rotor,), rad/s
+    push : array, shape (6,), N m and N, body frame, or None
+        Of gusts.
     """
-
-    def __init__(self, vehicle: Vehicle, model: VehicleModel | None) -> None:
-        self._turning = turning_of(vehicle, model)
-        rotors, extra = len(vehicle.settings.rotors), 0 if self._turning is None else TURNING_NUMBERS
-        self.start = np.array([*[0.0] * VEHICLE_STATES, *vehicle.start])
-        states = len(self.start)
-
-        def build(_memory: Memory, given: tuple[Symbol, ...]) -> Vector:
-            state, push, rest = given[:states], given[states : states + 6], given[states + 6 :]
-            speed, acceleration, slow = (Each(rest[rotors * n : rotors * (n + 1)]) for n in range(3))
-            instant = vehicle.instant(state, speed, acceleration, slow)
-            turning = given_turning(rest[3 * rotors :]) if extra else None
-            return vehicle.derivative(instant, state, push, turning)
-
-        self._machine = Machine.of(build, states + 6 + 3 * rotors + extra)
-
-    def derivative(
-        self, state: Array, speed: Array, acceleration: Array, slow: Array, push: Array | None = None
-    ) -> Array:
-        """Differentiate the state, shape (state,).
-
-        Parameters
-        ----------
-        speed, acceleration, slow : array, shape (rotor,), rad/s, rad/s^2 and rad^2/s^2
-            Of the rotors; squared speed that slow actuation has come to.
-        push : array, shape (6,), N m and N, body frame, or None
-            Of gusts.
-        """
-        push = np.zeros(6) if push is None else push
-        numbers = tuple(state.tolist())
-        turning = () if self._turning is None else self._turning(numbers)
-        parts = (each.tolist() for each in (push, speed, acceleration, slow))
-        return np.array(self._machine.advance((*numbers, *(x for part in parts for x in part), *turning)))
-
-    def settled(self, state: Array, speed: Array, push: Array | None = None) -> Array:
-        """Differentiate the state with rotors that have long turned at a speed; parameters as of `derivative`."""
-        return self.derivative(state, speed, np.zeros_like(speed), speed**2, push)
+    numbers, rotors = tuple(state.tolist()), Each(speed.tolist())
+    turning = turning_of(vehicle, model)
+    now = vehicle.instant(numbers, rotors, 0, rotors**2)
+    pushed = None if push is None else tuple(push.tolist())
+    return np.array(vehicle.derivative(now, numbers, pushed, turning and given_turning(turning(numbers))), dtype=float)
 
 
 # Share of the full battery: what a load takes beyond it would turn rotors backwards.
@@ -548,7 +519,7 @@ def _integration(
     """Set up the integration at a state, shape (12,), with the rotors at a speed that they were commanded to."""
     flown = flown_vehicle(loop.vehicle, loop.model, loop.effects)
     state = np.concatenate([state, flown.start])
-    change = Plant(flown, loop.model).settled(state, speed, None if push is None else push[0])
+    change = settled(flown, loop.model, state, speed, None if push is None else push[0])
     response = RotorResponse() if loop.model is None else loop.model.response
     chain = actuators(loop.effects, response, loop.vehicle, loop.settings, speed, clock.step * clock.steps)
     return Integration(pilot, chain, flown, loop.model, state, change, clock, push)

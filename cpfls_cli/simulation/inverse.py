@@ -9,8 +9,9 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
-from cpfls_cli.dynamics import body_torque, inertia_tensor
+from cpfls_cli.dynamics import body_torque
 from cpfls_cli.errors import ComputationError, SettingError
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.simulation.measured import noisy
 from cpfls_cli.simulation.model import Simulated
 from cpfls_cli.simulation.settings import SimulationSettings
@@ -140,7 +141,7 @@ def tilt_of(attitude: Array) -> Array:
 def needed_wrench(planned: Mapping[str, Array], vehicle: VehicleSettings) -> tuple[Array, Array]:
     """Compute the body torque, shape (time, 3), N m, and the thrust, shape (time,), N, that a motion needs."""
     rotation = planned["attitude"], planned["attitude_rate"], planned["attitude_acceleration"]
-    about_body = body_torque(*rotation, inertia_tensor(vehicle))
+    about_body = body_torque(*rotation, symmetric(vehicle.inertia_kg_m2))
     return about_body, collective_thrust(vehicle, about_body, planned.get("acceleration"))
 
 

@@ -86,7 +86,7 @@ def measure(
         motion.state[:, POSITION] - planned["position"], motion.state[:, ATTITUDE] - planned["attitude"]
     )
     beyond = violations(motion.demand, vehicle.rotor_speed_max_rad_s)
-    return Simulated.of(time, signals, noise_std, beyond, effects=values_of(flown), flown=flown, tracking=tracking)
+    return Simulated.of(time, signals, noise_std, beyond, effects=values_of(flown), tracking=tracking)
 
 
 def _logged(

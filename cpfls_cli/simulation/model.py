@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -126,9 +126,6 @@ class Simulated(Flight):
     infeasible: tuple[Infeasible, ...] = part()
     effects: Mapping[str, float] = about("true values of what was flown beyond the model, by `effect.coefficient`")
     tracking: Tracking | None = part(default=None)
-
-    flown: SimulatedEffects = field(default_factory=SimulatedEffects)
-    """Each effect with its numbers; in no file."""
 
     @classmethod
     def of(

@@ -81,25 +81,6 @@ class Air:
         return push, None if lack is None else lack.drawn(self.model, self.rng, clock.step, clock.steps)
 
 
-@dataclass(frozen=True)
-class TwinFlight:
-    """A simulated vehicle along the setpoints of a flight.
-
-    Attributes
-    ----------
-    values : array, shape (time, channel)
-        Of `CHANNELS`, NaN behind a loss of the vehicle.
-    position : array, shape (time, 3), m, world frame
-        The same.
-    lost_s : float
-        When it was lost, on the clock of the flight; NaN where it was not.
-    """
-
-    values: Array
-    position: Array
-    lost_s: float
-
-
 def asked_of(flight: LoggedFlight, settings: ClosedLoopSettings, vehicle: VehicleSettings, *, share: bool) -> Asked:
     """Give the setpoints of a flight to the law of `settings.autopilot`.
 
@@ -200,8 +181,10 @@ def fly_twin(
     asked: Asked,
     progress: Callable[[int], None] = lambda _done: None,
     air: Air | None = None,
-) -> TwinFlight:
+) -> TwinVehicle:
     """Fly the setpoints of a flight, each stretch from the flight's own state on, without looking at the flight again.
+
+    Its motion is that of `CHANNELS`, NaN behind a loss of the vehicle; they are not compared yet.
 
     Parameters
     ----------
@@ -217,7 +200,8 @@ def fly_twin(
         positions.append(places)
         lost = where if np.isnan(lost) else lost
         progress(sum(map(len, parts)))
-    return TwinFlight(np.concatenate(parts), np.concatenate(positions), lost)
+    simulated, position = np.concatenate(parts), np.concatenate(positions)
+    return TwinVehicle(lost_s=lost, simulated=simulated, position=position, channels={})
 
 
 def _flown(loop: ClosedLoop, part: Signals, setpoints: Setpoints, air: Air | None) -> tuple[Array, Array, float]:
@@ -260,7 +244,7 @@ def fly_in_gusts(
     lack: Lack | None,
     rng: np.random.Generator,
     progress: Callable[[int], None] = lambda _done: None,
-) -> list[TwinFlight]:
+) -> list[TwinVehicle]:
     """Fly the setpoints of a flight by vehicles that may differ, each in gusts of its own and with what is lacking."""
     found = []
     for number, (model, own) in enumerate(zip(models, rng.spawn(len(models)), strict=True)):
@@ -472,7 +456,7 @@ class Twin:
 def twin_of(
     flight: LoggedFlight,
     asked: Asked,
-    flown: Mapping[str, TwinFlight],
+    flown: Mapping[str, TwinVehicle],
     settings: ClosedLoopSettings,
     gains: TwinGains,
     warnings: Sequence[str],
@@ -506,12 +490,7 @@ def twin_of(
         still_rms=root_mean_square(measured - still),
         window_start=np.array([flight.time[each.start] for each in windows(flight)]),
         vehicles={
-            name: TwinVehicle(
-                lost_s=one.lost_s,
-                simulated=one.values,
-                position=one.position,
-                channels=compared(flight, asked, measured, one.values, moves),
-            )
+            name: replace(one, channels=compared(flight, asked, measured, one.simulated, moves))
             for name, one in flown.items()
         },
         in_gusts=air,
@@ -540,21 +519,21 @@ def compared(
     def found(index: int) -> TwinChannel:
         own, other = measured[:, index], simulated[:, index]
         estimate, judged, follows = _answers(flight, _input_of(flight, asked, index), own, other, instrument)
-        rms = root_mean_square((own - other)[:, None])[0]
+        rms = float(root_mean_square(own - other))
         following, floor, least = np.full_like(own, np.nan), np.nan, np.nan
         if follows is not None:
             following = follows
-            floor = float(np.sqrt(max(rms**2 - root_mean_square(following[:, None])[0] ** 2, 0.0)))
-            least = _LEAST * float(root_mean_square(own[:, None], about_mean=True)[0])
+            floor = float(np.sqrt(max(rms**2 - float(root_mean_square(following)) ** 2, 0.0)))
+            least = _LEAST * float(root_mean_square(own, about_mean=True))
         difference, followed = (
-            np.array([root_mean_square(values[each, None])[0] for each in cut]) for values in (own - other, following)
+            np.array([root_mean_square(values[each]) for each in cut]) for values in (own - other, following)
         )
         apart = _is_apart(difference, followed, floor, least)
         first = np.flatnonzero(apart)
         unknown = np.zeros(0, dtype=complex)
         return TwinChannel(
             **vars(judged),
-            rms=float(rms),
+            rms=rms,
             floor=floor,
             first_apart_s=float(flight.time[cut[first[0]].start]) if len(first) else np.nan,
             frequency=np.zeros(0) if estimate is None else estimate.frequency,
@@ -618,7 +597,7 @@ def windows(flight: LoggedFlight) -> list[slice]:
 
 
 def root_mean_square(values: Array, *, about_mean: bool = False) -> Array:
-    """Take the root mean square of each column where it is known, NaN where nowhere."""
+    """Take the root mean square over time where it is known, NaN where nowhere."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     held = np.where(known, values, 0.0)
@@ -688,7 +667,7 @@ def known_axes(gusts: Gusts | None, lack: Lack | None) -> BoolArray:
 def in_gusts(
     measured: Array,
     still: Array,
-    flown: Sequence[TwinFlight],
+    flown: Sequence[TwinVehicle],
     blown: BoolArray,
     rng: np.random.Generator,
     vehicle: str = "",
@@ -711,7 +690,7 @@ def in_gusts(
     ----------
     Barnard 1963 (Monte Carlo tests); Westfall and Young 1993 (the largest of several).
     """
-    values = np.stack([each.values for each in flown])
+    values = np.stack([each.simulated for each in flown])
     noise = _white(measured, values)
     values = values + noise * rng.standard_normal(values.shape)
     held = blown[list(_MOVED_BY)]

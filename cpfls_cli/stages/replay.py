@@ -21,7 +21,7 @@ from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.errors import NOTHING_MOVES, STATED
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.player import Observer, past_of
-from cpfls_cli.playback.replay import USUAL, Playback, Played, ReplayWindows, playback
+from cpfls_cli.playback.replay import USUAL, Playback, Played, Replay, playback
 from cpfls_cli.playback.replay import replay as played_back
 from cpfls_cli.playback.settings import VEHICLE
 from cpfls_cli.report.canvas import HELD, Drawn, legend_over, line, plain_ticks, stacked, style_of
@@ -150,23 +150,23 @@ def replay(
         *seen_warnings(model.name, learned_by(model), known_by(roles, inputs)),
         *(warning for flight in given for warning in flight.warnings),
         *([_FORECAST.format(model.name)] if holds_forecast(model) else []),
-        *([] if observer is None else _past_notes(observer, pairs, found.windows)),
+        *([] if observer is None else _past_notes(observer, pairs, found)),
         *model_notes(model.name, to_play, given),
     ]
     asked = {"played": model.name, "asked_s": horizon, "every": every, "hold": between or USUAL, "history_s": history}
     return playback(asked, given, pairs, found, warnings)
 
 
-def _past_notes(observer: Observer, pairs: Iterable[Played], windows: ReplayWindows) -> Iterator[str]:
+def _past_notes(observer: Observer, pairs: Iterable[Played], found: Replay) -> Iterator[str]:
     """Say where there is less of the past than was asked for."""
     short = 0
     for index, pair in enumerate(pairs):
-        starts = windows.start[windows.flight == index]
+        starts = found.start[found.flight == index]
         samples = observer.samples(pair.flight.motion.period)
         short += int(np.sum(past_of(pair.flight, starts, samples)[1].sum(axis=1) < samples))
     if short:
         yield (
-            f"{short} of {len(windows.start)} windows begin less than {observer.past_s:g} s after the start of a "
+            f"{short} of {len(found.start)} windows begin less than {observer.past_s:g} s after the start of a "
             f"stretch and use what past there is"
         )
 

@@ -51,8 +51,8 @@ from cpfls_cli.simulation.twin import (
     InGusts,
     Twin,
     TwinChannel,
-    TwinFlight,
     TwinGains,
+    TwinVehicle,
     asked_of,
     fly_in_gusts,
     fly_twin,
@@ -226,7 +226,7 @@ def twin(run: Run, path: Path, model: Path | None = None) -> Twin | None:
         raise InputError(f"{error}. Without setpoints `{words}` says where the model of the config differs") from None
     if run.dry_run:
         return None
-    flown: dict[str, TwinFlight] = {}
+    flown: dict[str, TwinVehicle] = {}
     total = (len(vehicles) + DRAWS * settings.gusts) * len(flight.time)
     for number, (name, own) in enumerate(vehicles.items()):
         before = number * len(flight.time)
@@ -267,7 +267,7 @@ def _in_gusts(
     flight: LoggedFlight,
     asked: Asked,
     possible: tuple[Sequence[VehicleModel], Lack | None],
-    flown: Mapping[str, TwinFlight],
+    flown: Mapping[str, TwinVehicle],
 ) -> InGusts:
     """Fly possible vehicles in gusts, with what the model lacks, and compare the flight with them."""
     (models, lack), rng, count = possible, generator(run.study, "simulate"), len(flight.time)
@@ -278,7 +278,7 @@ def _in_gusts(
 
     gusty = fly_in_gusts(loop, flight, asked, models, lack, rng, progress)
     name, still = list(flown.items())[-1]
-    return in_gusts(measured_channels(flight), still.values, gusty, known_axes(models[0].gusts, lack), rng, name)
+    return in_gusts(measured_channels(flight), still.simulated, gusty, known_axes(models[0].gusts, lack), rng, name)
 
 
 def _vehicles(study: Study, model: Path | None) -> dict[str, VehicleModel | None]:

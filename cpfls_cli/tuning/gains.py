@@ -211,15 +211,13 @@ def parameter_of(autopilot: Autopilot, axis: int, role: str) -> Parameter | None
 
 def floored(parameter: Parameter, wanted: float) -> Proposal:
     """Propose the next value below one that is wanted, inside the documented range."""
-    steps = floor(wanted / parameter.step + 1e-9)
-    value = min(max(steps * parameter.step, parameter.low), parameter.high)
-    return Proposal(parameter, float(f"{value:.9g}"), wanted)
+    return proposal_of(parameter, wanted, lambda steps: floor(steps + 1e-9))
 
 
-def proposal_of(parameter: Parameter, wanted: float) -> Proposal:
+def proposal_of(parameter: Parameter, wanted: float, whole: Callable[[float], int] = round) -> Proposal:
     """Propose the nearest value to one that is wanted, inside the documented range."""
-    nearest = min(max(round(wanted / parameter.step) * parameter.step, parameter.low), parameter.high)
-    return Proposal(parameter, float(f"{nearest:.9g}"), wanted)
+    value = min(max(whole(wanted / parameter.step) * parameter.step, parameter.low), parameter.high)
+    return Proposal(parameter, float(f"{value:.9g}"), wanted)
 
 
 def _with(law: Law, axis: int, own: AxisLaw) -> Law:

@@ -15,13 +15,11 @@ from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, result
-from cpfls_cli.simulation.closed_loop import Plant, flown_vehicle
+from cpfls_cli.simulation.closed_loop import flown_vehicle, given_turning, settled, turning_of
 from cpfls_cli.simulation.model import SimulatedEffects, with_effects
-from cpfls_cli.vehicle.motion import BODY_RATE, VELOCITY
+from cpfls_cli.vehicle.motion import BODY_RATE, VEHICLE_STATES, VELOCITY, Vehicle
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-_RATE_STEP, _SPEED_SHARE = 1e-3, 1e-4
-_ROUNDS = 50
+from cpfls_cli.vehicle.values import ARRAYS, Tangent
 
 
 @dataclass(frozen=True)
@@ -125,13 +123,14 @@ def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, 
     held, effects = with_effects(model, SimulatedEffects())
     flown = vehicle if held is None else held.vehicle
     motors = Motors.of(law.mixer, law.curve, flown)
-    plant = Plant(flown_vehicle(flown, held, effects), held)
-    share = _hover_share(plant, motors)
+    whole = flown_vehicle(flown, held, effects)
+    share = _hover_share(whole, held, motors)
     speed = np.full(len(flown.rotors), motors.speed_at(share))
     slope = motors.speed_slope(share)
     lag, delay, slow_s = _lags_and_delay(model, effects, rotor_lag)
-    by_speed, by_acceleration, by_slow = _slopes(plant, speed)
-    by_rate = _damping(plant, speed)
+    by_speed, by_acceleration, by_slow, by_rate = np.split(
+        _slopes(whole, held, speed), len(speed) * np.arange(1, 4), axis=1
+    )
     turned = slope * motors.mix[:, 1:]
     axes = tuple(
         AxisPlant(
@@ -140,7 +139,7 @@ def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, 
             # A change of the speed changes its slow square by twice the speed.
             slow=float(by_slow[axis] @ (2 * speed * turned[:, axis])),
             slow_s=slow_s,
-            damping=-float(by_rate[axis]),
+            damping=-float(by_rate[axis, axis]),
             lag=lag,
             delay=delay,
         )
@@ -149,39 +148,32 @@ def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, 
     return HoverPlant((axes[0], axes[1], axes[2]), share, motors.speed_at(share) / motors.speed_max)
 
 
-def _hover_share(plant: Plant, motors: Motors) -> float:
+def _hover_share(flown: Vehicle, held: VehicleModel | None, motors: Motors) -> float:
     """Find the share of the full thrust at which nothing rises or falls."""
+    # Slow to load for who reads gains alone.
+    from scipy.optimize import brentq
 
-    def climbs(share: float) -> bool:
+    start = np.array((0.0,) * VEHICLE_STATES + flown.start)
+
+    def climb(share: float) -> float:
         speed = np.full(len(motors.mix), motors.speed_at(share))
-        return bool(plant.settled(plant.start, speed)[VELOCITY][2] > 0)
+        return float(settled(flown, held, start, speed)[VELOCITY][2])
 
-    if not climbs(1.0):
+    if climb(1.0) <= 0:
         raise ComputationError(
             "vehicle: full thrust does not carry the weight; correct mass_kg, thrust_factor_n_s2 or "
             "rotor_speed_max_rad_s"
         )
-    low, high = 0.0, 1.0
-    for _ in range(_ROUNDS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if climbs(middle) else (middle, high)
-    return 0.5 * (low + high)
+    return float(brentq(climb, 0.0, 1.0, xtol=1e-15))
 
 
 def _lags_and_delay(
     model: VehicleModel | None, effects: SimulatedEffects, rotor_lag: float
 ) -> tuple[float, float, float]:
     """Give lag, delay, and the time of slow actuation, s, of all between command and torque."""
-    lags = [
-        one.effect.actuation.lag(one.values)
-        for one in effects.ordered
-        if one.effect.actuation is not None and one.effect.actuation.lag is not None
-    ]
-    delays = [
-        one.values[one.effect.shapes[0].name]
-        for one in effects.ordered
-        if one.effect.actuation is not None and one.effect.actuation.delay is not None
-    ]
+    acting = [(one.effect.actuation, one) for one in effects.ordered if one.effect.actuation is not None]
+    lags = [each.lag(one.values) for each, one in acting if each.lag is not None]
+    delays = [one.values[one.effect.shapes[0].name] for each, one in acting if each.delay is not None]
     if model is None:
         return rotor_lag, 0.0, 1.0
     behind = model.response
@@ -191,31 +183,25 @@ def _lags_and_delay(
     return rotor_lag + behind.lag_s, behind.delay_s, behind.slow_s
 
 
-def _slopes(plant: Plant, speed: Array) -> tuple[Array, Array, Array]:
-    """Differentiate angular acceleration by speeds, their accelerations and slow squares, shape (3, rotor) each."""
-    step = _SPEED_SHARE * float(speed.mean())
-    still = speed, np.zeros_like(speed), speed**2
+def _slopes(flown: Vehicle, held: VehicleModel | None, speed: Array) -> Array:
+    """Differentiate angular acceleration in hover, shape (3, 3 rotors + 3).
 
-    def slope(place: int, size: float) -> Array:
-        def turning(change: Array) -> Array:
-            rotors = (each + change if at == place else each for at, each in enumerate(still))
-            return plant.derivative(plant.start, *rotors)[BODY_RATE]
-
-        return np.array([turning(size * unit) - turning(-size * unit) for unit in np.eye(len(speed))]).T / (2 * size)
-
+    By speeds, their accelerations, and slow squares of the rotors, and by body rate.
+    """
+    rotors, hovering = len(speed), (0.0,) * VEHICLE_STATES + flown.start
     # Slowness is that behind the present square, which a change of the speed alone leaves where it was.
-    return slope(0, step), slope(1, step), slope(2, 2 * step * float(speed.mean()))
-
-
-def _damping(plant: Plant, speed: Array) -> Array:
-    """Differentiate angular acceleration by body rate about the same axis, shape (3,), 1/s."""
-
-    def turning(axis: int, rate: float) -> float:
-        moved = plant.start.copy()
-        moved[BODY_RATE.start + axis] += rate
-        return float(plant.settled(moved, speed)[BODY_RATE][axis])
-
-    return np.array([turning(axis, _RATE_STEP) - turning(axis, -_RATE_STEP) for axis in range(3)]) / (2 * _RATE_STEP)
+    speeds, accelerations, squares = (
+        Tangent(values[:, None], dict(enumerate(np.eye(rotors)[:, :, None], rotors * place)))
+        for place, values in enumerate((speed, 0.0 * speed, speed**2))
+    )
+    rate = (Tangent(0.0, {3 * rotors + axis: 1.0}) for axis in range(3))
+    state = (*hovering[: BODY_RATE.start], *rate, *hovering[BODY_RATE.stop :])
+    turning = turning_of(flown, held)
+    given = None if turning is None else given_turning(turning(hovering))
+    turned = flown.derivative(flown.instant(state, speeds, accelerations, squares, ARRAYS), state, None, given)[
+        BODY_RATE
+    ]
+    return np.array([[np.sum(each.by.get(place, 0.0)) for place in range(3 * rotors + 3)] for each in turned])
 
 
 def spread_of(intervals: Mapping[str, tuple[float, float]], moment: str, factor: str) -> Spread:

@@ -204,10 +204,6 @@ class Carrier:
     turning: Vector
     inverse: Sequence[Vector]
 
-    def turned_by(self, torque: Vector) -> Vector:
-        """Compute the angular acceleration that a torque gives."""
-        return apply(self.inverse, torque)
-
 
 class Pull(NamedTuple):
     """Acceleration of the carrier by a carried body, and the derivative of its state.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -93,6 +93,21 @@ def allocation_matrix(vehicle: VehicleSettings) -> Array:
         k, b = rotor.thrust_factor_n_s2, rotor.drag_factor_n_m_s2
         columns.append([k, y * k, -x * k, -rotor.spin * b])
     return np.array(columns).T
+
+
+def with_factors(vehicle: VehicleSettings, thrust: float, drag: float) -> VehicleSettings:
+    """Multiply the thrust and drag factors of all rotors, each by a ratio."""
+    return replace(
+        vehicle,
+        rotors=tuple(
+            replace(
+                rotor,
+                thrust_factor_n_s2=thrust * rotor.thrust_factor_n_s2,
+                drag_factor_n_m_s2=drag * rotor.drag_factor_n_m_s2,
+            )
+            for rotor in vehicle.rotors
+        ),
+    )
 
 
 def figures_of_vehicle(vehicle: VehicleSettings) -> Figures:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from math import exp
 from typing import NamedTuple
 
+import numpy as np
+
 from cpfls_cli.filters import SecondOrder
 from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, Symbol, traced
 from cpfls_cli.vehicle.values import Each, Functions, Value, plus, times
@@ -95,12 +97,8 @@ class Memory:
         """Filter a value that had settled before the first step."""
         (a0, a1, a2), (_, b1, b2) = section.over.tolist(), section.under.tolist()
         kept = self.recall((0.0, 0.0))
-        later = times(a2 - b2 * section.level, settled)
-        sooner = plus(times(a1 - b1 * section.level, settled), later)
-        one, two = (
-            self.functions.where(self.first, begin, each)
-            for begin, each in zip((sooner, later), kept.values, strict=True)
-        )
+        begin = (times(each, settled) for each in section.settled(np.ones(())).tolist())
+        one, two = (self.functions.where(self.first, *pair) for pair in zip(begin, kept.values, strict=True))
         out = plus(times(a0, now), one)
         kept.keep((plus(times(a1, now), times(-b1, out), two), plus(times(a2, now), times(-b2, out))))
         return out

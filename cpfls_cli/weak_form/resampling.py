@@ -189,7 +189,7 @@ def folds(columns: Array, right: Array, block: IntArray, prior: Array | None = N
     `block`: shape (window,).
     `prior`, shape (column,): None for nothing known.
     """
-    parts = [_rows(block == number) for number in range(int(block.max()) + 1)]
+    parts = [marked_rows(block == number) for number in range(int(block.max()) + 1)]
     rows = BlockRows(columns, right.reshape(*right.shape[:2], -1), parts)
     return Folds(
         rows.products(columns, columns),
@@ -200,7 +200,7 @@ def folds(columns: Array, right: Array, block: IntArray, prior: Array | None = N
     )
 
 
-def _rows(marked: BoolArray) -> slice | BoolArray:
+def marked_rows(marked: BoolArray) -> slice | BoolArray:
     """Say which rows are marked, as a slice where they are neighbours: nothing is copied then."""
     rows = np.flatnonzero(marked)
     neighbours = len(rows) > 0 and rows[-1] - rows[0] + 1 == len(rows)

@@ -1,6 +1,6 @@
 """Weak form: averages over smooth windows, with derivatives moved onto the window by integration by parts."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Protocol, Self
@@ -8,7 +8,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from cpfls_cli.arrays import Array, Numbers
+from cpfls_cli.arrays import Array, IntArray, Numbers
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 
@@ -43,6 +43,27 @@ class Windows:
         """Average the time derivative as `average` does, ``-int phi' x dt``; nothing is differentiated."""
         return np.asarray(-self.laid(values, self.slope))
 
+    def balance(self, direct: Array, momentum: Array | None = None) -> Array:
+        """Average ``direct + d/dt momentum``, shapes (time, ...), over each window, shape (window, ...)."""
+        return self.average(direct) if momentum is None else self.average(direct) + self.derivative(momentum)
+
+    def over(self, stretches: Iterable[slice], seen: Callable[[Array], Array], values: Array) -> Array:
+        """Average, or differentiate, over the windows of one stretch of samples after another, shape (window, ...)."""
+        return np.concatenate([seen(values[part]) for part in (slice(0), *stretches)])
+
+    def middles(self, stretches: Iterable[slice]) -> IntArray:
+        """Give the sample in the middle of each window of these stretches, shape (window,)."""
+        half = len(self.weight) // 2
+        counts = ((part.start + half, self.count(part.stop - part.start)) for part in stretches)
+        return np.concatenate([first + self.hop * np.arange(count) for first, count in counts])
+
+    def modulated(self, frequency: float | Array) -> Self:
+        """Shift windows to a frequency, Hz, ``phi(t) exp(-2 pi i f t)``; to several, the columns of the weights."""
+        turn = 2j * np.pi * np.asarray(frequency)
+        phase = np.exp(-self.period * np.multiply.outer(turn, np.arange(len(self.weight))))
+        slope = self.slope - np.multiply.outer(turn, self.weight)
+        return replace(self, weight=(self.weight * phase).T, slope=(slope * phase).T)
+
     def alternating(self) -> Self:
         """Turn the sign of every other sample: white noise stays as large as it was, and what is smooth vanishes."""
         sign = 1.0 - 2.0 * (np.arange(len(self.weight)) % 2)
@@ -59,6 +80,8 @@ class Windows:
 
     def laid(self, values: Array, kernel: Numbers) -> Any:
         """Lay a kernel of the windows' length, or several, over values, shape (window, ..., kernel)."""
+        if len(values) < len(kernel):
+            return np.zeros((0, *values.shape[1:], *kernel.shape[1:]))
         views = sliding_window_view(values, len(kernel), axis=0)[:: self.hop]
         return views @ kernel
 

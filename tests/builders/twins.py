@@ -71,8 +71,8 @@ def blown(twin):
             noise=0.0,
             inside_share=0.5,
             beyond=at == 0,
-            low=twin.values[:, at] - 0.1,
-            high=twin.values[:, at] + 0.1,
+            low=twin.simulated[:, at] - 0.1,
+            high=twin.simulated[:, at] + 0.1,
         )
         for at, each in drawn.items()
     }

@@ -5,13 +5,12 @@ from dataclasses import replace
 
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+from cpfls_cli.vehicle.rotors import with_factors
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
 def _vehicle(vehicle: VehicleSettings, shape: Mapping[str, float]) -> VehicleSettings:
-    factor = 1.0 + shape["error"]
-    rotors = (replace(each, drag_factor_n_m_s2=factor * each.drag_factor_n_m_s2) for each in vehicle.rotors)
-    return replace(vehicle, rotors=tuple(rotors))
+    return with_factors(vehicle, 1.0, 1.0 + shape["error"])
 
 
 def _accounts(number: str, values: Mapping[str, float]) -> float:

@@ -329,7 +329,7 @@ def _pull(see: Instant, p: Numbers, state: Vector, carrier: Carrier) -> Pull:
     cable = scaled(1 / see.functions.sqrt(dot(along, along)), along)
     hook, lever = (0, 0, -p["depth_m"]), tuple(-p[f"mass_times_{place}"] for place in ("behind", "right", "depth"))
     pulled = scaled(p["mass"] / see.vehicle.mass_kg, cable)
-    turned = carrier.turned_by(across(lever, apply(transposed(rotation), cable)))
+    turned = apply(carrier.inverse, across(lever, apply(transposed(rotation), cable)))
     bent = add(across(carrier.turning, hook), across(see.body_rate, across(see.body_rate, hook)))
     felt = add(carrier.acceleration, apply(rotation, bent), (0, 0, see.vehicle.gravity_m_s2))
     response = add(pulled, apply(rotation, across(turned, hook)))

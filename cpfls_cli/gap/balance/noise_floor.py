@@ -1,6 +1,5 @@
 """The noise floor of each channel, from the residual at frequencies above the motion."""
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -79,10 +78,8 @@ def _below(residual: Columns, windows: Windows, cut_off: float) -> Array:
     longer = make_windows(windows.period, wanted, 0.5) if fits else windows
     lowest = _LOWEST_PER_WINDOW / (len(longer.weight) * longer.period)
     frequencies = np.linspace(lowest, max(highest, _BAND * lowest), _FREQUENCIES)
-    through = modulated(longer, frequencies)
-    rows = through.average(residual.direct)
-    if residual.momentum is not None:
-        rows = rows + through.derivative(residual.momentum)
+    through = longer.modulated(frequencies)
+    rows = through.balance(residual.direct, residual.momentum)
     # The median, which does not see lines; that of the power of noise is ln 2 of its mean.
     power = np.median(np.abs(rows) ** 2, axis=0) / np.log(2) / (longer.weight**2).sum()
     terms = np.array([_terms(longer.weight.tobytes(), longer.period, frequency) for frequency in frequencies])
@@ -134,14 +131,3 @@ def _best_pair(relative: Array) -> int:
     # Of so many powers a misfit is no surer than this ratio, and colour is believed beyond it.
     unsure = 1 + ERRORS / np.sqrt(len(relative))
     return 0 if misfit[0, 0] <= unsure * misfit.min() else int(np.argmin(misfit))
-
-
-def modulated(windows: Windows, frequency: float | Array) -> Windows:
-    """Shift windows to a frequency, ``phi(t) exp(-2 pi i f t)``; to several, they are columns of the weights.
-
-    `frequency`: Hz; Result: complex.
-    """
-    turn = 2j * np.pi * np.asarray(frequency)
-    phase = np.exp(-windows.period * np.multiply.outer(turn, np.arange(len(windows.weight))))
-    slope = windows.slope - np.multiply.outer(turn, windows.weight)
-    return replace(windows, weight=(windows.weight * phase).T, slope=(slope * phase).T)

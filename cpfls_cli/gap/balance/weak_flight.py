@@ -13,7 +13,7 @@ from scipy.linalg import toeplitz
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.consistency.check import Audit
-from cpfls_cli.dynamics import InertiaModel, inertia_tensor, momentum_form
+from cpfls_cli.dynamics import InertiaModel, momentum_form
 from cpfls_cli.effects.catalogue.parameter_error import shown, with_thrust
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
@@ -21,6 +21,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.innovations import PER_WINDOW
 from cpfls_cli.weak_form.windows import Windows
 
@@ -124,10 +125,7 @@ class WeakFlight:
 
     def averaged(self, columns: Columns) -> Array:
         """Average columns, or a residual, over the windows, shape (window, 6, ...)."""
-        rows = self.windows.average(columns.direct)
-        if columns.momentum is not None:
-            rows = rows + self.windows.derivative(columns.momentum)
-        return self.of_channels(rows)
+        return self.of_channels(self.windows.balance(columns.direct, columns.momentum))
 
     @cached_property
     def innovations(self) -> WeakFlight:
@@ -241,7 +239,7 @@ def rotation_balance(signals: Signals, model: InertiaModel | None = None) -> Col
     Raises InputError if the model needs an attitude that the flight lacks.
     """
     if model is None:
-        momentum = signals.body_rate @ inertia_tensor(signals.vehicle)
+        momentum = signals.body_rate @ symmetric(signals.vehicle.inertia_kg_m2)
         return Columns(rotations.cross(signals.body_rate, momentum), momentum)
     attitude = signals.attitude
     if attitude is None:

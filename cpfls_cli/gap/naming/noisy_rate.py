@@ -12,7 +12,6 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import FEWEST_BLOCKS, MOST_BLOCKS, contiguous
 from cpfls_cli.effects.signals import white_noise
 from cpfls_cli.gap.balance.balance_system import residual_along
-from cpfls_cli.gap.balance.noise_floor import modulated
 from cpfls_cli.gap.naming.estimate import NamedFit, estimates_of, places_of
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.rounding import tied
@@ -87,7 +86,7 @@ class _Balance:
         highest = int(min(ends) * samples * self.period)
         if highest < FEWEST_SAMPLES:
             return
-        at = modulated(own, np.arange(1, highest) / (samples * self.period))
+        at = own.modulated(np.arange(1, highest) / (samples * self.period))
         self.hop, self.average, self.differentiate = own.hop, at.weight / size, -at.slope / size
         power, fine = np.abs(np.fft.fft(self.average, 4 * samples, axis=0)).T ** 2, np.fft.fftfreq(4 * samples)
         near = np.abs(fine) < (highest + 3) / samples
@@ -115,7 +114,8 @@ class _Balance:
         named = {each.name: float(value) for each, value in zip(self.effect.shapes, shapes, strict=True)}
         assert self.effect.filters is not None, "asked for"
         passing = self.effect.filters(named, self.period)
-        return self._rows([passing.along(each) for each in self.momenta], self.differentiate), passing.gain(self.turn)
+        column = self._rows([passing.along(each) for each in self.momenta], self.differentiate)
+        return column, passing.gain(np.exp(-self.turn))
 
     def _products(self, columns: Sequence[Array]) -> Array:
         """Multiply torque of the rest, inertial torque and columns, shape (window, frequency, 3, side, side)."""

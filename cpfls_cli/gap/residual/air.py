@@ -1,8 +1,9 @@
 """Whether a residual is the air: gusts that neither setpoints nor the past predict; size and memory."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from weakref import ref
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.gap.balance.balance_system import System, floors, residual_along
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.residual.dependence import state_signals, without_actuation
-from cpfls_cli.gap.residual.repeated import without_copies
 from cpfls_cli.gap.settings import ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
@@ -116,15 +116,17 @@ def known_motion(flights: Sequence[Signals]) -> Instruments:
 
     Flights that were asked to stay where they are, and did, were asked for nothing that moves.
     """
-    return flights[0].once((known_motion, *flights), lambda: _known_motion(flights))
+    # A flight that holds itself would be freed only by the garbage collector.
+    return flights[0].once((known_motion, *map(ref, flights)), lambda: moved_from_outside(flights))
 
 
-def _known_motion(recorded: Sequence[Signals]) -> Instruments:
+def moved_from_outside(recorded: Sequence[Signals]) -> Instruments:
+    """Find it anew; see `known_motion`."""
     flights = [LoggedFlight.of(each).playback for each in recorded]
     given = instruments(flights)
     if given.kind == "none" and all(held(flight) for flight in flights):
         given = replace(given, setpoints=tuple(np.ones((len(run), 1)) for run in given.flown), names=("position",))
-    different = set(without_copies(recorded))
+    different = set(_without_copies(recorded))
     copies = {number for number, run in enumerate(given.runs) if run.flight not in different}
     known = tuple(
         {} if number in copies else {other: place for other, place in each.items() if other not in copies}
@@ -132,6 +134,13 @@ def _known_motion(recorded: Sequence[Signals]) -> Instruments:
     )
     likeness = {pair: alike for pair, alike in given.repeats.likeness.items() if copies.isdisjoint(pair)}
     return replace(given, repeats=Repeats(known, likeness))
+
+
+def _without_copies(flights: Sequence[Signals]) -> Iterator[int]:
+    """Give the numbers of flights without copies: in a copy noise is repeatable, too."""
+    for number, each in enumerate(flights):
+        if not any(np.array_equal(each.body_rate, one.body_rate) for one in flights[:number]):
+            yield number
 
 
 def air(

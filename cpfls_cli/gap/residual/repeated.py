@@ -11,15 +11,15 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS, block_length, half_width, jackknife_error
-from cpfls_cli.dynamics import inertia_tensor
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, negligible, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
+from cpfls_cli.gap.residual.air import moved_from_outside
 from cpfls_cli.gap.settings import COUNTS
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, fitting_bands
-from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.instruments import Instruments, instruments
+from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.result import about, result
 from cpfls_cli.weak_form.windows import Windows
 
@@ -222,18 +222,15 @@ class RepeatedRuns:
         are any.
         None where no flight repeats another.
         """
-        different = list(without_copies(recorded))
-        flights = [LoggedFlight.of(each).playback for each in recorded]
-        given = instruments(flights)
-        runs = given.runs
+        given = moved_from_outside(recorded)
         pairs = [
             pair
             for path in given.repeats.paths()
             for pair in permutations(path, 2)
-            if pair[1] in given.repeats.places[pair[0]] and all(runs[each].flight in different for each in pair)
+            if pair[1] in given.repeats.places[pair[0]]
         ]
         seen = len(recorded) - unseen
-        judged = [pair for pair in pairs if any(runs[each].flight >= seen for each in pair)]
+        judged = [pair for pair in pairs if any(given.runs[each].flight >= seen for each in pair)]
         bands = tuple(_bands(recorded[0].period))
         if not pairs or not bands:
             return None
@@ -261,7 +258,7 @@ class RepeatedRuns:
             low=np.array([band.low for band in self.bands]),
             high=np.array([band.high for band in self.bands]),
             noise=np.where(known, self._noise(flights, sides), np.nan),
-            resists=np.array([*np.diag(inertia_tensor(body)), *[body.mass_kg] * 3]),
+            resists=np.array([*np.diag(symmetric(body.inertia_kg_m2)), *[body.mass_kg] * 3]),
             flights=tuple(dict.fromkeys(self.names[self.given.runs[number].flight] for number in self.used)),
             paths=sum(not set(path).isdisjoint(self.used) for path in self.given.repeats.paths()),
             runs=len(self.used),
@@ -286,12 +283,14 @@ class RepeatedRuns:
         length = max(block_length(samples * band.period) / band.period, float(len(band.weight)))
         found: dict[tuple[int, int], Array] = {}
         for number, other in self.pairs:
-            middles = np.arange(band.count(len(cut[number]))) * band.hop + len(band.weight) // 2
+            middles = band.middles([slice(0, len(cut[number]))])
             first, place = repeats.path(number, len(cut[number]))
             # Too short a run has no window.
             if not len(middles):
                 continue
-            mine, theirs = _averaged(band, cut[number]), _averaged(band, repeats.at(number, other, cut[other]))
+            mine, theirs = (
+                band.balance(*each.swapaxes(0, 1)) for each in (cut[number], repeats.at(number, other, cut[other]))
+            )
             known = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(place[middles])
             block = np.where(known, place[middles] // length, -1)
             for each in np.unique(block[known]):
@@ -303,7 +302,10 @@ class RepeatedRuns:
         """Estimate the mean squares of a gap by white noise, shape (6, band); NaN behind a filter."""
         numbers = sorted({self.given.runs[number].flight for number in self.used})
         bands = [band.windows.alternating() for band in self.bands]
-        squares = [[np.mean(_averaged(band, sides[number])[:, 0] ** 2, axis=0) for band in bands] for number in numbers]
+        squares = [
+            [np.mean(band.balance(*sides[number][:, :, 0].swapaxes(0, 1)) ** 2, axis=0) for band in bands]
+            for number in numbers
+        ]
         filtered = np.any([np.isfinite(flights[number].cut_off) for number in numbers], axis=0)
         return np.where(filtered[:, None], np.nan, np.mean(squares, axis=0).T)
 
@@ -325,13 +327,6 @@ def _with_errors(sums: Array) -> Array:
     return np.array([shares(whole), jackknife_error(shares(whole - sums))])
 
 
-def without_copies(flights: Sequence[Signals]) -> Iterator[int]:
-    """Give the numbers of flights without copies: in a copy noise is repeatable, too."""
-    for number, each in enumerate(flights):
-        if not any(np.array_equal(each.body_rate, one.body_rate) for one in flights[:number]):
-            yield number
-
-
 def _bands(period: float) -> Iterator[Band]:
     """Make the windows of all bands together and of each, as far as a log is fast enough for them."""
     # Above 6 Hz the noise of a gyroscope leaves little to split.
@@ -345,15 +340,10 @@ def _bands(period: float) -> Iterator[Band]:
 
 
 def _sides(residual: Columns, motion: Columns) -> Array:
-    """Arrange residual and inertial side, each as momentum and direct term, shape (time, 2, 2, 6)."""
+    """Arrange direct term and momentum, each of residual and inertial side, shape (time, 2, 2, 6)."""
     none = np.zeros_like(residual.direct)
-    parts = [(none if each.momentum is None else each.momentum, each.direct) for each in (residual, motion)]
-    return np.stack([np.stack(each, axis=1) for each in parts], axis=1)
-
-
-def _averaged(band: Windows, sides: Array) -> Array:
-    """Average both sides over windows, shape (window, 2, 6)."""
-    return band.derivative(sides[:, :, 0]) + band.average(sides[:, :, 1])
+    momenta = [none if each.momentum is None else each.momentum for each in (residual, motion)]
+    return np.stack([np.stack(each, axis=1) for each in ((residual.direct, motion.direct), momenta)], axis=1)
 
 
 def _products(mine: Array, theirs: Array) -> Array:

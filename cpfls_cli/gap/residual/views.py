@@ -101,18 +101,17 @@ def heat_map(
     known = np.isfinite(residual) & np.isfinite(first) & np.isfinite(second)
     values = [first[known], second[known]]
     edges = [_edges(each, bins) for each in values]
-    cells = [np.clip(np.searchsorted(e, v, side="right") - 1, 0, bins - 1) for e, v in zip(edges, values, strict=True)]
-    flat = cells[0] * bins + cells[1]
-    count = np.bincount(flat, minlength=bins**2).astype(float)
-    total = np.bincount(flat, weights=residual[known], minlength=bins**2)
-    mean = np.divide(total, count, out=np.full(bins**2, np.nan), where=count > 0)
+    across, along = (np.clip(each, own[0], own[-1]) for own, each in zip(edges, values, strict=True))
+    count = np.histogram2d(across, along, edges)[0]
+    total = np.histogram2d(across, along, edges, weights=residual[known])[0]
+    mean = np.divide(total, count, out=np.full_like(count, np.nan), where=count > 0)
     return HeatMap(
         channel=channel,
         signals=signals,
         first_edge=edges[0],
         second_edge=edges[1],
-        mean=mean.reshape(bins, bins),
-        count=count.reshape(bins, bins),
+        mean=mean,
+        count=count,
     )
 
 

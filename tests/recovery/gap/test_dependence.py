@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from cpfls_cli.dynamics import inertia_tensor
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.resampling import blocks_of
 from cpfls_cli.weak_form.windows import windows
 
 VEHICLE = VehicleSettings()
-TENSOR = inertia_tensor(VEHICLE)
+TENSOR = symmetric(VEHICLE.inertia_kg_m2)
 TIME = 0.01 * np.arange(3000)
 WINDOWS = windows(0.01, 0.4, 0.5)
 UNKNOWN = {

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.dynamics import inertia_tensor
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.residual.narrow_band import narrow_band
+from cpfls_cli.inertia import symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import windows
 
 VEHICLE = VehicleSettings()
-TENSOR = inertia_tensor(VEHICLE)
+TENSOR = symmetric(VEHICLE.inertia_kg_m2)
 PERIOD, SAMPLES = 0.01, 3000
 WINDOWS = windows(PERIOD, 0.4, 0.5)
 HOP = WINDOWS.hop * PERIOD

@@ -10,7 +10,7 @@ from scipy.signal import butter, filtfilt, lfilter
 
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, known_up_to, modulated, noise_floor
+from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, known_up_to, noise_floor
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import windows
 
@@ -85,9 +85,9 @@ def test_floor_scales_with_the_noise_and_nothing_has_no_floor():
 
 def test_shifted_windows_hear_one_frequency_and_keep_integration_by_parts():
     tone = np.exp(2j * np.pi * 12.0 * TIME)
-    heard = modulated(THROUGH, 12.0)
+    heard = THROUGH.modulated(12.0)
     np.testing.assert_allclose(np.abs(heard.average(tone)), 1.0)
-    assert np.abs(modulated(THROUGH, 20.0).average(tone)).max() < 0.01
+    assert np.abs(THROUGH.modulated(20.0).average(tone)).max() < 0.01
     np.testing.assert_allclose(heard.derivative(tone), 2j * np.pi * 12.0 * heard.average(tone), rtol=2e-3)
 
 

@@ -13,11 +13,12 @@ from cpfls_cli.export.holding import Off
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, nuisance
 from cpfls_cli.gap.before_after import left_out
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, plain
-from cpfls_cli.gap.whole_vehicle import _lifting, of_vehicle, whole_vehicle, with_effects, with_known_wrench
+from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle, with_effects, with_known_wrench
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.player import free_runs, made_ready, player_of
+from cpfls_cli.vehicle.rotors import with_factors
 from tests.builders import vehicle_models
 from tests.builders.vehicle_models import QUAD
 
@@ -197,7 +198,7 @@ def test_flights_are_compared_with_the_numbers_of_a_vehicle_that_was_found_witho
 def test_what_one_model_knew_is_no_part_of_what_the_next_one_does():
     drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
     model = VehicleModel(vehicle=QUAD, effects=(drag,))
-    stronger = replace(model, vehicle=_lifting(QUAD, 1.2, 1.1))
+    stronger = replace(model, vehicle=with_factors(QUAD, 1.2, 1.1))
     once = with_known_wrench([replace(signals(), name="flight")], stronger)
     again = with_known_wrench(with_known_wrench([replace(signals(), name="flight")], model), stronger)
     np.testing.assert_allclose(again[0].wrench, once[0].wrench, rtol=1e-12)

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.playback.balances import Balances, PastBalances, averaged
+from cpfls_cli.playback.balances import Balances, PastBalances
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.instruments import instruments
-from cpfls_cli.playback.model import Airflow
-from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, blocks_of
+from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, Rules, blocks_of
 from tests.builders.playback_flights import STATED, flown, truth
 
-FREE = FreeNumbers(STATED, blocks_of(STATED), Airflow(np.array([0.0, 1.0]), 0))
+FREE = FreeNumbers(STATED, blocks_of(STATED), Rules(1, 0))
 NAMED = replace(FREE, chosen=tuple(block for block in FREE.chosen if block not in LEARNED))
 
 
@@ -93,7 +92,9 @@ def test_the_residual_is_what_the_model_leaves_of_the_motion(flights):
     bands = len(balances.bands_hz)
     for number, band in enumerate(balances.bands):
         changing, acting = (momentum, torque) if number < bands else (STATED.mass_kg * motion.velocity, force)
-        residual = averaged(band, flight, changing, changes=True) + averaged(band, flight, acting)
+        residual = band.over(flight.stretches, band.derivative, changing) + band.over(
+            flight.stretches, band.average, acting
+        )
         assert sums.xtx[:, number, :, 0, 0].sum(axis=0) == pytest.approx((residual**2).sum(axis=0), rel=1e-9)
 
 

@@ -1,11 +1,14 @@
 """Flights for playback keep what their stretches know."""
 
+import gc
 from typing import Any
+from weakref import ref
 
 import numpy as np
 import pytest
 
 from cpfls_cli.effects.signals import Signals, stretch_of
+from cpfls_cli.gap.residual.air import known_motion
 from cpfls_cli.playback.flight import playback_flight
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -36,3 +39,17 @@ def test_a_part_of_a_flight_has_its_part_of_the_setpoints() -> None:
 
 def test_a_flight_without_setpoints_has_none() -> None:
     assert playback_flight([_part(0, 12)], "linear").setpoints == {}
+
+
+def test_flights_are_freed_when_nobody_uses_them_any_more() -> None:
+    logged = [_part(0, 200), _part(300, 200)]
+    flight = playback_flight(logged[:1], "linear")
+    assert flight.rotor_terms(0.0, 0.01, None) is flight.rotor_terms(0.0, 0.01, None)
+    assert known_motion(logged) is known_motion(logged)
+    freed = [ref(each) for each in (*logged, flight)]
+    gc.disable()
+    try:
+        del logged, flight
+        assert [each() for each in freed] == [None] * 3
+    finally:
+        gc.enable()

@@ -7,8 +7,7 @@ import pytest
 
 from cpfls_cli.playback.evaluation import Group, JointNumbers
 from cpfls_cli.playback.fit import fit, uncertainty, windows_of
-from cpfls_cli.playback.model import Airflow
-from cpfls_cli.playback.parameters import FreeNumbers
+from cpfls_cli.playback.parameters import FreeNumbers, Rules
 from cpfls_cli.playback.vehicle import Difference, differences
 from tests.builders.playback_flights import (
     ADDED_AT,
@@ -22,7 +21,7 @@ from tests.builders.playback_flights import (
     truth,
 )
 
-NO_REMAINDER = Airflow(np.zeros(0), 0)
+NO_REMAINDER = Rules(0, 0)
 JOINT = JointNumbers(
     FreeNumbers(STATED, TRUE_BLOCKS, NO_REMAINDER), (Group("payload", ("mass", "com_offset", "inertia")),)
 )

@@ -8,13 +8,13 @@ import pytest
 from cpfls_cli.playback import vehicle
 from cpfls_cli.playback.evaluation import JointNumbers
 from cpfls_cli.playback.fit import FitWindows, WindowSet, fit, loss_of, rate_stays, uncertainty, windows_of
-from cpfls_cli.playback.model import Airflow, VehicleModel
-from cpfls_cli.playback.parameters import FreeNumbers, blocks_of
+from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.parameters import FreeNumbers, Rules, blocks_of
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 
-RULES = {"one rule": Airflow(np.array([0.0, 1.0]), 2), "seesaw": Airflow(np.array([0.0, 0.3, 0.6, 1.0]), 0)}
+RULES = {"one rule": Rules(1, 2), "seesaw": Rules(3, 0)}
 
 
 @pytest.fixture(scope="module")
@@ -114,5 +114,5 @@ def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
 
 def test_a_vehicle_as_it_is_stated_has_no_numbers(flight):
     windows = windows_of([flight], 0.2, 0.2)
-    fitted = fit(numbers(STATED, (), Airflow(np.zeros(0), 0)), windows, {}, 20, 1e-4)
+    fitted = fit(numbers(STATED, (), Rules(0, 0)), windows, {}, 20, 1e-4)
     assert list(vehicle.found_numbers(fitted, uncertainty(fitted, windows))) == []

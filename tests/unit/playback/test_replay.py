@@ -212,8 +212,8 @@ def test_errors_by_horizon_are_means_over_all_windows_of_all_flights():
             known = found.models[prediction].signals[signal]
             np.testing.assert_allclose(known.mae, np.linalg.norm(own, axis=2).mean(axis=0))
             np.testing.assert_allclose(known.rms_by_axis, np.sqrt((own**2).mean(axis=0)))
-        np.testing.assert_allclose(found.windows.size[row], np.linalg.norm(errors[:, :, 3], axis=2).mean(axis=1))
-    assert found.windows.flight.tolist() == [0] * 17 + [1] * 12
+        np.testing.assert_allclose(found.size[row], np.linalg.norm(errors[:, :, 3], axis=2).mean(axis=1))
+    assert found.flight.tolist() == [0] * 17 + [1] * 12
 
 
 def test_batches_do_not_show(monkeypatch):
@@ -222,7 +222,7 @@ def test_batches_do_not_show(monkeypatch):
     monkeypatch.setattr("cpfls_cli.playback.replay._BATCH", 140)
     parts = replay([played(flight)], 20, 1)
     np.testing.assert_allclose(mean_errors(parts, "attitude"), mean_errors(whole, "attitude"), rtol=1e-12)
-    np.testing.assert_array_equal(parts.windows.start, whole.windows.start)
+    np.testing.assert_array_equal(parts.start, whole.start)
 
 
 def test_a_model_is_better_where_it_was_played_along_what_it_flies():
@@ -261,7 +261,7 @@ def test_a_signal_is_averaged_over_the_flights_that_know_it():
 def test_a_run_that_diverges_is_counted_and_bounded(fuzzy):
     driven = (ModelEffect("linear_damping", {}, np.full(3, -90.0)),)
     found = replay([played(flight_of(), VehicleModel(vehicle=VEHICLE, effects=driven, fuzzy=fuzzy))], 60, 5)
-    lost = (found.windows.diverged >= 0).sum(axis=1)
+    lost = (found.diverged >= 0).sum(axis=1)
     assert lost.tolist() == [4, 0, 0, 0]
     assert all(np.isfinite(mean_errors(found, signal)).all() for signal in found.models[MODEL].signals)
     assert mean_errors(found, "body_rate").max() < 600
@@ -278,7 +278,7 @@ class Hollow(Rigid):
 
 def test_a_run_stops_where_no_body_has_the_inertia():
     found = replay([played(flight_of(), VehicleModel(vehicle=VEHICLE, fuzzy=Hollow()))], 40, 1)
-    lost = found.windows.diverged[0]
+    lost = found.diverged[0]
     assert 0 < (lost >= 0).sum() < len(lost)
     assert np.isfinite(mean_errors(found, "attitude")).all()
 
@@ -286,7 +286,7 @@ def test_a_run_stops_where_no_body_has_the_inertia():
 def test_no_window_crosses_a_pause():
     flight = flight_of(stretches=(slice(0, 30), slice(30, 80)))
     found = replay([played(flight)], 20, 1)
-    assert found.windows.start.tolist() == [*range(10), *range(30, 60)]
+    assert found.start.tolist() == [*range(10), *range(30, 60)]
 
 
 def test_a_horizon_beyond_the_longest_stretch_is_refused():
@@ -296,8 +296,8 @@ def test_a_horizon_beyond_the_longest_stretch_is_refused():
 
 
 def test_the_worst_windows_do_not_overlap():
-    found = replay([played(flight_of(samples=200))], 20, 1).windows
-    worst = found.worst(20, 4)
+    found = replay([played(flight_of(samples=200))], 20, 1)
+    worst = found.worst(4)
     starts = np.sort(found.start[worst])
     assert np.diff(starts).min() > 20
     assert worst[0] == found.size[0].argmax()
@@ -305,8 +305,8 @@ def test_the_worst_windows_do_not_overlap():
 
 
 def test_a_typical_stretch_is_made_of_windows_one_after_another():
-    found = replay([played(flight_of(samples=400))], 20, 3).windows
-    typical = found.typical(20, 4)
+    found = replay([played(flight_of(samples=400))], 20, 3)
+    typical = found.typical(4)
     assert len(typical) == 4
     assert np.diff(found.start[typical]).tolist() == [21, 21, 21]
 

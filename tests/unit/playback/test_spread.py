@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.evaluation import VehicleAt
-from cpfls_cli.playback.model import Airflow, ModelEffect
+from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.spread import POSITIVE, drawn, model_at
 from cpfls_cli.playback.vehicle import FoundNumber
@@ -62,7 +62,7 @@ def test_models_have_the_numbers_that_were_drawn():
 
 def test_the_model_of_a_fit_is_made_again_from_what_people_know_of_its_numbers():
     blocks = ("inertia", "thrust_factor", "drag_factor", "thrust_law", "lag", "slow_actuation", "linear_damping")
-    free = FreeNumbers(STATED, blocks, Airflow(np.zeros(0), 0))
+    free = FreeNumbers(STATED, blocks)
     steps = np.random.default_rng(0).uniform(0.05, 0.2, (2, len(free.numbers)))
     scales = np.array([number.scale for number in free.numbers])
     starts = np.array([number.start for number in free.numbers])

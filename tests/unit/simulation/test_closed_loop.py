@@ -20,6 +20,7 @@ from cpfls_cli.simulation import model
 from cpfls_cli.simulation.closed_loop import ClosedLoop, Setpoints, fly_setpoints
 from cpfls_cli.simulation.inverse import ROTOR_SHARE, hover_squared, room_left, rotor_load, squared_speeds, tilt_of
 from cpfls_cli.simulation.measured import measure
+from cpfls_cli.simulation.model import simulated_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import plan
@@ -81,7 +82,7 @@ def test_path_is_followed_and_no_rotor_is_clipped(plain):
 @pytest.mark.parametrize("name", SEEN_BY_BALANCE)
 def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
     flight = flown(2.0, effects={name: typical(name)})
-    (one,) = flight.flown.listed
+    (one,) = simulated_effects({name: typical(name)}, VEHICLE).listed
     signals = signals_of(flight)
     weak, left = balance(signals)
     if one.effect.kind == "actuator":
@@ -202,10 +203,12 @@ def test_battery_empties_by_the_share_that_was_asked_for():
 
 def test_effects_add_up():
     names = ("com_offset", "rotor_drag", "products_of_inertia", "rotor_acceleration")
-    flight = flown(effects={name: typical(name) for name in names})
+    chosen = {name: typical(name) for name in names}
+    flight = flown(effects=chosen)
     signals = signals_of(flight)
     weak, left = balance(signals)
-    expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in flight.flown.listed)
+    listed = simulated_effects(chosen, VEHICLE).listed
+    expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in listed)
     np.testing.assert_array_less(rms(left - expected), [3e-5] * 3 + [2e-4] * 3)
 
 
@@ -438,7 +441,7 @@ def test_a_new_actuator_effect_is_a_link_of_the_chain(monkeypatch):
     free = flown_with(monkeypatch)
     flight = flown_with(monkeypatch, limited_rotors=(500.0,))
     assert free.signals["rotor_speed"].min() < 345 < free.signals["rotor_speed"].max() < 500
-    assert flight.flown.hides_rotor_speed
+    assert flight.rotor_speed is None
     np.testing.assert_array_equal(flight.signals["position"], free.signals["position"])
     slow = flown_with(monkeypatch, limited_rotors=(345.0,))
     assert slow.position[-1, 2] < free.position[-1, 2] - 0.01

@@ -14,7 +14,7 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.autopilot import mixer, upright
-from cpfls_cli.simulation.closed_loop import Integration, Plant, actuators, clock_of, flown, flown_vehicle
+from cpfls_cli.simulation.closed_loop import Integration, actuators, clock_of, flown, flown_vehicle, settled
 from cpfls_cli.simulation.model import in_the_loop, simulated_effects, with_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.vehicle.rotors import body_wrench
@@ -57,7 +57,7 @@ def simulated(rate, effects):
     vehicle = flown_vehicle(VEHICLE, None, chosen)
     state, push = np.concatenate([START, vehicle.start]), np.tile(PUSH, (clock.steps, 1))
     chain = actuators(chosen, RotorResponse(), VEHICLE, settings, SPEED, TIME[-1])
-    change = Plant(vehicle, None).settled(state, SPEED, PUSH)
+    change = settled(vehicle, None, state, SPEED, PUSH)
     loop = Integration(Given(), chain, vehicle, None, state, change, clock, push)
     return flown(loop, lambda _sample, _state: None, lambda _done, _all: None)
 

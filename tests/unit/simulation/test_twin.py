@@ -14,7 +14,7 @@ from cpfls_cli.simulation.twin import (
     CHANNELS,
     DRAWS,
     RATE_LAW,
-    TwinFlight,
+    TwinVehicle,
     asked_of,
     baselines,
     compared,
@@ -39,7 +39,7 @@ def flight():
 def comparison(flight, vehicle=CROSS, loop=LOOP):
     asked = asked_of(flight, loop, CROSS, share=True)
     twin = fly_twin(ClosedLoop(CROSS, loop, VehicleModel(vehicle=vehicle)), flight, asked)
-    return compared(flight, asked, measured_channels(flight), twin.values, lambda _given: None)
+    return compared(flight, asked, measured_channels(flight), twin.simulated, lambda _given: None)
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def test_without_gusts_the_same_flight_comes_back():
     asked = asked_of(flight, LOOP, CROSS, share=True)
     measured = measured_channels(flight)
     twin = fly_twin(ClosedLoop(CROSS, LOOP), flight, asked)
-    np.testing.assert_allclose(twin.values, measured, atol=1e-9)
+    np.testing.assert_allclose(twin.simulated, measured, atol=1e-9)
     assert np.isnan(twin.lost_s)
     setpoint, still = baselines(flight, measured)
     np.testing.assert_array_equal(setpoint[:, 3:6], flight.parts[0].setpoints["attitude"])
@@ -109,7 +109,7 @@ def test_a_vehicle_that_is_lost_is_known_up_to_there():
     asked = asked_of(flight, LOOP, CROSS, share=True)
     twin = fly_twin(ClosedLoop(CROSS, LOOP, other), flight, asked)
     assert 0 < twin.lost_s < 1.5
-    known = np.isfinite(twin.values).all(axis=1)
+    known = np.isfinite(twin.simulated).all(axis=1)
     assert known[: round(twin.lost_s / PERIOD)].all()
     assert not known[round(twin.lost_s / PERIOD) :].any()
 
@@ -149,7 +149,7 @@ def test_a_flight_in_the_same_gusts_is_one_of_those_in_gusts_and_that_of_a_heavi
     gusty = fly_in_gusts(ClosedLoop(CROSS, loop), flights[1.0], asked, [model] * 7, None, drawing(1))
     blown = known_axes(GUSTS, None)
     found = {
-        ratio: in_gusts(measured_channels(own), still.values, gusty, blown, drawing(2))
+        ratio: in_gusts(measured_channels(own), still.simulated, gusty, blown, drawing(2))
         for ratio, own in flights.items()
     }
     assert found[1.0].beyond == []
@@ -171,7 +171,7 @@ def among(rng, larger=1.0):
     size = rng.uniform(0.5, 2.0, len(CHANNELS)) * np.exp(0.3 * rng.standard_normal((1 + DRAWS, 1, len(CHANNELS))))
     size[0, :, 3] *= larger
     walks = size * np.cumsum(rng.standard_normal((1 + DRAWS, 60, len(CHANNELS))), axis=1)
-    others = [TwinFlight(values, values[:, :3], np.nan) for values in walks[1:]]
+    others = [TwinVehicle(lost_s=np.nan, simulated=values, position=values[:, :3], channels={}) for values in walks[1:]]
     return in_gusts(walks[0], np.zeros_like(walks[0]), others, np.ones(6, dtype=bool), rng)
 
 
@@ -190,6 +190,6 @@ def test_channels_that_no_known_gust_moves_are_not_held():
     gusts = Gusts(GUSTS.size * [1, 1, 0, 1, 0, 1], GUSTS.memory)
     assert known_axes(gusts, None).tolist() == [True, True, False, True, False, True]
     walks = np.cumsum(drawing(1).standard_normal((4, 60, len(CHANNELS))), axis=1)
-    others = [TwinFlight(values, values[:, :3], np.nan) for values in walks[1:]]
+    others = [TwinVehicle(lost_s=np.nan, simulated=values, position=values[:, :3], channels={}) for values in walks[1:]]
     found = in_gusts(walks[0], 0 * walks[0], others, known_axes(gusts, None), drawing(1))
     assert list(found.channels) == ["roll rate", "pitch rate", "roll", "pitch", "velocity z", "thrust"]
