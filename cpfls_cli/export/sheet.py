@@ -25,6 +25,7 @@ from cpfls_cli.export.points import (
     reference_points,
     runs_of,
 )
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.structure import Block, ModelStructure
@@ -51,7 +52,6 @@ LACK_RECIPE = (
 """How to play what a model lacks."""
 
 _SEED = 1
-_ROWS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 REFITTED = "refitted numbers of the vehicle"
 
 
@@ -176,12 +176,12 @@ class Sheet:
             titles = [REFITTED if each.kind == "parameter" else each.title for each in known]
             yield f"Effects: {', '.join(dict.fromkeys(titles))}."
         if model.remainder is not None:
-            rows = ", ".join(_ROWS[row] for row in model.remainder.rows)
+            rows = ", ".join(CHANNELS[row] for row in model.remainder.rows)
             yield f"Learned, without a name: {rows} over the direction of the airflow."
         if model.gusts is not None:
             size, memory, white = (", ".join(f"{value:.4g}" for value in values) for values in model.gusts)
             yield (
-                f"Gusts of its flights, not played here, {', '.join(_ROWS)}: standard deviations {size} (N m, N); "
+                f"Gusts of its flights, not played here, {', '.join(CHANNELS)}: standard deviations {size} (N m, N); "
                 f"memories {memory} s; white {white} (N m s^0.5, N s^0.5). {GUST_RECIPE}"
             )
         if self.identified is not None:

@@ -34,6 +34,7 @@ from cpfls_cli.flights.recordings import (
     signals_of,
 )
 from cpfls_cli.logs.formats import is_log
+from cpfls_cli.playback.errors import MOTION
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import made_ready, player_of
@@ -42,7 +43,6 @@ from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 
-_STATE = ("body_rate", "attitude", "velocity", "position")
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")
 _BESIDE = ("acceleration", "specific_force", "voltage", "thrust", "rotor_command")
 _MOST_PARTS = 50
@@ -114,7 +114,7 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
         )
     if actuation != "body_torque":
         require_rotors(study)
-    driven = {name: flight.signals[name] for name in ("time", *_STATE, actuation) if name in flight.signals}
+    driven = {name: flight.signals[name] for name in ("time", *MOTION, actuation) if name in flight.signals}
     stretches = known_stretches(flight.name, all_known(driven), driven["time"])
     made = [signals_of(flight, _known(flight, actuation, part), study) for part in stretches]
     parts = tuple(signals for signals, _ in made)
@@ -149,7 +149,7 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
 
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:
     """Cut out a stretch, with what is known in all of it and what was asked for."""
-    names = [name for name in ("time", *_STATE, actuation) if name in flight.signals]
+    names = [name for name in ("time", *MOTION, actuation) if name in flight.signals]
     beside = [name for name in _BESIDE if name in flight.signals and np.isfinite(flight.signals[name][part]).all()]
     asked = [name for name in SETPOINTS if name in flight.signals]
     return {name: flight.signals[name][part] for name in (*names, *beside, *asked)}

@@ -11,7 +11,8 @@ from markupsafe import Markup
 from cpfls_cli import page
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.identification.data import TRAINING
-from cpfls_cli.identification.identify import AXES, MODEL, RIGID_BODY, Judged
+from cpfls_cli.identification.findings import AXES
+from cpfls_cli.identification.identify import MODEL, RIGID_BODY, Judged
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.comparison import COMPARISON_WORDS
 from cpfls_cli.pages.identified_figures import (

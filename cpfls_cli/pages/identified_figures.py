@@ -12,7 +12,8 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.fuzzy.basis import join_ends, memberships
-from cpfls_cli.identification.identify import AXES, MODEL, RIGID_BODY
+from cpfls_cli.identification.findings import AXES
+from cpfls_cli.identification.identify import MODEL, RIGID_BODY
 from cpfls_cli.identification.solver import RidgeCurve
 from cpfls_cli.pages.comparison import FLOOR_TICK, compared_curves, compared_parts
 from cpfls_cli.report.canvas import (

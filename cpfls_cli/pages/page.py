@@ -256,12 +256,11 @@ def _words(blocks: Iterable[Block]) -> Iterator[str]:
             case Facts():
                 yield "\n".join(f"- **{page.said(term)}**: {page.said(value)}" for term, value in block.rows)
             case Table():
-                yield f"{page.said(block.explained)} {{#{block.name}}}"
+                yield f"{page.said(block.caption)} {{#{block.name}}}"
                 rows = [[_toned(cell.text, cell.tone) for cell in row] for row in block.cells]
                 yield page.table([page.said(name) for name in block.header], rows, block.words)
             case Plot():
-                more = f" [{page.said(block.see[1])}](#{block.see[0]})" if block.see else ""
-                yield f"![{page.said(block.caption)}{more}]({block.name})"
+                yield f"![{page.said(block.caption)}]({block.name})"
             case Listing():
                 yield page.listing(block.text)
             case Folded():
@@ -291,7 +290,7 @@ def _block(block: Block) -> dict[str, Any]:
         case Text():
             return {"kind": kind, "text": block.text, "tone": block.tone}
         case Plot():
-            return {"kind": "figure", "name": block.name, "caption": block.caption, "description": block.description}
+            return {"kind": "figure", "name": block.name, "caption": block.caption, "description": block.caption}
         case _:
             return {"kind": kind, **asdict(block)}
 
@@ -311,7 +310,7 @@ def _table(table: Table) -> dict[str, Any]:
     ]
     return {
         "name": table.name,
-        "caption": table.explained,
+        "caption": table.caption,
         "header": list(table.header),
         "rows": [[_bare(cell.text) for cell in line] for line in cells],
         "marked": marked,

@@ -8,7 +8,6 @@ from enum import StrEnum
 from importlib import import_module
 from math import inf, radians
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -263,7 +262,11 @@ def trajectory(
     figures = [run.output.with_name(f"{run.output.stem}-{name}.svg") for name in names]
     texts = {run.beside(f"{run.output.stem}-waypoints.csv"): "csv"} if settles else mission_paths(run, mission)
     check_outputs(run, *figures, *texts)
-    planned = _next_flight().planned(run, diagnosis) if settles else _planned(run, settings, waypoints)
+    if settles:
+        # What reads diagnoses and models is loaded for no other path.
+        planned: PlannedPath | None = import_module("cpfls_cli.stages._next_flight").planned(run, diagnosis)
+    else:
+        planned = _planned(run, settings, waypoints)
     written = None if planned is None else mission_texts(run, mission, planned, texts)
     if planned is None or written is None or run.dry_run:
         return None
@@ -279,11 +282,6 @@ def trajectory(
     run.also = {"figures": [str(path) for path in figures], "files": [str(path) for path in texts]}
     run.go_on("simulate", run.output, output=run.beside("flight.h5"))
     return planned
-
-
-def _next_flight() -> ModuleType:
-    """Load what reads diagnoses and models, which no other path needs."""
-    return import_module("cpfls_cli.stages._next_flight")
 
 
 def _planned(run: Run, settings: TrajectorySettings, waypoints: Path | None) -> PlannedPath | None:
