@@ -350,7 +350,8 @@ class Vehicle(FoundVehicle, AnyModel):
                 identified=identified,
             )
         lacks = self.responses_off or self.instruments.lacks
-        word = Trust.SIMULATION if lacks or self.responses_judged else Trust.NOT_JUDGED
+        judged = len(self._turning) == len(ROTATION[:2]) and NOT_JUDGED not in self._turning
+        word = Trust.SIMULATION if lacks or judged else Trust.NOT_JUDGED
         return capped(word, self.contradictions, lacks=lacks, identified=identified)
 
     @property
@@ -376,11 +377,6 @@ class Vehicle(FoundVehicle, AnyModel):
     def responses_off(self) -> bool:
         """Whether the frequency response about roll or pitch is not acceptable."""
         return NOT_ACCEPTABLE in self._turning
-
-    @property
-    def responses_judged(self) -> bool:
-        """Whether the frequency responses of roll and pitch are judged, both."""
-        return len(self._turning) == len(ROTATION[:2]) and NOT_JUDGED not in self._turning
 
     @property
     def identifies_turning(self) -> bool:

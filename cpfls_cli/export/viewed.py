@@ -107,13 +107,6 @@ def _signals(
         )
 
 
-def _units_of(study: Study, *, imported: bool) -> dict[str, str]:
-    """Give the units that only the import knows."""
-    if not imported:
-        return {"rotor_command": "rad/s"}
-    return {name: own.unit for name, own in study.import_.signals.items() if name in _OF_CONFIG}
-
-
 def _pose(child: str, time: Array, attitude: Array | None, position: Array | None) -> list[Pose]:
     if attitude is None:
         return []
@@ -123,7 +116,10 @@ def _pose(child: str, time: Array, attitude: Array | None, position: Array | Non
 def _of_flight(given: Flight, study: Study) -> View:
     time = _log_time(given.time, given.begins)
     signals = {name: values for name, values in given.signals.items() if name != "time"}
-    units = _units_of(study, imported=isinstance(given, Imported))
+    # Units that only the import knows.
+    units = {"rotor_command": "rad/s"}
+    if isinstance(given, Imported):
+        units = {str(name): str(own.unit) for name, own in study.import_.signals.items() if name in _OF_CONFIG}
     return View(
         tuple(_signals("", time, signals, Flight.about_signals(), units)),
         poses=_pose(BODY_FRAME, time, given.attitude, given.position),

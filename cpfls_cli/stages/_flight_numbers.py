@@ -77,12 +77,6 @@ def stated_of(flight: Path) -> dict[str, str]:
     return stated_vehicle(contents.system, contents.parameters)
 
 
-def with_absent_signals(study: Study) -> Study:
-    """Let a log lack any signal but those that the import cannot do without."""
-    signals = {name: replace(signal, required=False) for name, signal in study.import_.signals.items()}
-    return study.model_copy(update={"import_": replace(study.import_, signals=signals)})
-
-
 def _path(flight: Path, file: InputFile, folder: Path) -> Path:
     return folder / f"{flight.name}-{file.sha256[:_HASH]}.h5"
 

@@ -38,7 +38,6 @@ from cpfls_cli.stages._flight_numbers import (
     of_other_vehicles,
     stated_by,
     stated_of,
-    with_absent_signals,
 )
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
@@ -178,7 +177,8 @@ def _flights(
             if anyway:
                 # Of another vehicle's log what it holds is compared.
                 with suppress(InputError):
-                    study = with_absent_signals(run.study)
+                    signals = {name: replace(own, required=False) for name, own in run.study.import_.signals.items()}
+                    study = run.study.model_copy(update={"import_": replace(run.study.import_, signals=signals)})
                     own = kept_numbers(path, inputs[role], study, folder, run.cautions)
                     flights[role] = replace(own, name=label)
                     del refused[role]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -148,15 +148,6 @@ def _farther_off(playback: PlaybackChange) -> list[str]:
     ]
 
 
-def _unplayed(playback: PlaybackChange) -> list[str]:
-    """List the signals that cannot be played back."""
-    return [words for name, (words, _, _) in SIGNALS.items() if name not in playback.signals]
-
-
-def _finite(value: Any) -> bool:
-    return bool(np.isfinite(value))
-
-
 FIGURES = {
     "repeatable": repeatability_drawn(lambda r: (r.repeatability_before, r.repeatability_after)),
     "free-runs": Drawn(
@@ -185,13 +176,13 @@ WORDS = {
     **GAP_WORDS,
     "axes": BODY_AXES,
     "farther_off": _farther_off,
-    "finite": _finite,
+    "finite": np.isfinite,
     "gust_words": axis_words,
     "hidden_gaps": hidden_gaps,
     "leaving": _leaving,
     "of_guesses": is_of_guesses,
     "signals": SIGNALS,
-    "unplayed": _unplayed,
+    "unplayed": lambda playback: [words for name, (words, *_) in SIGNALS.items() if name not in playback.signals],
     "who": WHO,
     "wrong_numbers": _wrong,
 }

@@ -31,7 +31,7 @@ from cpfls_cli.export.sheet import REFITTED, Sheet
 from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.viewed import view_of
 from cpfls_cli.flights.models import any_model, modelled
-from cpfls_cli.pages.model import against, impossible_in_words, worth_in_words
+from cpfls_cli.pages.model import against, impossible_in_words, said_by
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
@@ -256,7 +256,7 @@ def bare_sheet(record: AnyModel, model: VehicleModel, origin: Origin) -> Sheet:
     return Sheet(
         "",
         model,
-        tuple(worth_in_words(record)),
+        tuple(said_by(record.MADE_BY, record, "usage")),
         origin,
         "",
         "",

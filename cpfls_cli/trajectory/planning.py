@@ -250,7 +250,10 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
         time = sample_times(duration, settings.sample_time_s)
         heading = _heading(settings, legs, time, duration)
         flown = along(time, evaluate_legs(legs, time) if legs else np.zeros((7, len(time), 3)), heading, gravity)
-        planned = Trajectory(duration=duration, legs=legs, maxima=_maxima(legs), runs=(), **flown)
+        # Crackle and pop are infinite without a limit.
+        peaks = [asdict(profile.peaks) for leg in legs for profile in leg.profiles]
+        maxima = {each.name: max((abs(peak[each.name]) for peak in peaks), default=0.0) for each in fields(Peaks)}
+        planned = Trajectory(duration=duration, legs=legs, maxima=maxima, runs=(), **flown)
     if not all(np.isfinite(values).all() for values in vars(planned).values() if isinstance(values, np.ndarray)):
         raise ComputationError(
             "the attitude's derivatives are too large for floating-point numbers; lower trajectory.yaw_turn_rad"
@@ -325,12 +328,6 @@ def _begins(settings: TrajectorySettings, durations: Array) -> Array:
     check_duration(len(durations), needed, settings.duration_s)
     pause = (settings.duration_s - needed) / max(len(durations) - 1, 1)
     return np.asarray(np.cumsum(durations) - durations + pause * np.arange(len(durations)))
-
-
-def _maxima(legs: tuple[Leg, ...]) -> dict[str, float]:
-    """Find the largest peak of every derivative over all legs; infinite for crackle and pop without a limit."""
-    peaks = [asdict(profile.peaks) for leg in legs for profile in leg.profiles]
-    return {field.name: max((abs(peak[field.name]) for peak in peaks), default=0.0) for field in fields(Peaks)}
 
 
 def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
