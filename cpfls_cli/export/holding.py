@@ -261,7 +261,7 @@ def _with_inertia(body: Body, inertia: Array) -> Body:
 def missing(
     model: VehicleModel, held: Held, holds: Holds, floor: Array, wind: tuple[float, float, float]
 ) -> list[Missing]:
-    """List what a target does not hold, each with its size beside noise floors, shape (6,), N m and N."""
+    """List what a target does not hold, each with its size, also in noise floors, shape (6,), N m and N."""
     flight, whole = probe_flight(model), replace(Held.whole(model), wind=(0.0, 0.0, 0.0))
     others = [*_left(model, whole, holds), *_others(held, whole)]
     if any(wind):
@@ -336,7 +336,7 @@ def _apart(first: Array, second: Array) -> Off:
 
 
 def sized(title: str, size: Array, floor: Array, off: Off, where: str = Missing.where) -> Missing:
-    """Tell the size of a part, its root mean square, shape (6,), N m and N, beside noise floors."""
+    """Tell the size of a part, its root mean square, shape (6,), N m and N, also in noise floors."""
     floors = size / floor
     largest = float(np.nanmax(floors)) if np.isfinite(floors).any() else float("nan")
     torque, force = (float(np.where(part < _ROUNDING, 0.0, part).max()) for part in (size[:3], size[3:]))

@@ -1,4 +1,4 @@
-"""Everything about a model that goes into an export: the vehicle, where it comes from, what it is worth in words."""
+"""Everything about a model that goes into an export: the vehicle, where it comes from, what it is good for."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ REFITTED = "refitted numbers of the vehicle"
 class Sheet:
     """A model, ready to be written in any form, in still air.
 
-    `name`: prefix of all names in source code; `worth`: paragraphs that say what it is worth; `verdict`: in a word;
+    `name`: prefix of all names in source code; `usage`: paragraphs that say what it is good for; `verdict`: in a word;
     `stopped`: why its search did not come to its end; `evidence`: what it was judged by, for JSON; `outside`: effects
     of the artifact that are no sums of weights; `wind` of the flights that it was made with, m/s, world frame, and
     their noise `floor`, N m and N, NaN where unknown; `warnings`: what speaks against using it, on the screen alone;
@@ -69,7 +69,7 @@ class Sheet:
 
     name: str
     model: VehicleModel
-    worth: tuple[str, ...]
+    usage: tuple[str, ...]
     origin: Origin
     file: str
     sha256: str
@@ -144,13 +144,13 @@ class Sheet:
 
     @property
     def facts(self) -> list[str]:
-        """Paragraphs that say what the model is, what it is worth and where it comes from."""
+        """Paragraphs that say what the model is, what it is good for and where it comes from."""
         return [*self.remarks, "", *self._origin()]
 
     @property
     def remarks(self) -> list[str]:
-        """What must not be overlooked, what the model is and what it is worth."""
-        return [*self._marks(), *self.cautions, *self._structure(), *self.worth]
+        """What must not be overlooked, what the model is and what it is good for."""
+        return [*self._marks(), *self.cautions, *self._structure(), *self.usage]
 
     def _marks(self) -> Iterator[str]:
         if self.impossible:

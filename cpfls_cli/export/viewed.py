@@ -83,16 +83,16 @@ def _axes(about: About, values: Array) -> tuple[str, ...]:
 def _signals(
     flight: str, time: Array, signals: Mapping[str, Array], abouts: Mapping[str, About], units: Mapping[str, str]
 ) -> Iterator[Track]:
-    """Put each setpoint beside what it is a setpoint of, where both have one unit."""
+    """Join each setpoint with what it is a setpoint of, where both have one unit."""
     for name, values in signals.items():
         own = name.removeprefix(_ASKED)
         unit = units.get(name, abouts[name].unit)
         if own != name and own in signals and units.get(own, abouts[own].unit) == unit:
             continue
         asked = signals.get(_ASKED + own)
-        beside = own == name and asked is not None and units.get(_ASKED + own, abouts[_ASKED + own].unit) == unit
+        joined = own == name and asked is not None and units.get(_ASKED + own, abouts[_ASKED + own].unit) == unit
         held = {SETPOINT if own != name else MEASURED: values}
-        if beside and asked is not None:
+        if joined and asked is not None:
             held[SETPOINT] = asked.reshape(values.shape)
         about = abouts[name]
         yield Track(

@@ -44,7 +44,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")
-_BESIDE = ("acceleration", "specific_force", "voltage", "thrust", "rotor_command")
+_OPTIONAL = ("acceleration", "specific_force", "voltage", "thrust", "rotor_command")
 _MOST_PARTS = 50
 
 
@@ -150,9 +150,9 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:
     """Cut out a stretch, with what is known in all of it and what was asked for."""
     names = [name for name in ("time", *MOTION, actuation) if name in flight.signals]
-    beside = [name for name in _BESIDE if name in flight.signals and np.isfinite(flight.signals[name][part]).all()]
+    optional = [name for name in _OPTIONAL if name in flight.signals and np.isfinite(flight.signals[name][part]).all()]
     asked = [name for name in SETPOINTS if name in flight.signals]
-    return {name: flight.signals[name][part] for name in (*names, *beside, *asked)}
+    return {name: flight.signals[name][part] for name in (*names, *optional, *asked)}
 
 
 def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) -> list[str]:
@@ -171,7 +171,7 @@ def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) 
 
 
 def played(model: VehicleModel, flight: LoggedFlight, stated: VehicleSettings) -> Played:
-    """Make a flight and a model ready for playback, beside the vehicle that the config states."""
+    """Make a flight and a model ready for playback, with the vehicle that the config states to compare with."""
     along, player = made_ready(model, flight)
     if model.is_rigid_body and model.vehicle == stated and model.fuzzy is None:
         return Played(along, player, player)

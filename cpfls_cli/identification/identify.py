@@ -69,7 +69,7 @@ def identify(
     stated_inertia: Array | None = None,
     kept: TorqueSource | None = None,
 ) -> Identification:
-    """Identify a model and judge it beside its baselines.
+    """Identify a model and compare it with its baselines.
 
     Where instruments or past windows identify the vehicle and not its loop, parameters and the errors that the search
     minimises are those of the torque that they know (`freed_torque`); scores are those of the torque as measured.

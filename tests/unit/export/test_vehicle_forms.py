@@ -240,7 +240,7 @@ def test_references_of_json_are_what_it_says(exports):
 
 
 def test_json_is_the_same_each_time_and_strict():
-    sheet = sheet_of_vehicle(MODELS["harmonic"], worth=("caf\u00e9", "\ud800"))
+    sheet = sheet_of_vehicle(MODELS["harmonic"], usage=("caf\u00e9", "\ud800"))
     text = json_text(sheet)
     assert text == json_text(sheet)
     assert text.isascii()
