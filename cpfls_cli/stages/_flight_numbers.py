@@ -156,6 +156,14 @@ def of_other_autopilots(flights: Sequence[FlightNumbers], *, thrusts: bool) -> t
     return unlike, ranges
 
 
+def without_voltage(which: str) -> str:
+    """Say of which flights by commands the voltage of the battery is not known, and why it is asked for."""
+    return (
+        f"without the battery's voltage: {which}; an emptier battery looks like a heavier vehicle, so name "
+        "import.signals.voltage"
+    )
+
+
 def stated_by(flights: Sequence[FlightNumbers]) -> list[tuple[str, Mapping[str, str]]]:
     """Give what the logs of flights state of their vehicles, with the names of the flights."""
     return [(own.name, own.facts) for own in flights]

@@ -38,6 +38,7 @@ from cpfls_cli.stages._flight_numbers import (
     of_other_vehicles,
     stated_by,
     stated_of,
+    without_voltage,
 )
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
@@ -243,10 +244,7 @@ def _warnings(today: Sequence[FlightNumbers], before: Sequence[FlightNumbers], n
         )
     elif flights[0].commanded and not all(np.isfinite(own.voltage) for own in flights):
         without = [own.name for own in flights if not np.isfinite(own.voltage)]
-        yield (
-            f"without the battery's voltage: {'all flights' if len(without) == len(flights) else joined(without)}; an "
-            "emptier battery looks like a heavier vehicle, so name import.signals.voltage"
-        )
+        yield without_voltage("all flights" if len(without) == len(flights) else joined(without))
     usual = float(np.median([own.period_s for own in before]))
     other = [own for own in flights if abs(own.period_s / usual - 1) > _RATE]
     if other:

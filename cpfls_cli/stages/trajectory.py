@@ -26,7 +26,8 @@ from cpfls_cli.report.canvas import BASELINE, Drawn, line, picture_of, stacked, 
 from cpfls_cli.report.content import plain
 from cpfls_cli.simulation.inverse import Flyability, RoomLeft, flyability, room_left, single_axis_torque
 from cpfls_cli.stage import Run, stage
-from cpfls_cli.stages._flight import demand_sentences, draw_attitude, draw_rotation
+from cpfls_cli.stages._flight import FIGURES as OF_FLIGHTS
+from cpfls_cli.stages._flight import demand_sentences
 from cpfls_cli.stages._mission import mission_of, mission_paths, mission_texts, mission_words
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rotation, plan, repeated
@@ -218,10 +219,8 @@ FIGURES = {
     "derivatives": Drawn(
         f"Seven curves over time: {', '.join(DERIVATIVES)}", 8.6, _draw_derivatives, lambda r: not r.held
     ),
-    "attitude": Drawn("Roll and pitch angle over time", 2.7, draw_attitude, lambda r: not r.held),
-    "rotation": Drawn(
-        "Roll, pitch and yaw on the circle, and their rates, over time", 4.6, draw_rotation, lambda r: r.held
-    ),
+    "attitude": replace(OF_FLIGHTS["attitude"], holds=lambda r: not r.held),
+    "rotation": replace(OF_FLIGHTS["rotation"], holds=lambda r: r.held),
 }
 
 
