@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.dynamics import InertiaFunctions
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.export.holding import Missing
+from cpfls_cli.export.holding import Missing, identified_of
 from cpfls_cli.export.points import (
     Expected,
     ReferencePoints,
@@ -86,11 +86,7 @@ class Sheet:
     @property
     def identified(self) -> InertiaFunctions | None:
         """The identified model that its inertia over attitude is that of; None for a constant inertia."""
-        fuzzy = self.model.fuzzy
-        assert fuzzy is None or isinstance(fuzzy, InertiaFunctions), (
-            "an inertia over attitude is that of an identified model"
-        )
-        return fuzzy
+        return identified_of(self.model)
 
     @property
     def rigid_body(self) -> Array:

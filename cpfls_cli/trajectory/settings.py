@@ -21,6 +21,7 @@ _LARGEST_PEAK = 1e100
 # Of the fastest wave of an excitation, between which an autopilot and a simulation interpolate.
 _SAMPLES_IN_A_PERIOD = 10
 _MAY_JUMP = ("crackle", "pop")
+_OF_DURATION = "contradicts duration_s, which determines the rest between moves; set duration_s to null"
 # Samples of a path, of 34 numbers each: 2.7 GB.
 _LARGEST_SIZE = 10_000_000
 
@@ -55,9 +56,7 @@ def _check_clock(settings: TrajectorySettings) -> None:
         return
     check_samples(settings.duration_s, settings.sample_time_s)
     if settings.pause_s:
-        raise SettingError(
-            "pause_s", "contradicts duration_s, which determines the rest between moves; set duration_s to null"
-        )
+        raise SettingError("pause_s", _OF_DURATION)
 
 
 def _check_held(settings: TrajectorySettings) -> None:
@@ -197,8 +196,7 @@ def check_waypoints(waypoints: Sequence[WaypointSettings], paused: bool) -> None
         raise SettingError(f"waypoints.{headings.index(True)}.yaw_rad", message)
     for number, point in enumerate(waypoints):
         if point.pause_s and not paused:
-            message = "contradicts duration_s, which determines the rest between moves; set duration_s to null"
-            raise SettingError(f"waypoints.{number}.pause_s", message)
+            raise SettingError(f"waypoints.{number}.pause_s", _OF_DURATION)
 
 
 _Turns = Annotated[int, Ge(-10_000), Le(10_000)]
