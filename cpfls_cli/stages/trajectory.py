@@ -202,11 +202,11 @@ _MOST_SAMPLES = 1_000_000
 
 def _draw_derivatives(r: PlannedPath, figure: Figure) -> None:
     """Draw pop to displacement over the first move: Figure 2 of the paper."""
-    move = r.first_leg()
+    time, curves = r.first_leg()
     panels = stacked(figure, len(DERIVATIVES))
     for axes, peak in zip(panels, r.peaks, strict=True):
-        curve = move.curves[peak.name]
-        line(axes, move.time, curve, **style_of(0))
+        curve = curves[peak.name]
+        line(axes, time, curve, **style_of(0))
         jumps = "" if np.any(curve) else ": not limited, infinite where the derivative below jumps"
         axes.set(title=f"{peak.name}{jumps}", ylabel=peak.unit)
         axes.axhline(0.0, color="#999999", linewidth=0.6)
