@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.trajectory.legs import Leg, MoveInSpace, evaluate_legs, move_in_space, samples_of_legs
+from cpfls_cli.trajectory.legs import Leg, MoveInSpace, evaluate_legs, samples_of_legs
 from cpfls_cli.trajectory.profile import BaseProfile, Peaks, covering
 from cpfls_cli.trajectory.rotation import RotationMotion, RotationPath
 from cpfls_cli.trajectory.settings import (
@@ -310,7 +310,7 @@ def _duration_of(settings: TrajectorySettings, legs: tuple[Leg, ...]) -> float:
 def _between_waypoints(settings: TrajectorySettings) -> list[MoveInSpace]:
     check_waypoints(settings.waypoints, settings.duration_s is None)
     points = [np.array(waypoint.position_m) for waypoint in settings.waypoints]
-    moves = [move_in_space(end - start, settings.timing) for start, end in pairwise(points)]
+    moves = [settings.move(end - start) for start, end in pairwise(points)]
     for profile in (profile for move in moves for profile in move.profiles):
         check_peaks(profile, "limits" if settings.limits.given else "period_s")
     return moves
@@ -433,7 +433,7 @@ def _way_back(run: Trajectory, settings: TrajectorySettings) -> tuple[Leg | None
     vector = run.position[0] - run.position[-1]
     if float(np.abs(vector).max()) <= _AT_HOME:
         return None, turn if abs(turn) > _AT_HOME else 0.0
-    move = move_in_space(vector, settings.timing)
+    move = settings.move(vector)
     return Leg(begin=0.0, start=run.position[-1], yaw=None, **vars(move)), turn
 
 
