@@ -376,7 +376,7 @@ def _blocks(
             yield Folded(_plain_line(node.text), inner, "open" in node.marks)
         elif node.kind == "figure" and node.name in pictures:
             caption = _plain_line(node.text)
-            yield Plot(f"{prefix}{node.name}", caption, pictures[node.name])
+            yield Plot(f"{prefix}{node.name}", caption, pictures[node.name], caption)
         elif node.kind == "words":
             title: SyntaxTreeNode | None = None
             for each in SyntaxTreeNode(_markdown().parse(node.text)).children:

@@ -260,7 +260,8 @@ def _words(blocks: Iterable[Block]) -> Iterator[str]:
                 rows = [[_toned(cell.text, cell.tone) for cell in row] for row in block.cells]
                 yield page.table([page.said(name) for name in block.header], rows, block.words)
             case Plot():
-                yield f"![{page.said(block.caption)}]({block.name})"
+                more = f" [{page.said(block.see[1])}](#{block.see[0]})" if block.see else ""
+                yield f"![{page.said(block.caption)}{more}]({block.name})"
             case Listing():
                 yield page.listing(block.text)
             case Folded():
@@ -290,7 +291,7 @@ def _block(block: Block) -> dict[str, Any]:
         case Text():
             return {"kind": kind, "text": block.text, "tone": block.tone}
         case Plot():
-            return {"kind": "figure", "name": block.name, "caption": block.caption, "description": block.caption}
+            return {"kind": "figure", "name": block.name, "caption": block.caption, "description": block.description}
         case _:
             return {"kind": kind, **asdict(block)}
 

@@ -19,7 +19,7 @@ from markupsafe import escape
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import visible
-from cpfls_cli.report.content import Picture, number, plain, power_of_ten
+from cpfls_cli.report.content import Picture, Plot, number, plain, power_of_ten
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -102,6 +102,11 @@ _WIDE_RANGE = 1000.0
 
 _POINTS = 12
 """Of a curve that are all listed for who does not see it."""
+
+
+def plot(name: str, caption: str, description: str, height: float, draw: Callable[[Figure], None]) -> Plot:
+    """Describe a figure, which `draw` fills when it is asked for; its height is in inches, at a width of 7.6."""
+    return Plot(name, caption, _Drawing(name, description, height, draw), description)
 
 
 @dataclass(frozen=True)

@@ -93,11 +93,19 @@ Picture = Any
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure, with a name that is unique on the page."""
+    """A figure, with a name that is unique on the page, and a description for those who do not see it.
+
+    Attributes
+    ----------
+    see : tuple of (str, str), or None
+        Where on the page more is said of it: an anchor, and the words that lead there.
+    """
 
     name: str
     caption: str
     picture: Picture
+    description: str = ""
+    see: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import typer
 from cpfls_cli import store
 from cpfls_cli.arguments import ExportAnywayOption
 from cpfls_cli.artifacts.diagnosis import Extended
-from cpfls_cli.artifacts.gate import InputFile, read_origin
+from cpfls_cli.artifacts.gate import InputFile, Origin, read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.artifacts.output import check_output
@@ -32,7 +32,7 @@ from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.viewed import view_of
 from cpfls_cli.flights.models import any_model, modelled
 from cpfls_cli.pages.model import against, impossible_in_words, said_by
-from cpfls_cli.playback.model import ModelEffect
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.validation.trust import Trust
@@ -231,7 +231,7 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool, anyway: boo
     Numbers that no vehicle has need `anyway`, which does for the others too.
     """
     record = any_model(path)
-    sheet = replace(_unnamed_sheet(path, record), name=name, file=path.name, sha256=file.sha256)
+    sheet = _bare_sheet(path, record, read_origin(path))
     if isinstance(sheet.model.fuzzy, InertiaFunctions):
         _require_usable(sheet.model.fuzzy, path)
     if sheet.impossible and not anyway:
@@ -248,7 +248,24 @@ def sheet_of(path: Path, name: str, file: InputFile, *, force: bool, anyway: boo
         )
     if sheet.verdict == "do-not-use" and not force:
         raise InputError(f"{path}: its verdict is do-not-use; --anyway exports it, marked as such")
-    return sheet
+    return replace(sheet, name=name, file=path.name, sha256=file.sha256)
+
+
+def bare_sheet(record: AnyModel, model: VehicleModel, origin: Origin) -> Sheet:
+    """Put a model on a sheet that has no name yet."""
+    return Sheet(
+        "",
+        model,
+        tuple(said_by(record.MADE_BY, record, "usage")),
+        origin,
+        "",
+        "",
+        verdict=None if record.trust == Trust.NOT_JUDGED else str(record.trust),
+        stopped=record.stopped or None,
+        cautions=() if isinstance(record, IdentifiedModel) else (*origin.cautions, *against(record)),
+        evidence=_evidence(record) if isinstance(record, IdentifiedModel) else {},
+        impossible=impossible_in_words(record),
+    )
 
 
 def _require_usable(functions: InertiaFunctions, path: Path) -> None:
@@ -261,27 +278,17 @@ def _require_usable(functions: InertiaFunctions, path: Path) -> None:
             raise InputError(f"{where}/partitions: those of {partition.name} make no partition; identify it again")
 
 
-def _unnamed_sheet(path: Path, record: AnyModel) -> Sheet:
+def _bare_sheet(path: Path, record: AnyModel, origin: Origin) -> Sheet:
     """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
-    model, origin = modelled(path, record), read_origin(path)
+    model = modelled(path, record)
     held = tuple(each for each in model.effects if each.name not in model.unsimulated)
-    sheet = Sheet(
-        "",
-        replace(model, effects=held, wind=(0.0, 0.0, 0.0)),
-        tuple(said_by(record.MADE_BY, record, "usage")),
-        origin,
-        "",
-        "",
-        verdict=None if record.trust == Trust.NOT_JUDGED else str(record.trust),
-        stopped=record.stopped or None,
-        impossible=impossible_in_words(record),
-    )
+    still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
+    sheet = bare_sheet(record, still, origin)
     if isinstance(record, IdentifiedModel):
-        return replace(sheet, evidence=_evidence(record), warnings=tuple(_warnings(record, origin.config, path)))
+        return replace(sheet, warnings=tuple(_warnings(record, origin.config, path)))
     outside = tuple(_missing(record, (*model.filters, *model.along)))
     floor = tuple(record.gap.floor.tolist()) if isinstance(record, Extended) else sheet.floor
-    cautions = (*origin.cautions, *against(record))
-    return replace(sheet, cautions=cautions, outside=outside, wind=model.wind, floor=floor)
+    return replace(sheet, outside=outside, wind=model.wind, floor=floor)
 
 
 def _missing(record: AnyModel, effects: tuple[ModelEffect, ...]) -> Iterator[Missing]:

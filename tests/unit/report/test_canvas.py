@@ -9,23 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cpfls_cli.arrays import runs
-from cpfls_cli.report.canvas import (
-    Drawn,
-    band,
-    figure_html,
-    kept_samples,
-    legend_above,
-    legend_over,
-    line,
-    picture_of,
-    stacked,
-)
+from cpfls_cli.report.canvas import band, figure_html, kept_samples, legend_above, legend_over, line, plot, stacked
 
 pytestmark = pytest.mark.usefixtures("drawn")
-
-
-def plot(name, draw, words="what", height=2.0):
-    return picture_of(Drawn(words, height, lambda _, figure: draw(figure), lambda _: True), name, None)
 
 
 def draw(figure):
@@ -35,14 +21,14 @@ def draw(figure):
 
 
 def test_equal_figures_are_equal_text_whatever_the_reader_s_settings():
-    first = plot("one", draw).svg
+    first = plot("one", "", "what", 2.0, draw).picture.svg
     with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "svg.fonttype": "path", "lines.linewidth": 9}):
-        assert plot("one", draw).svg == first
+        assert plot("one", "", "what", 2.0, draw).picture.svg == first
         assert matplotlib.rcParams["font.size"] == 30
 
 
 def test_ids_of_two_figures_do_not_meet_and_all_references_resolve():
-    pictures = [plot(name, draw).svg for name in ("one", "two")]
+    pictures = [plot(name, "", "what", 2.0, draw).picture.svg for name in ("one", "two")]
     ids = [re.findall(r'\bid="([^"]+)"', svg) for svg in pictures]
     assert ids[0]
     assert not set(ids[0]) & set(ids[1])
@@ -53,7 +39,7 @@ def test_ids_of_two_figures_do_not_meet_and_all_references_resolve():
 
 
 def test_a_figure_is_well_formed_named_and_carries_no_style_sheet():
-    svg = plot("one", draw, 'says "what" & <more>').svg
+    svg = plot("one", "", 'says "what" & <more>', 2.0, draw).picture.svg
     root = ElementTree.fromstring(svg)
     assert root.get("aria-label") == 'says "what" & <more>'
     assert root.get("role") == "img"
@@ -66,7 +52,7 @@ def test_a_unit_stays_on_one_line_and_what_cannot_be_drawn_is_marked():
     def label(figure):
         figure.subplots().set_xlabel("torque, N\N{NO-BREAK SPACE}m of a\x07b")
 
-    words = "".join(ElementTree.fromstring(plot("one", label).svg).itertext())
+    words = "".join(ElementTree.fromstring(plot("one", "", "what", 2.0, label).picture.svg).itertext())
     assert "torque, N\N{NO-BREAK SPACE}m of a\N{REPLACEMENT CHARACTER}b" in words
 
 
@@ -84,7 +70,7 @@ def test_names_in_a_figure_are_shown_as_they_are_written(over):
         axes.set_title("_$x_")
         legend_over(figure, axes) if over else legend_above(axes)
 
-    picture = plot("one", draw)
+    picture = plot("one", "", "what", 2.0, draw).picture
     shown = [text for text in ElementTree.fromstring(picture.svg).itertext() if text.strip()]
     assert [text for text in shown if text in {*names, "_bars", "_$x_"}] == ["_$x_", *names, "_bars"]
     assert {curve for _, curve, _, _ in picture.rows} == {*names, "_bars", ""}
@@ -126,7 +112,7 @@ def powers_of_ten(figure):
 
 @pytest.mark.parametrize("draw", [labels_of_several_widths, powers_of_ten])
 def test_a_layout_by_few_ticks_is_that_of_the_library(draw):
-    picture = plot("one", draw, height=4.0)
+    picture = plot("one", "", "what", 4.0, draw).picture
     figure = picture.figure()
     figure.set_dpi(72)
     figure.draw_without_rendering()
@@ -141,7 +127,7 @@ def test_a_layout_by_few_ticks_is_that_of_the_library(draw):
 
 
 def test_ticks_are_written_in_words_that_need_no_typesetting_and_keep_their_factor():
-    figure = plot("one", powers_of_ten, height=4.0)
+    figure = plot("one", "", "what", 4.0, powers_of_ten).picture
     words = {text.strip() for text in ElementTree.fromstring(figure.svg).itertext()}
     assert {"10⁻³", "10⁰", "10⁴", "2 × 10⁰", "1e−9", "0.5"} <= words
     assert not any("$" in word or "\\" in word for word in words)
@@ -163,7 +149,7 @@ def test_who_does_not_see_a_figure_reads_its_panels_curves_and_their_extremes():
         lower.set_yticks([0.0, 1.0], ["drag", "lag"])
         lower.set_ylabel("effect")
 
-    picture = plot("one", draw)
+    picture = plot("one", "", "what", 2.0, draw).picture
     panel = "roll <b>, N m over time, s"
     assert picture.rows[:4] == [
         (panel, "torque", "0", "0"),
@@ -179,5 +165,5 @@ def test_who_does_not_see_a_figure_reads_its_panels_curves_and_their_extremes():
 
 
 def test_no_figure_is_left_open():
-    plot("name", draw).figure()
+    plot("name", "", "what", 2.0, draw).picture.figure()
     assert not plt.get_fignums()
