@@ -48,7 +48,7 @@ class _Loop:
 
 @cache
 def _numba() -> Any:
-    """Load numba, and be told when it compiles something that no folder keeps."""
+    """Load numba, and take note when it compiles something that no folder keeps."""
     import numba
     from numba.core import event
 

@@ -366,10 +366,10 @@ def _move_numbers(trajectory: Source[PlannedPath]) -> dict[str, float]:
     """Measure the first move of a path: its peaks by derivative, its time and its integral of absolute jerk."""
     from scipy.integrate import trapezoid
 
-    leg = trajectory.record.first_leg()
-    peaks = {name: float(np.max(np.abs(leg.curves[name]))) for name in PRINTED_PEAKS}
-    taken = float(leg.time[-1] - leg.time[0])
-    return peaks | {"time": taken, "integral of jerk": float(trapezoid(np.abs(leg.curves["jerk"]), leg.time))}
+    time, curves = trajectory.record.first_leg()
+    peaks = {name: float(np.max(np.abs(curves[name]))) for name in PRINTED_PEAKS}
+    taken = float(time[-1] - time[0])
+    return peaks | {"time": taken, "integral of jerk": float(trapezoid(np.abs(curves["jerk"]), time))}
 
 
 MOVE_CLAIM = Claim(

@@ -45,7 +45,8 @@ from cpfls_cli.flightlog.results import MOTION
 from cpfls_cli.flights.prediction import AlongFlight
 from cpfls_cli.fuzzy.basis import breakpoints, seesaw
 from cpfls_cli.identification.data import TRAINING
-from cpfls_cli.identification.identify import AXES, MODEL
+from cpfls_cli.identification.findings import AXES
+from cpfls_cli.identification.identify import MODEL
 from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.report.canvas import line, plot, stacked, style_of
 from cpfls_cli.report.content import (

@@ -150,7 +150,9 @@ def parameters_of(vehicle: Vehicle) -> Iterator[Parameter]:
         else:
             held = _held(vehicle, key)
             stated = held if key in STATED and held else None
-            yield Parameter(key, held, unit, None, None, stated, False, _why_not_fitted(key))
+            adds = key in (LAG, DELAY, *CENTRE, *INERTIA[3:])
+            why = "not needed: no lower error with it" if adds else "as stated: no lower error with another"
+            yield Parameter(key, held, unit, None, None, stated, False, why)
 
 
 def _reason(vehicle: Vehicle, number: FoundNumber) -> str:
@@ -211,12 +213,6 @@ def _held(vehicle: Vehicle, key: str) -> float:
     if key in (THRUST, DRAG):
         return float(np.mean([getattr(rotor, key.rpartition(".")[2]) for rotor in stated.rotors]))
     return {LAG: response.lag_s, DELAY: response.delay_s}.get(key, 0.0)
-
-
-def _why_not_fitted(key: str) -> str:
-    if key in (LAG, DELAY, *CENTRE, *INERTIA[3:]):
-        return "not needed: no lower error with it"
-    return "as stated: no lower error with another"
 
 
 def vehicle_section(vehicle: Vehicle) -> dict[str, Any]:
@@ -354,7 +350,8 @@ class Vehicle(FoundVehicle, AnyModel):
                 identified=identified,
             )
         lacks = self.responses_off or self.instruments.lacks
-        word = Trust.SIMULATION if lacks or self.responses_judged else Trust.NOT_JUDGED
+        judged = len(self._turning) == len(ROTATION[:2]) and NOT_JUDGED not in self._turning
+        word = Trust.SIMULATION if lacks or judged else Trust.NOT_JUDGED
         return capped(word, self.contradictions, lacks=lacks, identified=identified)
 
     @property
@@ -380,11 +377,6 @@ class Vehicle(FoundVehicle, AnyModel):
     def responses_off(self) -> bool:
         """Whether the frequency response about roll or pitch is not acceptable."""
         return NOT_ACCEPTABLE in self._turning
-
-    @property
-    def responses_judged(self) -> bool:
-        """Whether the frequency responses of roll and pitch are judged, both."""
-        return len(self._turning) == len(ROTATION[:2]) and NOT_JUDGED not in self._turning
 
     @property
     def identifies_turning(self) -> bool:

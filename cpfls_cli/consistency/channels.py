@@ -17,7 +17,7 @@ AXES = ("x", "y", "z")
 SAME = 0.9  # Correlation that noise does not reach over a flight.
 _OTHER = 0.5  # Correlation that noise does not hide where the motion is worth a look.
 TWICE = 2.0  # Ratio of two sizes that neither noise nor a filter makes: at a correlation of 0.6 noise makes up to 1.7.
-_BODY_AXES = ("x (roll)", "y (pitch)", "z (yaw)")
+BODY_AXES = ("x (roll)", "y (pitch)", "z (yaw)")
 TURNING_RAD_S, _TURNING_SHARE = 0.1, 0.1
 """Standard deviation from which on an axis is judged, also as a share of that of the axis which turns most: about one
 that hardly turns, errors of the others decide."""
@@ -93,7 +93,7 @@ def gyroscope_apart(seen: Array, read: Array) -> tuple[tuple[Finding, ...], tupl
         gain = float(read[:, axis].std() / seen[:, axis].std())
         about, remedy = _unit_of_gain(gain, _UNIT_TOLERANCE / (1.0 if agrees else same))
         if about or (agrees and not 1 / TWICE <= gain <= TWICE):
-            what = f"about body {_BODY_AXES[axis]} the body rate is {gain:.3g} times the attitude's derivative{about}"
+            what = f"about body {BODY_AXES[axis]} the body rate is {gain:.3g} times the attitude's derivative{about}"
             scaled.append(Finding(what, remedy, _SENSORS, gain))
     return tuple(unlike), tuple(scaled)
 
@@ -105,7 +105,7 @@ def _one_axis_apart(axis: int, correlation: Array) -> Finding:
         more = ", opposite signs"
     elif instead is not None:
         more = f", but {correlation[axis, instead]:.2f} with that about {AXES[instead]}: axes are swapped"
-    what = f"about body {_BODY_AXES[axis]} the attitude's derivative and the body rate barely agree"
+    what = f"about body {BODY_AXES[axis]} the attitude's derivative and the body rate barely agree"
     remedy = "check columns, signs and frames of import.signals.attitude (or quaternion) and import.signals.body_rate"
     return Finding(f"{what} (correlation {same:.2f}{more})", remedy, _SENSORS, same)
 

@@ -10,6 +10,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import BLOCK_S, half_width, jackknife_error
 from cpfls_cli.consistency.channels import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
+from cpfls_cli.consistency.repairs import UP
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import Ground, first_derivative, fit_lean, second_derivative
 from cpfls_cli.rounding import largest
@@ -38,7 +39,6 @@ _COULD_BE_LATE, _LEAVES_LESS, _PER_HOP = 0.5, 0.5, 4
 are tried from one window to the next."""
 
 _QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])
-_UP = np.array([0.0, 0.0, 1.0])
 TINY = 1e-100  # Square of what does not move.
 
 
@@ -257,7 +257,7 @@ def _in_world(name: str, values: Array, signals: Signals, windows: Windows) -> t
     if name == "velocity":
         return windows.derivative(values), None
     if name == "thrust":
-        values = np.einsum("tij,tj->ti", signals.rotation, values) - signals.vehicle.gravity_m_s2 * _UP
+        values = np.einsum("tij,tj->ti", signals.rotation, values) - signals.vehicle.gravity_m_s2 * UP
     return windows.average(values), windows.derivative(values)
 
 
@@ -268,7 +268,7 @@ def _in_body(name: str, values: Array, signals: Signals, windows: Windows) -> tu
         held = np.cross(signals.body_rate, speed) + signals.vehicle.gravity_m_s2 * signals.rotation[:, 2]
         return windows.derivative(speed) + windows.average(held), None
     if name == "acceleration":
-        values = np.einsum("tji,tj->ti", signals.rotation, values + signals.vehicle.gravity_m_s2 * _UP)
+        values = np.einsum("tji,tj->ti", signals.rotation, values + signals.vehicle.gravity_m_s2 * UP)
     return windows.average(values), windows.derivative(values)
 
 

@@ -12,7 +12,8 @@ from cpfls_cli.lag import delayed
 from cpfls_cli.result import About, about
 from cpfls_cli.words import capitalised
 
-_UP = np.array([0.0, 0.0, 1.0])
+UP = np.array([0.0, 0.0, 1.0])
+"""Of the world."""
 _SAME = 1e-6
 """Share of an acceleration up to which it is the one made of the accelerometer: the import computes it as here."""
 
@@ -72,7 +73,7 @@ class ChannelRepair:
         truth = truth @ self.matrix.T
         if self.gravity_m_s2:
             sensed = self.channel == "specific_force"
-            truth = truth + self.gravity_m_s2 * (signals.rotation[:, 2] if sensed else _UP)
+            truth = truth + self.gravity_m_s2 * (signals.rotation[:, 2] if sensed else UP)
         return np.asarray(truth)
 
 
@@ -81,7 +82,7 @@ def accelerated(signals: Signals) -> Array | None:
     if signals.specific_force is None or signals.attitude is None:
         return None
     turned = np.einsum("tij,tj->ti", signals.rotation, signals.specific_force)
-    return np.asarray(turned - signals.vehicle.gravity_m_s2 * _UP)
+    return np.asarray(turned - signals.vehicle.gravity_m_s2 * UP)
 
 
 def is_derived(signals: Signals) -> bool:

@@ -82,8 +82,8 @@ def attitude_on_clock(found: FaultNumber, along: Sequence[str] = ()) -> tuple[Ch
     `along`: channels that are late with the attitude.
     """
     who = "attitude and motion are" if along else "the attitude is"
-    what = f"{who} {off_clock(-found.value, 0.5 * (found.high - found.low))}, judged by the gyroscope"
-    finding = _off_clock(what, "correct the clock in the log", ("attitude", "gyroscope"), -found.value)
+    off = off_clock(-found.value, 0.5 * (found.high - found.low))
+    finding = _off_clock(f"{who} {off}", "correct the clock in the log", "attitude", -found.value)
     first = ChannelRepair("attitude", delay_s=-found.value).with_finding(finding, f"This is {_DONE}")
     return (first, *(ChannelRepair(name, delay_s=-found.value) for name in along))
 
@@ -107,13 +107,14 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
     if abs(delay) < _ROTORS_OFF_S or np.abs(np.array(found) - delay).max() > max(_SCATTER_S, _SCATTER * abs(delay)):
         return None
     half_s = float(half_width(mean_error(np.array(found)), len(found)))
-    what = f"the rotor speeds are {off_clock(delay, half_s)}, judged by the gyroscope"
-    finding = _off_clock(what, "correct their clock in the log", ("rotors", "gyroscope"), delay)
+    what = f"the rotor speeds are {off_clock(delay, half_s)}"
+    finding = _off_clock(what, "correct their clock in the log", "rotors", delay)
     return ChannelRepair("rotor_speed", delay_s=delay).with_finding(finding, f"They are {_DONE}")
 
 
-def _off_clock(what: str, remedy: str, channels: tuple[str, ...], delay: float) -> Finding:
-    return Finding(what, remedy, channels, delay, "s", contradiction=False, repairable=True)
+def _off_clock(what: str, remedy: str, channel: str, delay: float) -> Finding:
+    what, held = f"{what}, judged by the gyroscope", (channel, "gyroscope")
+    return Finding(what, remedy, held, delay, "s", contradiction=False, repairable=True)
 
 
 def _shifts(half: Signals, windows: Windows) -> Iterator[float]:

@@ -170,7 +170,11 @@ class Effect:
         """Give an actuator the change of wrench as its column, and others what they do for one unit of each number."""
         apply = self.apply
         if self.columns is None and self.kind == "actuator" and apply is not None:
-            object.__setattr__(self, "columns", lambda signals, shape: wrench_change(signals, apply(signals, shape)))
+
+            def change(signals: Signals, shape: Mapping[str, float]) -> Columns:
+                return Columns(stack(apply(signals, shape).wrench - signals.wrench))
+
+            object.__setattr__(self, "columns", change)
         elif self.columns is None and self.acts is not None:
             object.__setattr__(self, "columns", columns_of(self.acts, [each.name for each in self.coefficients]))
 
@@ -259,11 +263,6 @@ def hub_wrench(hubs: Array, force: Array) -> Array:
     `hubs`: shape (rotor, 3), m; `force`: shape (time, rotor, 3), N; Result: shape (time, 6).
     """
     return wrench(cross(hubs[None], force).sum(axis=1), force.sum(axis=1))
-
-
-def wrench_change(before: Signals, after: Signals) -> Columns:
-    """Compute the change of wrench by another actuation as a column."""
-    return Columns(stack(after.wrench - before.wrench))
 
 
 def a_few_percent(_number: str, _values: Mapping[str, float]) -> float:

@@ -10,14 +10,9 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.errors import InputError
 from cpfls_cli.words import did_you_mean
 
-
-def _discover() -> Mapping[str, Effect]:
-    modules = [import_module(f"{catalogue.__name__}.{module.name}") for module in iter_modules(catalogue.__path__)]
-    effects: list[Effect] = sorted((module.EFFECT for module in modules), key=lambda known: (known.order, known.name))
-    return MappingProxyType({known.name: known for known in effects})
-
-
-CATALOGUE: Mapping[str, Effect] = _discover()  # Effects by identifier.
+_MODULES = [import_module(f"{catalogue.__name__}.{module.name}") for module in iter_modules(catalogue.__path__)]
+_EFFECTS: list[Effect] = sorted((own.EFFECT for own in _MODULES), key=lambda known: (known.order, known.name))
+CATALOGUE: Mapping[str, Effect] = MappingProxyType({known.name: known for known in _EFFECTS})  # By identifier.
 VEHICLE_NUMBERS: Effect = next(known for known in CATALOGUE.values() if known.kind == "parameter")
 """The vehicle's own numbers, which stay free in every fit."""
 

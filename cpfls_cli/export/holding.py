@@ -107,13 +107,10 @@ class Missing:
         """What is missing, and its size."""
         if self.off is None:
             return f"Not held: {self.title}; its size depends on the flight and was not measured along one."
-        if not (self.torque or self.force):
-            return f"Not held, or only in part: {self.title}; half a second without it ends {self.off.sentence} off."
-        floors = "" if np.isnan(self.floors) else f", {self.floors:.3g} noise floors"
-        return (
-            f"Not held, or only in part: {self.title}: {self.torque:.3g} N m and {self.force:.3g} N {self.where}"
-            f"{floors}; half a second without it ends {self.off.sentence} off."
-        )
+        size = f": {self.torque:.3g} N m and {self.force:.3g} N {self.where}" if self.torque or self.force else ""
+        size += f", {self.floors:.3g} noise floors" if size and not np.isnan(self.floors) else ""
+        ends = f"half a second without it ends {self.off.sentence} off"
+        return f"Not held, or only in part: {self.title}{size}; {ends}."
 
 
 @dataclass(frozen=True)
@@ -242,15 +239,21 @@ def require_two_each_way(model: VehicleModel, target: str) -> None:
         raise InputError(f"{target} turns four rotors, two each way, which this vehicle has not; {ANY_ROTORS}")
 
 
+def identified_of(model: VehicleModel) -> InertiaFunctions | None:
+    """Give the identified model that an inertia over attitude is that of; None for a constant inertia."""
+    assert model.fuzzy is None or isinstance(model.fuzzy, InertiaFunctions), "no other depends on the attitude"
+    return model.fuzzy
+
+
 def constant_body(model: VehicleModel) -> Body:
     """Take the inertia of a vehicle for targets that hold but one: the mean over attitudes that training visited."""
-    if model.fuzzy is None:
+    fuzzy = identified_of(model)
+    if fuzzy is None:
         return model.body
-    assert isinstance(model.fuzzy, InertiaFunctions), "an inertia over attitude is that of an identified model"
     cell = 2 * np.pi / CELLS
-    roll, pitch = ((np.argwhere(model.fuzzy.visited) + 0.5) * cell - np.pi).T
+    roll, pitch = ((np.argwhere(fuzzy.visited) + 0.5) * cell - np.pi).T
     attitude = np.column_stack([roll, pitch, np.zeros_like(roll)])
-    _, tensors = body_inertia(model.fuzzy, attitude[~vertical(attitude)])
+    _, tensors = body_inertia(fuzzy, attitude[~vertical(attitude)])
     mean = tensors.mean(axis=0) if len(tensors) else np.zeros((3, 3))
     if not np.linalg.eigvalsh(mean).min() > 0:
         raise InputError("its inertia, averaged where training went, is not that of any body; identify it again")
@@ -272,7 +275,7 @@ def _with_inertia(body: Body, inertia: Array) -> Body:
 def missing(
     model: VehicleModel, held: Held, holds: Holds, floor: Array, wind: tuple[float, float, float]
 ) -> list[Missing]:
-    """List what a target does not hold, each with its size beside noise floors, shape (6,), N m and N."""
+    """List what a target does not hold, each with its size, also in noise floors, shape (6,), N m and N."""
     flight, whole = probe_flight(model), replace(Held.whole(model), wind=(0.0, 0.0, 0.0))
     others = [*_left(model, whole, holds), *_others(held, whole)]
     if any(wind):
@@ -347,7 +350,7 @@ def _apart(first: Array, second: Array) -> Off:
 
 
 def sized(title: str, size: Array, floor: Array, off: Off, where: str = Missing.where) -> Missing:
-    """Tell the size of a part, its root mean square, shape (6,), N m and N, beside noise floors."""
+    """Tell the size of a part, its root mean square, shape (6,), N m and N, also in noise floors."""
     floors = size / floor
     largest = float(np.nanmax(floors)) if np.isfinite(floors).any() else float("nan")
     torque, force = (float(np.where(part < _ROUNDING, 0.0, part).max()) for part in (size[:3], size[3:]))

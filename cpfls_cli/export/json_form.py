@@ -89,7 +89,7 @@ HOW_TO_EVALUATE = (
 
 
 def json_text(sheet: Sheet, remarks: Sequence[str] = ()) -> str:
-    """Write a model, and what it is worth, as strict JSON in ASCII; null for what is not finite, or not there."""
+    """Write a model, and what it is good for, as strict JSON in ASCII; null for what is not finite, or not there."""
     found, vehicle = sheet.identified, sheet.model.vehicle
     points, runs, attitudes = sheet.references
     document = {
@@ -101,7 +101,7 @@ def json_text(sheet: Sheet, remarks: Sequence[str] = ()) -> str:
         "verdict": None if sheet.verdict is None else {"label": sheet.verdict},
         "cautions": list(sheet.cautions),
         "findings": [],
-        "worth": [*sheet.worth, *remarks],
+        "worth": [*sheet.usage, *remarks],
         "conventions": _CONVENTIONS if found is None else _CONVENTIONS | _ON_ATTITUDE,
         "how_to_evaluate": HOW_TO_EVALUATE if found is None else (*HOW_TO_EVALUATE_INERTIA, *HOW_TO_EVALUATE),
         "mass_kg": vehicle.mass_kg,

@@ -94,10 +94,10 @@ class View:
         Whether the stamps are those of the log; else time counts from the first sample.
     """
 
-    title: str
     tracks: Sequence[Track] = ()
     curves: Sequence[Curve] = ()
     poses: Sequence[Pose] = ()
+    title: str = ""
     stamps: tuple[str, float] | None = None
     on_log_clock: bool = False
     about: Mapping[str, str] = field(default_factory=dict)

@@ -66,11 +66,6 @@ def parts_along(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> d
     }
 
 
-def wrench_along(model: VehicleModel, air: Array, rate: Array, rotor: Array) -> Array:
-    """Evaluate torque and force along a motion, shape (time, 6), N m and N, body frame; see `parts_along`."""
-    return np.asarray(sum(parts_along(model, air, rate, rotor).values()), dtype=float)
-
-
 def numbers_of(model: VehicleModel) -> dict[str, float]:
     """Give the numbers of all that acts by name: of rotors, of effects, coefficients of the learned part."""
     found = {

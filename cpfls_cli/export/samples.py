@@ -11,7 +11,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.errors import InputError
 from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, LACK_RECIPE, Sheet
 from cpfls_cli.export.source import jax_parameters, jax_parts
 from cpfls_cli.export.text import strict_json, yaml_text
@@ -234,10 +233,3 @@ def _gust_ranges(nominal: VehicleModel, spread: Spread) -> Iterator[tuple[str, R
             low, high = np.percentile(drawn[:, part, axis], _ENDS).tolist()
             value = float(nominal.gusts[part][axis])
             yield f"gust.{GUST_AXES[axis]}_{word}", Range(unit, value, low, high, True)
-
-
-def require_ending(name: str, suffix: str) -> str:
-    """Refuse a file whose ending names no form."""
-    if suffix not in ENDINGS:
-        raise InputError(f"{name}: its suffix names no form; give the name one of the suffixes {', '.join(ENDINGS)}")
-    return suffix

@@ -1,4 +1,4 @@
-"""Everything about a model that goes into an export: the vehicle, where it comes from, what it is worth in words."""
+"""Everything about a model that goes into an export: the vehicle, where it comes from, what it is good for."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.dynamics import InertiaFunctions
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.export.holding import Missing
+from cpfls_cli.export.holding import Missing, identified_of
 from cpfls_cli.export.points import (
     Expected,
     ReferencePoints,
@@ -25,6 +25,7 @@ from cpfls_cli.export.points import (
     reference_points,
     runs_of,
 )
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.inertia import INERTIA_PARAMETERS, six_parameters
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.structure import Block, ModelStructure
@@ -51,7 +52,6 @@ LACK_RECIPE = (
 """How to play what a model lacks."""
 
 _SEED = 1
-_ROWS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 REFITTED = "refitted numbers of the vehicle"
 
 
@@ -59,7 +59,7 @@ REFITTED = "refitted numbers of the vehicle"
 class Sheet:
     """A model, ready to be written in any form, in still air.
 
-    `name`: prefix of all names in source code; `worth`: paragraphs that say what it is worth; `verdict`: in a word;
+    `name`: prefix of all names in source code; `usage`: paragraphs that say what it is good for; `verdict`: in a word;
     `stopped`: why its search did not come to its end; `evidence`: what it was judged by, for JSON; `outside`: effects
     of the artifact that are no sums of weights; `wind` of the flights that it was made with, m/s, world frame, and
     their noise `floor`, N m and N, NaN where unknown; `warnings`: what speaks against using it, on the screen alone;
@@ -69,7 +69,7 @@ class Sheet:
 
     name: str
     model: VehicleModel
-    worth: tuple[str, ...]
+    usage: tuple[str, ...]
     origin: Origin
     file: str
     sha256: str
@@ -86,11 +86,7 @@ class Sheet:
     @property
     def identified(self) -> InertiaFunctions | None:
         """The identified model that its inertia over attitude is that of; None for a constant inertia."""
-        fuzzy = self.model.fuzzy
-        assert fuzzy is None or isinstance(fuzzy, InertiaFunctions), (
-            "an inertia over attitude is that of an identified model"
-        )
-        return fuzzy
+        return identified_of(self.model)
 
     @property
     def rigid_body(self) -> Array:
@@ -144,13 +140,13 @@ class Sheet:
 
     @property
     def facts(self) -> list[str]:
-        """Paragraphs that say what the model is, what it is worth and where it comes from."""
+        """Paragraphs that say what the model is, what it is good for and where it comes from."""
         return [*self.remarks, "", *self._origin()]
 
     @property
     def remarks(self) -> list[str]:
-        """What must not be overlooked, what the model is and what it is worth."""
-        return [*self._marks(), *self.cautions, *self._structure(), *self.worth]
+        """What must not be overlooked, what the model is and what it is good for."""
+        return [*self._marks(), *self.cautions, *self._structure(), *self.usage]
 
     def _marks(self) -> Iterator[str]:
         if self.impossible:
@@ -176,12 +172,12 @@ class Sheet:
             titles = [REFITTED if each.kind == "parameter" else each.title for each in known]
             yield f"Effects: {', '.join(dict.fromkeys(titles))}."
         if model.remainder is not None:
-            rows = ", ".join(_ROWS[row] for row in model.remainder.rows)
+            rows = ", ".join(CHANNELS[row] for row in model.remainder.rows)
             yield f"Learned, without a name: {rows} over the direction of the airflow."
         if model.gusts is not None:
             size, memory, white = (", ".join(f"{value:.4g}" for value in values) for values in model.gusts)
             yield (
-                f"Gusts of its flights, not played here, {', '.join(_ROWS)}: standard deviations {size} (N m, N); "
+                f"Gusts of its flights, not played here, {', '.join(CHANNELS)}: standard deviations {size} (N m, N); "
                 f"memories {memory} s; white {white} (N m s^0.5, N s^0.5). {GUST_RECIPE}"
             )
         if self.identified is not None:

@@ -16,7 +16,7 @@ from cpfls_cli.errors import InputError
 
 _COMMENT_COLUMNS, _NUMBER_COLUMNS = 112, 116
 _LONGEST_NAME = 48
-"""Letters of a prefix: strict compilers of C99 tell names by their first 63."""
+"""Letters of a prefix: strict compilers of C99 distinguish names by their first 63."""
 
 
 def comment_lines(paragraphs: Sequence[str]) -> list[str]:

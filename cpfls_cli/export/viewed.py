@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,7 @@ def view_of(path: Path, given: Any, config: str) -> View:
     study = stored_study(config, path)
     for kind, made in _KINDS.items():
         if isinstance(given, kind):
-            return made(path.name, given, study)
+            return replace(made(given, study), title=path.name, stamps=_stamps(study))
     *others, last = (kind.FORMAT for kind in _KINDS)
     raise InputError(
         f"{path}: is a {given.FORMAT}, which holds nothing over time; .mcap and .csv take {', '.join(others)} "
@@ -82,16 +83,16 @@ def _axes(about: About, values: Array) -> tuple[str, ...]:
 def _signals(
     flight: str, time: Array, signals: Mapping[str, Array], abouts: Mapping[str, About], units: Mapping[str, str]
 ) -> Iterator[Track]:
-    """Put each setpoint beside what it is a setpoint of, where both have one unit."""
+    """Join each setpoint with what it is a setpoint of, where both have one unit."""
     for name, values in signals.items():
         own = name.removeprefix(_ASKED)
         unit = units.get(name, abouts[name].unit)
         if own != name and own in signals and units.get(own, abouts[own].unit) == unit:
             continue
         asked = signals.get(_ASKED + own)
-        beside = own == name and asked is not None and units.get(_ASKED + own, abouts[_ASKED + own].unit) == unit
+        joined = own == name and asked is not None and units.get(_ASKED + own, abouts[_ASKED + own].unit) == unit
         held = {SETPOINT if own != name else MEASURED: values}
-        if beside and asked is not None:
+        if joined and asked is not None:
             held[SETPOINT] = asked.reshape(values.shape)
         about = abouts[name]
         yield Track(
@@ -106,33 +107,27 @@ def _signals(
         )
 
 
-def _units_of(study: Study, *, imported: bool) -> dict[str, str]:
-    """Give the units that only the import knows."""
-    if not imported:
-        return {"rotor_command": "rad/s"}
-    return {name: own.unit for name, own in study.import_.signals.items() if name in _OF_CONFIG}
-
-
 def _pose(child: str, time: Array, attitude: Array | None, position: Array | None) -> list[Pose]:
     if attitude is None:
         return []
     return [Pose(child, time, np.full_like(attitude, np.nan) if position is None else position, attitude)]
 
 
-def _of_flight(title: str, given: Flight, study: Study) -> View:
+def _of_flight(given: Flight, study: Study) -> View:
     time = _log_time(given.time, given.begins)
     signals = {name: values for name, values in given.signals.items() if name != "time"}
-    units = _units_of(study, imported=isinstance(given, Imported))
+    # Units that only the import knows.
+    units = {"rotor_command": "rad/s"}
+    if isinstance(given, Imported):
+        units = {str(name): str(own.unit) for name, own in study.import_.signals.items() if name in _OF_CONFIG}
     return View(
-        title,
         tuple(_signals("", time, signals, Flight.about_signals(), units)),
         poses=_pose(BODY_FRAME, time, given.attitude, given.position),
-        stamps=_stamps(study),
         on_log_clock=bool(np.isfinite(given.begins)),
     )
 
 
-def _of_replay(title: str, given: Playback, study: Study) -> View:
+def _of_replay(given: Playback, _study: Study) -> View:
     begins = {flight.name: flight.begins_s for flight in given.flights}
     several, period = len(given.flights) > 1, float(given.horizon_s[0])
 
@@ -188,7 +183,7 @@ def _of_replay(title: str, given: Playback, study: Study) -> View:
         for signal in given.signals
     ]
     on_log_clock = bool(np.isfinite(list(begins.values())).any())
-    return View(title, tracks, curves, stamps=_stamps(study), on_log_clock=on_log_clock)
+    return View(tracks, curves, on_log_clock=on_log_clock)
 
 
 def _short(name: str) -> str:
@@ -216,7 +211,7 @@ def _windows(flight: str, time: Array, values: Mapping[str, Array], about: str) 
             )
 
 
-def _of_disagreement(title: str, given: Disagreement, study: Study) -> View:
+def _of_disagreement(given: Disagreement, _study: Study) -> View:
     tracks: list[Track] = []
     floor, residual = given.sizes.floor, given.residual
     for index, (name, flight) in enumerate(_flown(given.recorded)):
@@ -225,14 +220,14 @@ def _of_disagreement(title: str, given: Disagreement, study: Study) -> View:
         values = {DIFFERENCE: residual.value[at], "floor": np.broadcast_to(floor, (len(at), len(CHANNELS)))}
         about = "what inertia and rotors leave of the motion, mean over a window; measured less model"
         tracks += _windows(name, _log_time(residual.time[at], flight.begins), values, about)
-    return View(title, tracks, stamps=_stamps(study), on_log_clock=_on_log_clock(given.recorded))
+    return View(tracks, on_log_clock=_on_log_clock(given.recorded))
 
 
 def _on_log_clock(flights: Mapping[str, RecordedFlight]) -> bool:
     return any(np.isfinite(own.begins) for own in flights.values())
 
 
-def _of_diagnosis(title: str, given: Diagnosis, study: Study) -> View:
+def _of_diagnosis(given: Diagnosis, _study: Study) -> View:
     tracks: list[Track] = []
     places: dict[str, tuple[str, float]] = {}
     held, residual = 0, given.residual
@@ -262,11 +257,10 @@ def _of_diagnosis(title: str, given: Diagnosis, study: Study) -> View:
                 axes=AXES,
             )
         )
-    return View(title, tracks, stamps=_stamps(study), on_log_clock=_on_log_clock(given.recorded))
+    return View(tracks, on_log_clock=_on_log_clock(given.recorded))
 
 
-def _of_response(title: str, given: Responses, study: Study) -> View:
-    del study
+def _of_response(given: Responses, _study: Study) -> View:
     curves = [
         Curve(
             name=name.replace(" ", "_"),
@@ -277,10 +271,10 @@ def _of_response(title: str, given: Responses, study: Study) -> View:
         )
         for name, own in given.responses.items()
     ]
-    return View(title, (), curves)
+    return View((), curves)
 
 
-def _of_twin(title: str, given: Twin, study: Study) -> View:
+def _of_twin(given: Twin, _study: Study) -> View:
     time, names = _log_time(given.time, given.begins), _vehicle_names(list(given.vehicles))
     vehicles = dict(zip(names, given.vehicles.values(), strict=True))
     tracks = []
@@ -306,7 +300,7 @@ def _of_twin(title: str, given: Twin, study: Study) -> View:
     ]
     measured_pose = _pose(BODY_FRAME, time, given.measured[:, 3:6], given.measured_position)
     on_clock = bool(np.isfinite(given.begins))
-    return View(title, tracks, poses=[*measured_pose, *poses], stamps=_stamps(study), on_log_clock=on_clock)
+    return View(tracks, poses=[*measured_pose, *poses], on_log_clock=on_clock)
 
 
 def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
@@ -319,7 +313,7 @@ def _vehicle_names(vehicles: Sequence[str]) -> list[str]:
     return names
 
 
-_KINDS: dict[Any, Callable[[str, Any, Study], View]] = {
+_KINDS: dict[Any, Callable[[Any, Study], View]] = {
     Flight: _of_flight,
     Playback: _of_replay,
     Disagreement: _of_disagreement,

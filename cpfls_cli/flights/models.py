@@ -50,11 +50,6 @@ def is_found(path: Path) -> bool:
     return path.is_file() and format_name(path) == Vehicle.FORMAT
 
 
-def is_identified(path: Path) -> bool:
-    """Tell whether a file is an identified model."""
-    return path.is_file() and format_name(path) == IdentifiedModel.FORMAT
-
-
 def any_model(path: Path) -> AnyModel:
     """Read which model a file is: identified, extended, or a vehicle that was found."""
     held = format_name(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -134,14 +133,6 @@ class RandomPaths:
     best: float = about("the lowest")
     median: float = about("the median")
     count: int = about("how many were drawn")
-
-
-@dataclass(frozen=True)
-class FirstLeg:
-    """Motion along the line of the first move, by name of the derivative, signed along the move."""
-
-    time: Array
-    curves: dict[str, Array]
 
 
 @result
@@ -297,8 +288,8 @@ class PlannedPath:
         tables = (self.after("likely"), self.after("likely_flown"))
         return all(max(sets.values()) <= RARE * own for table in tables for own, sets in table.values())
 
-    def first_leg(self) -> FirstLeg:
-        """Take the first move, from rest to rest; the whole path where there are no moves."""
+    def first_leg(self) -> tuple[Array, dict[str, Array]]:
+        """Give time and motion along the first move, by derivative, signed; the whole path where there are no moves."""
         away = {name: self._derivative(name) for name in DERIVATIVES}
         if self.legs:
             first, last = np.searchsorted(self.time, [self.legs[0].begin_s, self.legs[0].end_s])
@@ -308,7 +299,7 @@ class PlannedPath:
         else:
             farthest = away["displacement"][np.argmax(np.linalg.norm(away["displacement"], axis=1))]
             move, direction = slice(None), farthest / (np.linalg.norm(farthest) or 1.0)
-        return FirstLeg(self.time[move], {name: values[move] @ direction for name, values in away.items()})
+        return self.time[move], {name: values[move] @ direction for name, values in away.items()}
 
     def _derivative(self, name: str) -> Array:
         values: Array | None = self.position if name == "displacement" else getattr(self, name)

@@ -34,6 +34,7 @@ from cpfls_cli.flights.recordings import (
     signals_of,
 )
 from cpfls_cli.logs.formats import is_log
+from cpfls_cli.playback.errors import MOTION
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import made_ready, player_of
@@ -42,9 +43,8 @@ from cpfls_cli.playback.rotors import Hold
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 
-_STATE = ("body_rate", "attitude", "velocity", "position")
 _ACTUATION = ("rotor_speed", "rotor_command", "body_torque")
-_BESIDE = ("acceleration", "specific_force", "voltage", "thrust", "rotor_command")
+_OPTIONAL = ("acceleration", "specific_force", "voltage", "thrust", "rotor_command")
 _MOST_PARTS = 50
 
 
@@ -114,7 +114,7 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
         )
     if actuation != "body_torque":
         require_rotors(study)
-    driven = {name: flight.signals[name] for name in ("time", *_STATE, actuation) if name in flight.signals}
+    driven = {name: flight.signals[name] for name in ("time", *MOTION, actuation) if name in flight.signals}
     stretches = known_stretches(flight.name, all_known(driven), driven["time"])
     made = [signals_of(flight, _known(flight, actuation, part), study) for part in stretches]
     parts = tuple(signals for signals, _ in made)
@@ -149,10 +149,10 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
 
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:
     """Cut out a stretch, with what is known in all of it and what was asked for."""
-    names = [name for name in ("time", *_STATE, actuation) if name in flight.signals]
-    beside = [name for name in _BESIDE if name in flight.signals and np.isfinite(flight.signals[name][part]).all()]
+    names = [name for name in ("time", *MOTION, actuation) if name in flight.signals]
+    optional = [name for name in _OPTIONAL if name in flight.signals and np.isfinite(flight.signals[name][part]).all()]
     asked = [name for name in SETPOINTS if name in flight.signals]
-    return {name: flight.signals[name][part] for name in (*names, *beside, *asked)}
+    return {name: flight.signals[name][part] for name in (*names, *optional, *asked)}
 
 
 def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) -> list[str]:
@@ -171,7 +171,7 @@ def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) 
 
 
 def played(model: VehicleModel, flight: LoggedFlight, stated: VehicleSettings) -> Played:
-    """Make a flight and a model ready for playback, beside the vehicle that the config states."""
+    """Make a flight and a model ready for playback, with the vehicle that the config states to compare with."""
     along, player = made_ready(model, flight)
     if model.is_rigid_body and model.vehicle == stated and model.fuzzy is None:
         return Played(along, player, player)

@@ -304,14 +304,6 @@ def uniform_regressor(training: TorqueSource, study: Study) -> Callable[[], Iter
     return blocks
 
 
-def input_roles(
-    flights: Sequence[Path], selection: Path | None, validate: Sequence[Path], choose_on: Sequence[Path] = ()
-) -> dict[str, Path]:
-    """Give the inputs of an identification their roles."""
-    roles = flight_roles(flights) | ({"selection": selection} if selection else {})
-    return roles | numbered_roles("choose-on", choose_on) | numbered_roles("validate", validate)
-
-
 def numbered_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
     """Give flights of one role numbers: ``choose-on-1``, ``choose-on-2`` and so on."""
     return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}

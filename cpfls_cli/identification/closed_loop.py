@@ -146,8 +146,8 @@ def _by_instruments(
     if not _known_to_two(half)[2]:
         # What is hardly known would shake what is: about yaw the body stays as least squares has it.
         runs = [run._replace(others=run.others * [[1.0], [1.0], [0.0]]) for run in runs]
-        rigid_body, beside = _solved(_crossed(runs, repeated=repeated), least_squares)
-        half = np.array([*beside[:2], half[2]])
+        rigid_body, conditional = _solved(_crossed(runs, repeated=repeated), least_squares)
+        half = np.array([*conditional[:2], half[2]])
     if why_unphysical(rigid_body) is not None:
         return None
     starts = np.cumsum([0, *(len(part) for part in parts)])
@@ -217,7 +217,7 @@ def _driven(vehicle: VehicleSettings, parts: Sequence[TorqueData], period: float
 
 
 def _laid(parts: Sequence[TorqueData], scale: Array) -> list[Array]:
-    """Lay columns of the rigid body beside the torque, scaled by axis, of each flight, shape (samples, 3, 7)."""
+    """Join columns of the rigid body and the torque, scaled by axis, of each flight, shape (samples, 3, 7)."""
     return [
         np.concatenate([rigid_columns(part.motion), part.torque[:, :, None]], axis=2) * scale[:, None] for part in parts
     ]
@@ -286,15 +286,15 @@ def _flown(part: TorqueData, period: float) -> PlaybackFlight:
 
 
 def _runs(given: Instruments, rows: Sequence[Array], period: float) -> list[_Run]:
-    """Lay the rows of runs beside what instruments know of them, where all are known."""
+    """Join the rows of runs and what instruments know of them, where all are known."""
     fast = [_fast(each, period) for each in rows]
-    beside = _known(given, fast, period, fast=True)
-    if not beside:
+    known_rest = _known(given, fast, period, fast=True)
+    if not known_rest:
         return []
-    paths = {number: given.repeats.path(number, len(rows[number])) for number in beside}
+    paths = {number: given.repeats.path(number, len(rows[number])) for number in known_rest}
     length = block_length(sum(len(rows[first]) for first in {first for first, _ in paths.values()}) * period) / period
     found = []
-    for number, others in beside.items():
+    for number, others in known_rest.items():
         first, place = paths[number]
         known = np.isfinite(others + fast[number]).all(axis=(1, 2)) & np.isfinite(place)
         along = (place[known] // length).astype(np.int64)

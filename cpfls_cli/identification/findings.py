@@ -152,6 +152,7 @@ def swings(source: TorqueSource) -> Swings:
 
 
 AXES = ("roll", "pitch", "yaw")
+"""Euler axes, in the order in which scores have them."""
 _BADLY_EXPLAINED_R2 = 0.5
 """Below it most of a torque is something else."""
 

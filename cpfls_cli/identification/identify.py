@@ -15,11 +15,11 @@ from cpfls_cli.evolution.engine import History
 from cpfls_cli.identification.closed_loop import freed_torque, loop_along, source_of
 from cpfls_cli.identification.data import TRAINING, TorqueSource, axis_scale
 from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
-from cpfls_cli.identification.findings import FitDiagnostics, axis_evidence, findings, rule_excitation
+from cpfls_cli.identification.findings import AXES, FitDiagnostics, axis_evidence, findings, rule_excitation
 from cpfls_cli.identification.judge import Baseline, fit_baselines, score_of
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.samples import Ready, Samples
-from cpfls_cli.identification.search import UNWATCHED, Front, SearchRun, StopReason, is_end, search
+from cpfls_cli.identification.search import UNWATCHED, Front, NothingFoundError, SearchRun, StopReason, is_end, search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import Fit, RidgeCurve, Solver, with_folds
 from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
@@ -69,7 +69,7 @@ def identify(
     stated_inertia: Array | None = None,
     kept: TorqueSource | None = None,
 ) -> Identification:
-    """Identify a model and judge it beside its baselines.
+    """Identify a model and compare it with its baselines.
 
     Where instruments or past windows identify the vehicle and not its loop, parameters and the errors that the search
     minimises are those of the torque that they know (`freed_torque`); scores are those of the torque as measured.
@@ -106,7 +106,7 @@ def identify(
     result = search(evaluator, settings, rng, run, kept)
     solved = _solve(evaluator, training, result.front.chromosomes[result.front.chosen])
     if solved is None:
-        raise ComputationError("no chromosome gave a finite model; perhaps nothing moves in the data")
+        raise NothingFoundError(result.stop_reason)
     model, fit, system = solved
     baselines = fit_baselines(source_of(freed, training, learned)[1], fit.row_scale, settings.rank_tolerance)
     predictors = {"model": model.torque} | {baseline.name: baseline.torque for baseline in baselines}
@@ -195,9 +195,6 @@ def _solve(
 def _count(source: TorqueSource, flag: Callable[[Array], BoolArray]) -> int:
     return sum(int(np.sum(flag(data.motion.attitude))) for data in source.chunks())
 
-
-AXES = ("roll", "pitch", "yaw")
-"""Euler axes, in the order in which scores have them."""
 
 MODEL, RIGID_BODY, ZERO = "model", "rigid-body", "torque-zero"
 """Names of the model and of two of its baselines among the judged models."""

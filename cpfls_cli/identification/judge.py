@@ -146,17 +146,12 @@ def constant_inertia_columns(motion: Motion) -> Array:
     return symmetric_columns(motion.acceleration)
 
 
-def no_torque_columns(motion: Motion) -> Array:
-    """Build the columns of the prediction that no torque acts: none; shape (samples, 3, 0)."""
-    return np.zeros((len(motion), 3, 0))
-
-
 def fit_baselines(source: TorqueSource, row_scale: Array, rank_tolerance: float) -> tuple[Baseline, ...]:
     """Fit rigid body, constant inertia and torque zero to the samples learned from, with weights by axis."""
     kinds: tuple[tuple[str, Columns], ...] = (
         ("rigid-body", rigid_columns),
         ("constant-inertia", constant_inertia_columns),
-        ("torque-zero", no_torque_columns),
+        ("torque-zero", lambda motion: np.zeros((len(motion), 3, 0))),
     )
     return tuple(Baseline(name, columns, _fit(columns, source, row_scale, rank_tolerance)) for name, columns in kinds)
 

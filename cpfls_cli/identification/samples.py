@@ -71,7 +71,7 @@ class Ready:
     Attributes
     ----------
     rigid : bool
-        Whether a rigid body stands beside the fuzzy columns.
+        Whether columns of a rigid body come before the fuzzy ones.
     """
 
     source: TorqueSource

@@ -70,10 +70,6 @@ def _unwatched(_: object) -> None:
     pass
 
 
-def _unstopped() -> None:
-    return None
-
-
 @dataclass(frozen=True)
 class SearchRun:
     """Conditions under which a search is run; they do not change the result of a search that comes to its end.
@@ -92,7 +88,7 @@ class SearchRun:
     progress: Callable[[SearchStep], None] = _unwatched
     on_generation: Callable[[EvolutionState], None] = _unwatched
     on_stop: Callable[[Unfinished], None] = _unwatched
-    should_stop: Callable[[], Stop | None] = _unstopped
+    should_stop: Callable[[], Stop | None] = lambda: None
 
 
 UNWATCHED = SearchRun()

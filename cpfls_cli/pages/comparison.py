@@ -15,7 +15,8 @@ from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.vehicle_model import FOUND_AS, Parameter, Vehicle
 from cpfls_cli.config.load import flat_keys
 from cpfls_cli.identification.data import TRAINING
-from cpfls_cli.identification.identify import AXES, MODEL, RIGID_BODY
+from cpfls_cli.identification.findings import AXES
+from cpfls_cli.identification.identify import MODEL, RIGID_BODY
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.report.content import ROUNDING, UNKNOWN, count, number, percent, r_squared
 from cpfls_cli.report.source import Source, Sources

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import Estimate, GapChange, NamedEffect
 
 
-AXES = ("x (roll)", "y (pitch)", "z (yaw)")
-
 _CHANNEL_WORDS = {
     "torque x": "torque about x (roll)",
     "torque y": "torque about y (pitch)",

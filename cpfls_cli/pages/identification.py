@@ -11,7 +11,8 @@ from markupsafe import Markup
 from cpfls_cli import page
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.identification.data import TRAINING
-from cpfls_cli.identification.identify import AXES, MODEL, RIGID_BODY, Judged
+from cpfls_cli.identification.findings import AXES
+from cpfls_cli.identification.identify import MODEL, RIGID_BODY, Judged
 from cpfls_cli.inertia import six_parameters
 from cpfls_cli.pages.comparison import COMPARISON_WORDS
 from cpfls_cli.pages.identified_figures import (
@@ -21,6 +22,7 @@ from cpfls_cli.pages.identified_figures import (
     entry_of,
     first_objective,
     has_partitions,
+    residuals_of,
     weight_words,
 )
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
@@ -120,8 +122,7 @@ def _winners(judged: Judged, part: str) -> dict[str, list[str]]:
 
 def _whiteness(r: IdentifiedModel) -> Iterator[tuple[str, list[str]]]:
     """Say of the residuals about each axis whether they are white noise about 0; nothing of those that are rounding."""
-    residuals = r.residuals
-    assert residuals is not None, "asked only of models that hold them"
+    residuals = residuals_of(r)
     for axis, name in enumerate(AXES):
         known = residuals.autocorrelation[np.isfinite(residuals.autocorrelation[:, axis]), axis]
         if not known.size:
@@ -145,8 +146,7 @@ def _whiteness(r: IdentifiedModel) -> Iterator[tuple[str, list[str]]]:
 
 def _followed(r: IdentifiedModel) -> Iterator[tuple[str, list[str | None]]]:
     """Write the largest correlation of the residuals about each axis with each signal, and its lag."""
-    residuals = r.residuals
-    assert residuals is not None, "asked only of models that hold them"
+    residuals = residuals_of(r)
     for name, by_axis in zip(residuals.input, residuals.correlation.transpose(0, 2, 1), strict=True):
         yield name, [_strongest(values, residuals.input_lag, residuals.band) for values in by_axis]
 

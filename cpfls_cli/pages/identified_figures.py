@@ -12,7 +12,8 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.fuzzy.basis import join_ends, memberships
-from cpfls_cli.identification.identify import AXES, MODEL, RIGID_BODY
+from cpfls_cli.identification.findings import AXES
+from cpfls_cli.identification.identify import MODEL, RIGID_BODY
 from cpfls_cli.identification.solver import RidgeCurve
 from cpfls_cli.pages.comparison import FLOOR_TICK, compared_curves, compared_parts
 from cpfls_cli.report.canvas import (
@@ -111,8 +112,9 @@ def _draw_ridge(r: IdentifiedModel, figure: Figure) -> None:
     legend_above(axes)
 
 
-def _residuals(r: IdentifiedModel) -> ResidualAnalysis:
-    assert r.residuals is not None, "drawn only where there are some"
+def residuals_of(r: IdentifiedModel) -> ResidualAnalysis:
+    """Give what templates and figures ask for only of models that hold it."""
+    assert r.residuals is not None, "asked only of models that hold them"
     return r.residuals
 
 
@@ -132,7 +134,7 @@ def _by_axis(figure: Figure, rows: int = 1, share_y: Literal["row"] | bool = Fal
 
 def _draw_autocorrelation(r: IdentifiedModel, figure: Figure) -> None:
     """Draw the correlation of the torque error with itself some time later, by axis, with the band of white noise."""
-    residuals = _residuals(r)
+    residuals = residuals_of(r)
     values, noise = residuals.autocorrelation, residuals.band
     low = min(-0.2, float(np.nanmin(values, initial=0.0)) - 0.05)
     (panels,) = _by_axis(figure, share_y=True)
@@ -148,7 +150,7 @@ def _draw_autocorrelation(r: IdentifiedModel, figure: Figure) -> None:
 
 def _draw_cross_correlation(r: IdentifiedModel, figure: Figure) -> None:
     """Draw the correlation of error and inputs over the lag; the strongest three of each axis are named."""
-    residuals = _residuals(r)
+    residuals = residuals_of(r)
     panels = stacked(figure, len(AXES))
     for index, (axes, axis) in enumerate(zip(panels, AXES, strict=True)):
         axes.axhspan(-residuals.band, residuals.band, **_NOISE)
@@ -174,7 +176,7 @@ def _draw_correlations(axes: Axes, lag: Array, values: Array, inputs: tuple[str,
 
 def _draw_distribution(r: IdentifiedModel, figure: Figure) -> None:
     """Draw histogram and quantiles of the torque error by axis, each with the normal distribution."""
-    residuals = _residuals(r)
+    residuals = residuals_of(r)
     normal = residuals.normal_quantile
     upper, lower = _by_axis(figure, rows=2)
     for index, quantiles in enumerate(residuals.quantile.T):

@@ -72,8 +72,3 @@ def impossible_in_words(record: AnyModel) -> str:
         known |= {name: (own.value, own.unit) for name, own in record.found.items()}
     shown = ((name_of(name), *known[name]) for name in record.impossible)
     return joined(f"{name} {number(value, 3)} {unit}".removesuffix(" 1") for name, value, unit in shown)
-
-
-def worth_in_words(record: AnyModel) -> list[str]:
-    """Say what a model that is used elsewhere is worth."""
-    return said_by(record.MADE_BY, record, "usage")

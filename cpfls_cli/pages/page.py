@@ -256,7 +256,7 @@ def _words(blocks: Iterable[Block]) -> Iterator[str]:
             case Facts():
                 yield "\n".join(f"- **{page.said(term)}**: {page.said(value)}" for term, value in block.rows)
             case Table():
-                yield f"{page.said(block.explained)} {{#{block.name}}}"
+                yield f"{page.said(block.caption)} {{#{block.name}}}"
                 rows = [[_toned(cell.text, cell.tone) for cell in row] for row in block.cells]
                 yield page.table([page.said(name) for name in block.header], rows, block.words)
             case Plot():
@@ -311,7 +311,7 @@ def _table(table: Table) -> dict[str, Any]:
     ]
     return {
         "name": table.name,
-        "caption": table.explained,
+        "caption": table.caption,
         "header": list(table.header),
         "rows": [[_bare(cell.text) for cell in line] for line in cells],
         "marked": marked,

@@ -72,8 +72,6 @@ class Table:
         Columns that are aligned left; all others hold numbers.
     sentences : frozenset of int
         Columns of long text, which is broken into lines.
-    legend : str
-        What its columns mean: behind the caption on a page, on a terminal on request.
     """
 
     name: str
@@ -82,12 +80,6 @@ class Table:
     rows: Sequence[Sequence[str | Cell]]
     words: frozenset[int] = frozenset({0})
     sentences: frozenset[int] = frozenset()
-    legend: str = ""
-
-    @property
-    def explained(self) -> str:
-        """The caption with the legend."""
-        return f"{self.caption} {self.legend}".strip()
 
     @property
     def cells(self) -> list[list[Cell]]:

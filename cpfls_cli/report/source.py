@@ -97,6 +97,19 @@ class _OfFormat:
         return [source for source in sources.all if source.format == self.format]
 
 
+_OF_GAP = ("diagnosis", "extended", "disagreement")
+_TITLES = {
+    "gains": "Gains for an autopilot",
+    "vehicle": "A vehicle found in flights",
+    **dict.fromkeys(("changed", "trend"), "What changed about a vehicle"),
+    **dict.fromkeys(_OF_GAP, "Where simulation and flight disagree"),
+    "twin": "Does the simulator fly like the vehicle",
+    "replay": "What a model predicts of flights",
+    "response": "How a vehicle answers its rotors",
+}
+"""Headings of pages on nothing but such formats; the first of those that are there gives it."""
+
+
 @dataclass(frozen=True)
 class Sources:
     """Everything that a report is about, with vehicle and settings of the study that it is made with."""
@@ -106,39 +119,29 @@ class Sources:
     settings: ReportSettings
 
     trajectories, flights, selections = _OfFormat("trajectory"), _OfFormat("flight"), _OfFormat("selection")
-    models = _OfFormat("identified")
-    replays, responses, twins = _OfFormat("replay"), _OfFormat("response"), _OfFormat("twin")
-    gains, vehicles, extensions = _OfFormat("gains"), _OfFormat("vehicle"), _OfFormat("extended")
-    disagreements, diagnoses = _OfFormat("disagreement"), _OfFormat("diagnosis")
-    trends, changes = _OfFormat("trend"), _OfFormat("changed")
+    models, vehicles = _OfFormat("identified"), _OfFormat("vehicle")
+    extensions, diagnoses = _OfFormat("extended"), _OfFormat("diagnosis")
 
     @property
-    def gap(self) -> list[Source]:
-        """Everything that the gap workflow wrote, answers before their evidence."""
-        return [*self.diagnoses, *self.extensions, *self.disagreements]
+    def _formats(self) -> set[str]:
+        return {source.format.removeprefix("cpfls/") for source in self.all}
+
+    @property
+    def gap(self) -> bool:
+        """Whether anything is of the gap workflow."""
+        return not self._formats.isdisjoint(_OF_GAP)
 
     @property
     def only_gap(self) -> bool:
         """Whether nothing else was given than how models and flights disagree, and what was found then."""
-        alone = (self.gap, self.replays, self.responses, self.twins, self.gains)
-        return sum(map(len, (*alone, self.vehicles, self.changes, self.trends))) == len(self.all)
+        return self._formats <= _TITLES.keys()
 
     @property
     def title(self) -> str:
         """Heading of the page: that of the config, or what suits artifacts of the gap workflow alone."""
         if self.settings.title != ReportSettings().title or not self.only_gap:
             return self.settings.title
-        if self.gains:
-            return "Gains for an autopilot"
-        if self.vehicles:
-            return "A vehicle found in flights"
-        if self.changes or self.trends:
-            return "What changed about a vehicle"
-        if self.gap:
-            return "Where simulation and flight disagree"
-        if self.twins:
-            return "Does the simulator fly like the vehicle"
-        return "What a model predicts of flights" if self.replays else "How a vehicle answers its rotors"
+        return next((words for name, words in _TITLES.items() if name in self._formats), _TITLES["response"])
 
     @property
     def answered(self) -> frozenset[str]:

@@ -65,7 +65,7 @@ def terminal_lines(
                     drawn.add_row(_rich(visible(term)), _rich(visible(value)))
                 yield from _printed(drawn, width, colour)
             case Table():
-                yield from _table(block, width, colour, whole=whole)
+                yield from _table(block, width, colour)
             case Listing():
                 yield from visible(block.text.rstrip()).split("\n")
             case Folded() if whole and _says_something(block):
@@ -92,9 +92,9 @@ def warnings_of(blocks: Iterable[Block]) -> tuple[Text, ...]:
     return tuple(block for block in unfolded(blocks) if isinstance(block, Text) and block.tone == "warning")
 
 
-def _table(table: Table, width: int | None, colour: bool, *, whole: bool) -> Iterator[str]:
+def _table(table: Table, width: int | None, colour: bool) -> Iterator[str]:
     if table.caption:
-        yield from broken(visible(table.explained if whole else table.caption), width)
+        yield from broken(visible(table.caption), width)
     lines = _printed(_drawn(table, colour, unbroken=width is None), width, colour)
     if width is None and _widest(lines) > _WIDEST and table.sentences:
         excess = _widest(lines) - _WIDEST

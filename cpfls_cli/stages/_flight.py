@@ -62,7 +62,7 @@ def _written(values: Array) -> str:
     return " ".join(f"{value:.2f}" for value in values)
 
 
-def draw_attitude(r: Any, figure: Figure) -> None:
+def _draw_attitude(r: Any, figure: Figure) -> None:
     """Draw roll and pitch of a path or a flight: Figure 3 of the paper."""
     axes = figure.subplots()
     for index, axis in enumerate(AXES[:2]):
@@ -71,7 +71,7 @@ def draw_attitude(r: Any, figure: Figure) -> None:
     legend_above(axes)
 
 
-def draw_rotation(r: Any, figure: Figure) -> None:
+def _draw_rotation(r: Any, figure: Figure) -> None:
     """Draw attitude and Euler rates of full rotations, angles on the circle."""
     angles, rates = stacked(figure, 2)
     for index, axis in enumerate(AXES):
@@ -100,10 +100,10 @@ def _draw_torque(r: Flight, figure: Figure) -> None:
 # On the circle where angles go round it: they would run off any other figure.
 FIGURES = {
     "attitude": Drawn(
-        "Roll and pitch angle over time", 2.7, draw_attitude, lambda r: r.attitude is not None and not r.turns
+        "Roll and pitch angle over time", 2.7, _draw_attitude, lambda r: r.attitude is not None and not r.turns
     ),
     "rotation": Drawn(
-        "Roll, pitch and yaw on the circle, and their rates, over time", 4.6, draw_rotation, lambda r: r.turns
+        "Roll, pitch and yaw on the circle, and their rates, over time", 4.6, _draw_rotation, lambda r: r.turns
     ),
     "torque": Drawn(
         "Generalised torque on roll, pitch and yaw over time", 4.6, _draw_torque, lambda r: r.torque is not None

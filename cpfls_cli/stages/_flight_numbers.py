@@ -77,12 +77,6 @@ def stated_of(flight: Path) -> dict[str, str]:
     return stated_vehicle(contents.system, contents.parameters)
 
 
-def with_absent_signals(study: Study) -> Study:
-    """Let a log lack any signal but those that the import cannot do without."""
-    signals = {name: replace(signal, required=False) for name, signal in study.import_.signals.items()}
-    return study.model_copy(update={"import_": replace(study.import_, signals=signals)})
-
-
 def _path(flight: Path, file: InputFile, folder: Path) -> Path:
     return folder / f"{flight.name}-{file.sha256[:_HASH]}.h5"
 
@@ -160,6 +154,14 @@ def of_other_autopilots(flights: Sequence[FlightNumbers], *, thrusts: bool) -> t
         if thrusts and flights[0].commanded and ranges_apart(own, facts):
             ranges.append(name)
     return unlike, ranges
+
+
+def without_voltage(which: str) -> str:
+    """Say of which flights by commands the voltage of the battery is not known, and why it is asked for."""
+    return (
+        f"without the battery's voltage: {which}; an emptier battery looks like a heavier vehicle, so name "
+        "import.signals.voltage"
+    )
 
 
 def stated_by(flights: Sequence[FlightNumbers]) -> list[tuple[str, Mapping[str, str]]]:

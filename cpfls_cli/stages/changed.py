@@ -38,7 +38,7 @@ from cpfls_cli.stages._flight_numbers import (
     of_other_vehicles,
     stated_by,
     stated_of,
-    with_absent_signals,
+    without_voltage,
 )
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
@@ -178,7 +178,8 @@ def _flights(
             if anyway:
                 # Of another vehicle's log what it holds is compared.
                 with suppress(InputError):
-                    study = with_absent_signals(run.study)
+                    signals = {name: replace(own, required=False) for name, own in run.study.import_.signals.items()}
+                    study = run.study.model_copy(update={"import_": replace(run.study.import_, signals=signals)})
                     own = kept_numbers(path, inputs[role], study, folder, run.cautions)
                     flights[role] = replace(own, name=label)
                     del refused[role]
@@ -243,10 +244,7 @@ def _warnings(today: Sequence[FlightNumbers], before: Sequence[FlightNumbers], n
         )
     elif flights[0].commanded and not all(np.isfinite(own.voltage) for own in flights):
         without = [own.name for own in flights if not np.isfinite(own.voltage)]
-        yield (
-            f"without the battery's voltage: {'all flights' if len(without) == len(flights) else joined(without)}; an "
-            "emptier battery looks like a heavier vehicle, so name import.signals.voltage"
-        )
+        yield without_voltage("all flights" if len(without) == len(flights) else joined(without))
     usual = float(np.median([own.period_s for own in before]))
     other = [own for own in flights if abs(own.period_s / usual - 1) > _RATE]
     if other:

@@ -13,6 +13,8 @@ import numpy as np
 from cpfls_cli.arguments import FlightsArgument, ModelOption
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.artifacts.diagnosis import Disagreement
+from cpfls_cli.artifacts.gate import format_name
+from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.job import Job, Progress, go_on
 from cpfls_cli.artifacts.model import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.config.check import why_no_body
@@ -20,7 +22,7 @@ from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import GIVEN, Signals, recorded
 from cpfls_cli.errors import ConfigError
-from cpfls_cli.flights.models import is_found, is_identified, learned_by, read_model
+from cpfls_cli.flights.models import is_found, learned_by, read_model
 from cpfls_cli.flights.recordings import FlightSet, read_flights
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
@@ -227,7 +229,7 @@ def to_gap(job: Job, flights: Sequence[Path], model: Path | None) -> Command:
     """Give the command that names what is missing, from the model on where `cpfls gap` can start from it."""
     if job.found is not None and why_no_body_found(job, job.found):
         return to_fly(job)
-    starts = model is not None and (is_found(model) or is_identified(model))
+    starts = model is not None and (is_found(model) or format_name(model) == IdentifiedModel.FORMAT)
     given: Sequence[str | Path] = ("--model", model) if model is not None and starts else ()
     return go_on(job, "gap", *flights, *given, output=job.beside("gap"))
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from cpfls_cli.artifacts.job import Job, go_on
 from cpfls_cli.artifacts.model import MODEL_FLIGHT, LearnedFlight, as_inputs
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.config.unknown import is_of_guesses
+from cpfls_cli.consistency.channels import BODY_AXES
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
@@ -29,7 +30,6 @@ from cpfls_cli.gap.naming.causes import of_thrust
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.gap.whole_vehicle import known_already
 from cpfls_cli.pages.gap import (
-    AXES,
     BEFORE,
     MEASURED,
     channel_unit,
@@ -73,15 +73,15 @@ def _draw_free_runs(r: Diagnosis, figure: Figure) -> None:
     assert run is not None, "asked before"
     curves = _curves(run)
     parts = np.split(np.arange(len(run.time)), np.searchsorted(run.time, run.restart[1:] - 1e-9))
-    panels = stacked(figure, len(AXES) + 1)
+    panels = stacked(figure, len(BODY_AXES) + 1)
     for axes, start in product(panels, run.restart):
         axes.axvline(start, color=GREY, linewidth=1.2, linestyle=(0, (1, 1.5)), zorder=0.5)
-    for index, (axes, axis) in enumerate(zip(panels, AXES, strict=False)):
+    for index, (axes, axis) in enumerate(zip(panels, BODY_AXES, strict=False)):
         about = {key: values[:, index] for key, values in curves.items()}
         _draw_runs(axes, run.time, about, parts, f"body rate about {axis}")
         keep_in_view(axes, (about["measured"], about["after"]), about["before"])
     errors = {key: curves[key][:, run.axis] - run.measured[:, run.axis] for key in ("before", "after")}
-    _draw_runs(panels[-1], run.time, errors, parts, f"simulated less measured about {AXES[run.axis]}")
+    _draw_runs(panels[-1], run.time, errors, parts, f"simulated less measured about {BODY_AXES[run.axis]}")
     panels[-1].axhline(0.0, color="black", linewidth=0.8)
     legend_over(figure, panels[0])
     panels[-1].set_xlabel("time, s")
@@ -100,8 +100,8 @@ def _draw_runs(axes: Axes, time: Array, curves: dict[str, Array], runs: Sequence
 
 def _leaving(run: FreeRuns) -> list[str]:
     """Name the axes about which the model as given runs away from the figure."""
-    rates = [{key: values[:, index] for key, values in _curves(run).items()} for index in range(len(AXES))]
-    pairs = zip(AXES, rates, strict=True)
+    rates = [{key: values[:, index] for key, values in _curves(run).items()} for index in range(len(BODY_AXES))]
+    pairs = zip(BODY_AXES, rates, strict=True)
     return [axis for axis, own in pairs if leaves_view((own["measured"], own["after"]), own["before"])]
 
 
@@ -148,15 +148,6 @@ def _farther_off(playback: PlaybackChange) -> list[str]:
     ]
 
 
-def _unplayed(playback: PlaybackChange) -> list[str]:
-    """List the signals that cannot be played back."""
-    return [words for name, (words, _, _) in SIGNALS.items() if name not in playback.signals]
-
-
-def _finite(value: Any) -> bool:
-    return bool(np.isfinite(value))
-
-
 FIGURES = {
     "repeatable": repeatability_drawn(lambda r: (r.repeatability_before, r.repeatability_after)),
     "free-runs": Drawn(
@@ -183,15 +174,15 @@ FIGURES = {
 }
 WORDS = {
     **GAP_WORDS,
-    "axes": AXES,
+    "axes": BODY_AXES,
     "farther_off": _farther_off,
-    "finite": _finite,
+    "finite": np.isfinite,
     "gust_words": axis_words,
     "hidden_gaps": hidden_gaps,
     "leaving": _leaving,
     "of_guesses": is_of_guesses,
     "signals": SIGNALS,
-    "unplayed": _unplayed,
+    "unplayed": lambda playback: [words for name, (words, *_) in SIGNALS.items() if name not in playback.signals],
     "who": WHO,
     "wrong_numbers": _wrong,
 }

@@ -31,7 +31,7 @@ from cpfls_cli.export.sheet import REFITTED, Sheet
 from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.viewed import view_of
 from cpfls_cli.flights.models import any_model, modelled
-from cpfls_cli.pages.model import against, impossible_in_words, worth_in_words
+from cpfls_cli.pages.model import against, impossible_in_words, said_by
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
@@ -77,7 +77,7 @@ VIEWERS = {"mcap": ".mcap", "csv": ".csv"}
 ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()} | VIEWERS
 # What an autopilot states is no whole vehicle, so it is asked for by name.
 _BY_SUFFIX = {form: ending for form, ending in ENDINGS.items() if form in VIEWERS or not FORMS[form].lacks}
-# What the module imports beside the standard library: under such a name it would import itself.
+# What the module imports besides the standard library: under such a name it would import itself.
 _NAMED_AS_FILES = {"pyflyt": "a model of PyFlyt", "webots": "a PROTO of Webots"}
 _IMPORTED = ("casadi", "jax", "numpy", "pegasus", "rotorpy")
 
@@ -256,7 +256,7 @@ def bare_sheet(record: AnyModel, model: VehicleModel, origin: Origin) -> Sheet:
     return Sheet(
         "",
         model,
-        tuple(worth_in_words(record)),
+        tuple(said_by(record.MADE_BY, record, "usage")),
         origin,
         "",
         "",
@@ -281,8 +281,7 @@ def _require_usable(functions: InertiaFunctions, path: Path) -> None:
 def _bare_sheet(path: Path, record: AnyModel, origin: Origin) -> Sheet:
     """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
     model = modelled(path, record)
-    beside = model.unsimulated
-    held = tuple(each for each in model.effects if each.name not in beside)
+    held = tuple(each for each in model.effects if each.name not in model.unsimulated)
     still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
     sheet = bare_sheet(record, still, origin)
     if isinstance(record, IdentifiedModel):

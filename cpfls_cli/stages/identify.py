@@ -34,7 +34,7 @@ from cpfls_cli.flights.training import (
     choosing_source,
     flight_roles,
     held_out_parts,
-    input_roles,
+    numbered_roles,
     read_training,
 )
 from cpfls_cli.identification.data import TorqueSource
@@ -77,9 +77,9 @@ def identify(
 ) -> IdentifiedModel | None:
     """Identify a model, and gather the evidence on it."""
     others, choosing = validate or [], choose_on or []
-    inputs, search = begin_search(
-        run, input_roles(flights, selection, others, choosing), resume=resume, workers=workers, scheduler=scheduler
-    )
+    roles = flight_roles(flights) | ({"selection": selection} if selection else {})
+    roles |= numbered_roles("choose-on", choosing) | numbered_roles("validate", others)
+    inputs, search = begin_search(run, roles, resume=resume, workers=workers, scheduler=scheduler)
     run.files.update(inputs)
     data, kept = read_training(flights, selection, run.study, inputs), choosing_source(choosing, inputs)
     with settings_of("identification", run.study):

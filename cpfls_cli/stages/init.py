@@ -103,12 +103,6 @@ class Stated:
     model: SimulatorModel | None = None
     like: VehicleSettings | None = None  # Made of the same file with other logs.
 
-    @property
-    def knows_constants(self) -> bool:
-        """Whether it is any of what `cpfls vehicle` finds."""
-        known = (self.inertia_kg_m2, self.thrust_factor_n_s2, self.drag_factor_n_m_s2)
-        return self.model is not None or known != (None, None, None)
-
 
 def asked_keys(proposal: Proposal, stated: Stated) -> tuple[str, ...]:
     """List the keys of the config of logs that only a person can fill in."""
@@ -340,7 +334,8 @@ def proposed(
         twice=tuple(seen_twice(files)),
     )
     text, whole = config_text(made), not made.asked
-    if whole and stated.knows_constants:
+    constants = (stated.model, stated.inertia_kg_m2, stated.thrust_factor_n_s2, stated.drag_factor_n_m_s2)
+    if whole and any(each is not None for each in constants):
         # Numbers that the log's rotors make impossible, such as a thrust that lifts nothing.
         name = str(run.output) if model is None else f"{model.file}, as a config"
         validate(parse_config(text, name), name)

@@ -10,12 +10,13 @@ import numpy as np
 
 from cpfls_cli.arguments import EveryOption, FlightsArgument, HistoryOption, HoldOption, HorizonOption, PlayedArgument
 from cpfls_cli.arrays import Array
+from cpfls_cli.consistency.channels import BODY_AXES
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.models import holds_forecast, is_vehicle, learned_by, read_fading, read_model, read_observer
 from cpfls_cli.flights.playback import flights_to_play, model_notes, played
 from cpfls_cli.flights.recordings import seen_twice
 from cpfls_cli.flights.training import known_by, numbered_roles
-from cpfls_cli.pages.gap import AXES, MEASURED, keep_in_view
+from cpfls_cli.pages.gap import MEASURED, keep_in_view
 from cpfls_cli.pages.playback import ERRORS, WORDS, draw_errors, errors_height
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.errors import NOTHING_MOVES, STATED
@@ -53,13 +54,13 @@ def _pair(axes: Axes, time: Sequence[Array], measured: Sequence[Array], model: S
 def _worst(r: Playback, figure: Figure) -> None:
     """Draw the body rates of flight and model in the windows in which the model is worst."""
     shown = r.worst[:_SHOWN_WORST]
-    grid = figure.subplots(len(AXES), len(shown), sharex=True, squeeze=False)
+    grid = figure.subplots(len(BODY_AXES), len(shown), sharex=True, squeeze=False)
     time = np.concatenate([[0.0], r.horizon_s])
     for column, run in enumerate(shown):
         grid[0][column].set_title(f"{column + 1}: {run.flight}, {run.start_s:.2f} s")
         for row, axes in enumerate(grid[:, column]):
             _pair(axes, [time], [run.measured[:, row]], [run.model[:, row]])
-            axes.set_ylabel(AXES[row] if column == 0 else "")
+            axes.set_ylabel(BODY_AXES[row] if column == 0 else "")
     figure.supxlabel("time from the start, s", fontsize=9.5)
     figure.supylabel("body rate, rad/s", fontsize=9.5)
     legend_over(figure, grid[0][0])
@@ -68,7 +69,9 @@ def _worst(r: Playback, figure: Figure) -> None:
 def _panels(r: Playback) -> list[tuple[str, Array, Array]]:
     """List what is drawn of a stretch: of each panel its title, the flight and the model, shape (run, sample)."""
     own = r.drawn
-    found = [(f"rate about {axis}, rad/s", own.measured[:, :, at], own.model[:, :, at]) for at, axis in enumerate(AXES)]
+    found = [
+        (f"rate about {axis}, rad/s", own.measured[:, :, at], own.model[:, :, at]) for at, axis in enumerate(BODY_AXES)
+    ]
     if own.measured_position is not None and own.model_position is not None:
         both = own.measured_position, own.model_position
         found += [(f"position {axis}, m", both[0][:, :, at], both[1][:, :, at]) for at, axis in enumerate("xyz")]

@@ -11,7 +11,7 @@ import typer
 from cpfls_cli.arguments import ExportAnywayOption
 from cpfls_cli.artifacts.vehicle_model import name_of
 from cpfls_cli.errors import ComputationError, InputError, about
-from cpfls_cli.export.samples import Samples, require_ending
+from cpfls_cli.export.samples import ENDINGS, Samples
 from cpfls_cli.export.text import identifier
 from cpfls_cli.flights.models import any_model, found_vehicle, is_found, is_model
 from cpfls_cli.pages.trust import trust_words
@@ -55,7 +55,10 @@ def spread(
     anyway: ExportAnywayOption = False,
 ) -> Written | None:
     """Draw vehicles, and write them."""
-    ending = require_ending(str(run.output), run.output.suffix)
+    ending = run.output.suffix
+    if ending not in ENDINGS:
+        known = ", ".join(ENDINGS)
+        raise InputError(f"{run.output}: its suffix names no form; give the name one of the suffixes {known}")
     source = run.take({"model": model})["model"]
     if is_model(model) and not is_found(model):
         raise InputError(

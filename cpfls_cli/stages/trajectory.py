@@ -8,7 +8,6 @@ from enum import StrEnum
 from importlib import import_module
 from math import inf, radians
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -27,7 +26,8 @@ from cpfls_cli.report.canvas import BASELINE, Drawn, line, picture_of, stacked, 
 from cpfls_cli.report.content import plain
 from cpfls_cli.simulation.inverse import Flyability, RoomLeft, flyability, room_left, single_axis_torque
 from cpfls_cli.stage import Run, stage
-from cpfls_cli.stages._flight import demand_sentences, draw_attitude, draw_rotation
+from cpfls_cli.stages._flight import FIGURES as OF_FLIGHTS
+from cpfls_cli.stages._flight import demand_sentences
 from cpfls_cli.stages._mission import mission_of, mission_paths, mission_texts, mission_words
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rotation, plan, repeated
@@ -202,11 +202,11 @@ _MOST_SAMPLES = 1_000_000
 
 def _draw_derivatives(r: PlannedPath, figure: Figure) -> None:
     """Draw pop to displacement over the first move: Figure 2 of the paper."""
-    move = r.first_leg()
+    time, curves = r.first_leg()
     panels = stacked(figure, len(DERIVATIVES))
     for axes, peak in zip(panels, r.peaks, strict=True):
-        curve = move.curves[peak.name]
-        line(axes, move.time, curve, **style_of(0))
+        curve = curves[peak.name]
+        line(axes, time, curve, **style_of(0))
         jumps = "" if np.any(curve) else ": not limited, infinite where the derivative below jumps"
         axes.set(title=f"{peak.name}{jumps}", ylabel=peak.unit)
         axes.axhline(0.0, color="#999999", linewidth=0.6)
@@ -219,10 +219,8 @@ FIGURES = {
     "derivatives": Drawn(
         f"Seven curves over time: {', '.join(DERIVATIVES)}", 8.6, _draw_derivatives, lambda r: not r.held
     ),
-    "attitude": Drawn("Roll and pitch angle over time", 2.7, draw_attitude, lambda r: not r.held),
-    "rotation": Drawn(
-        "Roll, pitch and yaw on the circle, and their rates, over time", 4.6, draw_rotation, lambda r: r.held
-    ),
+    "attitude": replace(OF_FLIGHTS["attitude"], holds=lambda r: not r.held),
+    "rotation": replace(OF_FLIGHTS["rotation"], holds=lambda r: r.held),
 }
 
 
@@ -263,7 +261,11 @@ def trajectory(
     figures = [run.output.with_name(f"{run.output.stem}-{name}.svg") for name in names]
     texts = {run.beside(f"{run.output.stem}-waypoints.csv"): "csv"} if settles else mission_paths(run, mission)
     check_outputs(run, *figures, *texts)
-    planned = _next_flight().planned(run, diagnosis) if settles else _planned(run, settings, waypoints)
+    if settles:
+        # What reads diagnoses and models is loaded for no other path.
+        planned: PlannedPath | None = import_module("cpfls_cli.stages._next_flight").planned(run, diagnosis)
+    else:
+        planned = _planned(run, settings, waypoints)
     written = None if planned is None else mission_texts(run, mission, planned, texts)
     if planned is None or written is None or run.dry_run:
         return None
@@ -279,11 +281,6 @@ def trajectory(
     run.also = {"figures": [str(path) for path in figures], "files": [str(path) for path in texts]}
     run.go_on("simulate", run.output, output=run.beside("flight.h5"))
     return planned
-
-
-def _next_flight() -> ModuleType:
-    """Load what reads diagnoses and models, which no other path needs."""
-    return import_module("cpfls_cli.stages._next_flight")
 
 
 def _planned(run: Run, settings: TrajectorySettings, waypoints: Path | None) -> PlannedPath | None:

@@ -42,6 +42,7 @@ from cpfls_cli.stages._flight_numbers import (
     of_other_autopilots,
     of_other_vehicles,
     stated_by,
+    without_voltage,
 )
 from cpfls_cli.workers.workforce import employ
 
@@ -316,10 +317,7 @@ def _of_commands(flights: Sequence[FlightNumbers]) -> Iterator[str]:
         yield "some log rotor speeds, others commands: shares of thrust are not compared; import one signal of all"
     without = [own.name for own in flights if own.commanded and not np.isfinite(own.voltage)]
     if without:
-        yield (
-            f"without the battery's voltage: {len(without)} of {len(flights)} flights; an emptier battery looks like a "
-            "heavier vehicle, so name import.signals.voltage"
-        )
+        yield without_voltage(f"{len(without)} of {len(flights)} flights")
 
 
 def _ordered(numbers: Mapping[str, FlightNumbers], order: str | None) -> tuple[list[FlightNumbers], str, list[str]]:

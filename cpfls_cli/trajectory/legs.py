@@ -16,7 +16,6 @@ from cpfls_cli.trajectory.profile import (
     BaseProfile,
     Holds,
     Limits,
-    LimitSettings,
     Peaks,
     broadcast_to_moves,
     covering,
@@ -259,7 +258,6 @@ def _root(offset: Array, power: int) -> Array:
 
 
 Measure = Literal["along-path", "per-axis"]
-Synchronisation = Literal["straight-line", "each-axis"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -333,20 +331,6 @@ def samples_of_legs(legs: Sequence[Leg], time: Array) -> Iterator[tuple[Leg, sli
             yield leg, slice(int(first), int(after))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Timing:
-    """Timing of a move: by its period and holds, or the shortest that its limits allow, where the period may be None.
-
-    `measure`: how long a displacement is, and what a limit that is one number for all axes holds for.
-    """
-
-    limits: LimitSettings
-    coordination: Synchronisation
-    period: float | None
-    holds: Holds
-    measure: Measure
-
-
 def unit_of(vector: Array, measure: Measure) -> tuple[float, Array]:
     """Split a vector, not zero, into its length, in a measure, and the vector of length 1."""
     # Divided by the largest component first, so that no square overflows.
@@ -356,24 +340,7 @@ def unit_of(vector: Array, measure: Measure) -> tuple[float, Array]:
     return largest * length, unit / length
 
 
-def move_in_space(vector: Array, timing: Timing) -> MoveInSpace:
-    """Plan the move over a displacement in the world, m, not zero.
-
-    `SettingError` names the key of the section `trajectory` where there is no smooth move under the limits.
-    """
-    length, direction = unit_of(vector, timing.measure)
-    if not timing.limits.given:
-        period = 1.0 if timing.period is None else timing.period
-        return MoveInSpace(profiles=(covering(length, period, timing.holds),), directions=direction[None])
-    if timing.coordination == "straight-line":
-        move = plan_move(length, timing.limits.along(direction), timing.period)
-        return _smooth((move,), direction[None])
-    axes = np.flatnonzero(vector)
-    moves = synchronised(vector[axes], timing.limits.of_axes(axes), timing.period)
-    return _smooth(moves, np.eye(3)[axes])
-
-
-def _smooth(moves: tuple[Move, ...], directions: Array) -> MoveInSpace:
+def smooth(moves: tuple[Move, ...], directions: Array) -> MoveInSpace:
     """Refuse moves of unbounded snap, from which the acceleration of the attitude follows."""
     for move in moves:
         if not move.outcome.solved:

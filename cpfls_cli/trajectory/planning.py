@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.trajectory.legs import Leg, MoveInSpace, evaluate_legs, move_in_space, samples_of_legs
+from cpfls_cli.trajectory.legs import Leg, MoveInSpace, evaluate_legs, samples_of_legs
 from cpfls_cli.trajectory.profile import BaseProfile, Peaks, covering
 from cpfls_cli.trajectory.rotation import RotationMotion, RotationPath
 from cpfls_cli.trajectory.settings import (
@@ -250,7 +250,10 @@ def plan(settings: TrajectorySettings, gravity: float) -> Trajectory:
         time = sample_times(duration, settings.sample_time_s)
         heading = _heading(settings, legs, time, duration)
         flown = along(time, evaluate_legs(legs, time) if legs else np.zeros((7, len(time), 3)), heading, gravity)
-        planned = Trajectory(duration=duration, legs=legs, maxima=_maxima(legs), runs=(), **flown)
+        # Crackle and pop are infinite without a limit.
+        peaks = [asdict(profile.peaks) for leg in legs for profile in leg.profiles]
+        maxima = {each.name: max((abs(peak[each.name]) for peak in peaks), default=0.0) for each in fields(Peaks)}
+        planned = Trajectory(duration=duration, legs=legs, maxima=maxima, runs=(), **flown)
     if not all(np.isfinite(values).all() for values in vars(planned).values() if isinstance(values, np.ndarray)):
         raise ComputationError(
             "the attitude's derivatives are too large for floating-point numbers; lower trajectory.yaw_turn_rad"
@@ -307,7 +310,7 @@ def _duration_of(settings: TrajectorySettings, legs: tuple[Leg, ...]) -> float:
 def _between_waypoints(settings: TrajectorySettings) -> list[MoveInSpace]:
     check_waypoints(settings.waypoints, settings.duration_s is None)
     points = [np.array(waypoint.position_m) for waypoint in settings.waypoints]
-    moves = [move_in_space(end - start, settings.timing) for start, end in pairwise(points)]
+    moves = [settings.move(end - start) for start, end in pairwise(points)]
     for profile in (profile for move in moves for profile in move.profiles):
         check_peaks(profile, "limits" if settings.limits.given else "period_s")
     return moves
@@ -325,12 +328,6 @@ def _begins(settings: TrajectorySettings, durations: Array) -> Array:
     check_duration(len(durations), needed, settings.duration_s)
     pause = (settings.duration_s - needed) / max(len(durations) - 1, 1)
     return np.asarray(np.cumsum(durations) - durations + pause * np.arange(len(durations)))
-
-
-def _maxima(legs: tuple[Leg, ...]) -> dict[str, float]:
-    """Find the largest peak of every derivative over all legs; infinite for crackle and pop without a limit."""
-    peaks = [asdict(profile.peaks) for leg in legs for profile in leg.profiles]
-    return {field.name: max((abs(peak[field.name]) for peak in peaks), default=0.0) for field in fields(Peaks)}
 
 
 def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
@@ -436,7 +433,7 @@ def _way_back(run: Trajectory, settings: TrajectorySettings) -> tuple[Leg | None
     vector = run.position[0] - run.position[-1]
     if float(np.abs(vector).max()) <= _AT_HOME:
         return None, turn if abs(turn) > _AT_HOME else 0.0
-    move = move_in_space(vector, settings.timing)
+    move = settings.move(vector)
     return Leg(begin=0.0, start=run.position[-1], yaw=None, **vars(move)), turn
 
 

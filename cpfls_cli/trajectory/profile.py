@@ -18,6 +18,7 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt
+from numpy.polynomial.polynomial import polyval
 from typing_extensions import Doc
 
 from cpfls_cli.arrays import Array, IntArray
@@ -150,7 +151,7 @@ class _Piece:
         is_wave = self.crackle != 0
         degree = 5 if is_wave else 4
         for order, row in enumerate(self.coefficients):
-            _polynomial(row[: degree - order + 1], tau, motion[order])
+            motion[order] = polyval(tau, row[: degree - order + 1])
         if not is_wave:
             return
         angle = _TURN * tau
@@ -200,14 +201,6 @@ def _piece(start: float, length: float, wave: Array, state: Array) -> _Piece:
         coefficients[order, 1:5] = coefficients[order + 1, :4] * length / np.arange(1, 5)
     coefficients += np.cumprod([wave[4], *[length] * 4])[::-1, np.newaxis] * _WAVE
     return _Piece(start, length, coefficients, wave[5] / 2, wave[6])
-
-
-def _polynomial(coefficients: Array, tau: Array, values: Array) -> None:
-    """Evaluate by Horner's rule, in place."""
-    values[:] = coefficients[-1]
-    for coefficient in coefficients[-2::-1]:
-        values *= tau
-        values += coefficient
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,15 +12,17 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 from typing_extensions import Doc
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
-from cpfls_cli.trajectory.legs import MoveInSpace, Timing, move_in_space, unit_of
-from cpfls_cli.trajectory.profile import BaseProfile, Holds, LimitSettings
+from cpfls_cli.trajectory.legs import MoveInSpace, plan_move, smooth, synchronised, unit_of
+from cpfls_cli.trajectory.profile import BaseProfile, Holds, LimitSettings, covering
 
 _LARGEST_PEAK = 1e100
 # Of the fastest wave of an excitation, between which an autopilot and a simulation interpolate.
 _SAMPLES_IN_A_PERIOD = 10
 _MAY_JUMP = ("crackle", "pop")
+_OF_DURATION = "contradicts duration_s, which determines the rest between moves; set duration_s to null"
 # Samples of a path, of 34 numbers each: 2.7 GB.
 _LARGEST_SIZE = 10_000_000
 
@@ -55,9 +57,7 @@ def _check_clock(settings: TrajectorySettings) -> None:
         return
     check_samples(settings.duration_s, settings.sample_time_s)
     if settings.pause_s:
-        raise SettingError(
-            "pause_s", "contradicts duration_s, which determines the rest between moves; set duration_s to null"
-        )
+        raise SettingError("pause_s", _OF_DURATION)
 
 
 def _check_held(settings: TrajectorySettings) -> None:
@@ -197,8 +197,7 @@ def check_waypoints(waypoints: Sequence[WaypointSettings], paused: bool) -> None
         raise SettingError(f"waypoints.{headings.index(True)}.yaw_rad", message)
     for number, point in enumerate(waypoints):
         if point.pause_s and not paused:
-            message = "contradicts duration_s, which determines the rest between moves; set duration_s to null"
-            raise SettingError(f"waypoints.{number}.pause_s", message)
+            raise SettingError(f"waypoints.{number}.pause_s", _OF_DURATION)
 
 
 _Turns = Annotated[int, Ge(-10_000), Le(10_000)]
@@ -418,17 +417,6 @@ class TrajectorySettings(Settings):
         )
 
     @property
-    def timing(self) -> Timing:
-        """Timing of a move."""
-        return Timing(
-            limits=self.limits,
-            coordination=self.coordination,
-            period=self.period,
-            holds=self.holds,
-            measure=self.displacement_measure,
-        )
-
-    @property
     def line(self) -> MoveInSpace:
         """First move of a path to and fro."""
         unit = unit_of(np.array(self.direction), self.displacement_measure)[1]
@@ -437,4 +425,19 @@ class TrajectorySettings(Settings):
             return MoveInSpace(profiles=(given,), directions=unit[None])
         if self.displacement_m is None:
             raise SettingError("displacement_m", "is missing")
-        return move_in_space(self.displacement_m * unit, self.timing)
+        return self.move(self.displacement_m * unit)
+
+    def move(self, vector: Array) -> MoveInSpace:
+        """Plan the move over a displacement in the world, m, not zero.
+
+        `SettingError` names the key of the section `trajectory` where there is no smooth move under the limits.
+        """
+        length, direction = unit_of(vector, self.displacement_measure)
+        if not self.limits.given:
+            profile = covering(length, self.period or _USUAL_PERIOD, self.holds)
+            return MoveInSpace(profiles=(profile,), directions=direction[None])
+        if self.coordination == "straight-line":
+            return smooth((plan_move(length, self.limits.along(direction), self.period),), direction[None])
+        axes = np.flatnonzero(vector)
+        moves = synchronised(vector[axes], self.limits.of_axes(axes), self.period)
+        return smooth(moves, np.eye(3)[axes])

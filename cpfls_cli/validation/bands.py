@@ -324,7 +324,7 @@ def torque_band(
 ) -> tuple[Array, Array]:
     """Put a band around the torque that a model predicts.
 
-    It is the band of the prediction; a measured torque has its own noise beside it.
+    It is the band of the prediction; a measured torque has its own noise besides.
 
     Parameters
     ----------

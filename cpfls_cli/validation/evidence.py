@@ -251,7 +251,7 @@ class Evidence:
         errors = [steps.window_error[steps.model.index(predictor)] for steps in self.replayed.values()]
         return np.asarray(np.max([np.sqrt(_mean(squares)) for squares in errors], axis=0))
 
-    def replay_beside(self, part: str, predictor: str, rival: str, axes: Sequence[int] = (0, 1, 2)) -> Comparison:
+    def replay_compared(self, part: str, predictor: str, rival: str, axes: Sequence[int] = (0, 1, 2)) -> Comparison:
         """Compare the errors of the body rate of two predictors in windows of a part that do not overlap."""
         steps, samples = self.replayed[part], self.identification.samples[part]
         kept = non_overlapping(steps.start, len(steps.samples))
@@ -268,7 +268,7 @@ class Evidence:
         Shape (3,).
         """
         lower = [
-            [self.replay_beside(part, predictor, NOTHING_MOVES, (axis,)).lower for axis in range(3)]
+            [self.replay_compared(part, predictor, NOTHING_MOVES, (axis,)).lower for axis in range(3)]
             for part in self.replayed
         ]
         return np.asarray(np.all(np.array(lower, dtype=bool), axis=0))

@@ -20,7 +20,7 @@ from cpfls_cli.rotations import wrapped
 # what is usual there.
 _STEPS_AROUND = 25
 
-# By default enough that Student's t is that of a normal distribution; more than 200 take time and tell no more.
+# By default enough that Student's t is that of a normal distribution; more than 200 take time and add nothing.
 _DEFAULT_BLOCKS, _MOST_BLOCKS, _FEWEST_BLOCKS = 40, 200, 2
 
 # Shorter blocks are no longer independent of their neighbours where noise is coloured.

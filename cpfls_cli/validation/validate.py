@@ -30,7 +30,7 @@ from cpfls_cli.validation.evidence import (
 from cpfls_cli.validation.replay import StepErrors, replay_steps
 from cpfls_cli.validation.residuals import ResidualAnalysis, TimeBlocks, examine_residuals, time_blocks
 from cpfls_cli.validation.structures import StructureComparison, compare_structures
-from cpfls_cli.validation.verdict import Verdict, beside_loop, verdict
+from cpfls_cli.validation.verdict import Verdict, verdict, with_loop
 
 Tell = Callable[[str], None]
 """Takes the name of the next step, for the progress display."""
@@ -123,7 +123,7 @@ def validate(
         band=drawn.relative_width,
         definite=definite_share(model, draws),
     )
-    judged = beside_loop(verdict(evidence), result.loop, by_past=result.freed is not None)
+    judged = with_loop(verdict(evidence), result.loop, by_past=result.freed is not None)
     return Validation(structures, residuals, draws, drawn, again, steps, physics, judged)
 
 

@@ -27,7 +27,7 @@ DEFINITE_SHARE = 0.975
 """Share of the bootstrap draws that are to be positive definite wherever training was."""
 
 # A constant torque is reported from a quarter of the noise of errors on, if it is a hundredth of all torque.
-_LARGE_BESIDE_NOISE, _SMALL = 0.25, 0.01
+_LARGE_OVER_NOISE, _SMALL = 0.25, 0.01
 
 
 class Reason(NamedTuple):
@@ -45,7 +45,7 @@ def numbers(values: Array, shown: BoolArray | None = None) -> str:
 
 def reasons(evidence: Evidence) -> Iterator[Reason]:
     """List the reasons for and against a model, the most important first."""
-    of_errors = (_held_out, _hardly_excited, _beside_rigid_body, _constant, _steps, _lost)
+    of_errors = (_held_out, _hardly_excited, _against_rigid_body, _constant, _steps, _lost)
     of_inertia = (_definite, _draws, _elsewhere, _fuzzy_part, _determined)
     for rule in (*of_errors, *of_inertia, _band, _search, _outside, _white):
         yield from rule(evidence)
@@ -182,14 +182,14 @@ def _hardly_excited(evidence: Evidence) -> Iterator[Reason]:
             yield Reason(f"{text}, {still:.3g} if nothing moved: not better by more than chance", AGAINST)
 
 
-def _beside_rigid_body(evidence: Evidence) -> Iterator[Reason]:
+def _against_rigid_body(evidence: Evidence) -> Iterator[Reason]:
     several = len(evidence.held_out) > 1
     for flown, compared in evidence.torque.items():
         where = f" ({flown})" if several else ""
         yield _compared(f"squared error of held-out torque{where}", compared)
     for flown, steps in evidence.replayed.items():
         if steps.windows:
-            compared = evidence.replay_beside(flown, MODEL, RIGID_BODY)
+            compared = evidence.replay_compared(flown, MODEL, RIGID_BODY)
             reason = _compared(f"squared error of the replayed body rate ({flown})", compared)
             # What was learned from is no witness.
             yield reason if flown in evidence.held_out else Reason(reason.text, NEITHER)
@@ -199,7 +199,7 @@ def _constant(evidence: Evidence) -> Iterator[Reason]:
     """Name a constant torque that is large against the noise, and not negligible against the torque."""
     axes = evidence.identification.axes
     constant, noise = np.abs(axes.constant), axes.torque * np.sqrt(np.clip(1.0 - axes.r2, 0.0, None))
-    for axis in np.flatnonzero((constant > _LARGE_BESIDE_NOISE * noise) & (constant > _SMALL * axes.torque)):
+    for axis in np.flatnonzero((constant > _LARGE_OVER_NOISE * noise) & (constant > _SMALL * axes.torque)):
         share = f"{100 * constant[axis] / axes.torque[axis]:.3g} % of its torque"
         text = f"{AXES[axis]}: a constant torque of {axes.constant[axis]:.3g} N m acts in training, {share}"
         yield Reason(f"{text}: no inertia causes it; errors are compared with the rigid body's without it", NEITHER)
@@ -298,7 +298,7 @@ def contradicted(found: Verdict, contradictions: Sequence[str]) -> Verdict:
     return replace(found, label=capped(Trust(found.label), wrong), reasons=(*against, *found.reasons))
 
 
-def beside_loop(found: Verdict, loop: LoopBounds | None, *, by_past: bool = False) -> Verdict:
+def with_loop(found: Verdict, loop: LoopBounds | None, *, by_past: bool = False) -> Verdict:
     """Take back a good verdict on a model whose flights show the loop, unless the past identifies it.
 
     `loop` is None where something from outside separates the vehicle from its autopilot.
@@ -338,7 +338,7 @@ def _decided(evidence: Evidence) -> tuple[Trust, Reason]:
 
 
 def _better(evidence: Evidence) -> bool:
-    replayed = [evidence.replay_beside(part, MODEL, RIGID_BODY) for part in evidence.held_out]
+    replayed = [evidence.replay_compared(part, MODEL, RIGID_BODY) for part in evidence.held_out]
     compared = [*evidence.torque.values(), *replayed]
     return any(one.lower for one in compared) and not any(one.higher for one in compared)
 

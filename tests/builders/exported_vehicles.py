@@ -83,7 +83,7 @@ ORIGIN = Origin(stage="vehicle", seed=1, config="seed: 1\n", version="0.1.0")
 def sheet_of_vehicle(model, name="vehicle", **changed):
     """Put a vehicle on a sheet."""
     given = {
-        "worth": ("It is worth a test.",),
+        "usage": ("It is worth a test.",),
         "origin": ORIGIN,
         "file": "vehicle.h5",
     }

@@ -10,7 +10,7 @@ one curve for all rotors, and speeds follow commands by rotor_dyn_coef.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,17 +18,17 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, require_four
-from cpfls_cli.export.numbers import numbers_of, places, spins
+from cpfls_cli.export.numbers import RPM, Numbers, numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines, in_json
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.vehicle.motion import Instant, Wrench
+from cpfls_cli.vehicle.settings import VehicleSettings
 
-FORCE_OF_VELOCITY = slice(3, 6), slice(1, 4)
-DRAG = (*FORCE_OF_VELOCITY, 0)
+_FORCE_OF_VELOCITY = slice(3, 6), slice(1, 4)
+DRAG = (*_FORCE_OF_VELOCITY, 0)
 """Places in a table of weights."""
 
-_RPM = 30 / np.pi
 _USE = (
     "For crazyflow put the section into crazyflow/dynamics/first_principles/params.toml under the name of one of its "
     "drones, for drone-models into drone_models/data/params.toml; or give it to the function itself, with "
@@ -40,21 +40,22 @@ _USE = (
 def crazyflow_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what these dynamics fly of a vehicle."""
     require_four(model, "crazyflow and drone-models mix")
-    numbers, hover = numbers_of(model, _wrenches, alike=True), hover_speed(model.vehicle)
-
-    def holds(weights: Array) -> Array:
-        held = numbers.holds(weights)
-        held[DRAG] = in_hover(weights[FORCE_OF_VELOCITY], hover)
-        return held
-
+    numbers = numbers_of(model, _wrenches, alike=True)
+    holds = with_drag(numbers, model.vehicle)
     return held_by(model, holds, constant_body(model), numbers, lags=True), holds
 
 
-def in_hover(weights: Array, hover: float) -> Array:
-    """Sum the terms of rotors that hover, from which on the drag of rotors is one of the body, shape (3, 3)."""
-    rotors = (weights.shape[2] - 1) // 4
+def with_drag(numbers: Numbers, vehicle: VehicleSettings, taken: Callable[[Array], Array] = np.asarray) -> Holds:
+    """Hold a simulator's numbers, and what is taken of the drag that hovering rotors are to the body, shape (3, 3)."""
+    hover, rotors = hover_speed(vehicle), len(vehicle.rotors)
     turning = np.concatenate([[1.0], np.full(rotors, hover), np.full(rotors, hover**2), np.zeros(2 * rotors)])
-    return np.asarray(weights @ turning)
+
+    def holds(weights: Array) -> Array:
+        held = numbers.holds(weights)
+        held[DRAG] = taken(weights[_FORCE_OF_VELOCITY] @ turning)
+        return held
+
+    return holds
 
 
 def _wrenches(see: Instant) -> Mapping[str, Wrench]:
@@ -74,8 +75,8 @@ def crazyflow_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str)
         "mass": held.body.mass,
         "J": held.body.inertia.tolist(),
         "L": length,
-        "rpm2thrust": [0.0, found["thrust_linear"] / _RPM, found["thrust"] / _RPM**2],
-        "rpm2torque": [0.0, found["yaw_linear"] / _RPM, found["yaw"] / _RPM**2],
+        "rpm2thrust": [0.0, found["thrust_linear"] / RPM, found["thrust"] / RPM**2],
+        "rpm2torque": [0.0, found["yaw_linear"] / RPM, found["yaw"] / RPM**2],
         "rotor_dyn_coef": [rate, 0.0, rate, 0.0],
         "mixing_matrix": [(hubs[:, 1] / length).tolist(), (-hubs[:, 0] / length).tolist(), spins(vehicle).tolist()],
         "drag_matrix": held.weights[DRAG].tolist(),

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.export.holding import FOUR, Held, Holds, constant_body, held_by, of_a_body, require_four
 from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.simulators.crazyflow import DRAG, FORCE_OF_VELOCITY, in_hover
+from cpfls_cli.export.simulators.crazyflow import DRAG, with_drag
 from cpfls_cli.export.source import fill_template
 from cpfls_cli.export.text import comment_lines, comment_text, number, python_rows
 from cpfls_cli.playback.model import VehicleModel
@@ -25,13 +23,8 @@ from cpfls_cli.playback.model import VehicleModel
 def pegasus_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what Pegasus flies of a vehicle."""
     require_four(model, "Pegasus pushes at")
-    numbers, hover = numbers_of(model, lambda _see: {}, alike=False), hover_speed(model.vehicle)
-
-    def holds(weights: Array) -> Array:
-        held = numbers.holds(weights)
-        held[DRAG] = np.diag(np.diag(in_hover(weights[FORCE_OF_VELOCITY], hover)))
-        return held
-
+    numbers = numbers_of(model, lambda _see: {}, alike=False)
+    holds = with_drag(numbers, model.vehicle, lambda drag: np.diag(np.diag(drag)))
     return held_by(model, holds, of_a_body(constant_body(model)), numbers), holds
 
 

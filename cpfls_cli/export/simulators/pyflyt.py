@@ -18,7 +18,7 @@ import numpy as np
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.effects.scales import arm
 from cpfls_cli.export.holding import FOUR, Held, Holds, constant_body, held_by, of_a_body, require_two_each_way
-from cpfls_cli.export.numbers import numbers_of, places, spins
+from cpfls_cli.export.numbers import RPM, numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.simulators.urdf import add_body, add_point
@@ -29,7 +29,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 NUMBERS = ".yaml"
 STEP_S = 1 / 240
-_RPM = 30 / np.pi
 _X = ((1, -1), (-1, 1), (1, 1), (-1, -1))
 """Sides, forward and left, that PyFlyt's own controllers have motors 0 to 3 at."""
 _SAME = ("ang_vel", "ang_pos", "lin_vel", "lin_pos", "z_pos", "z_vel")
@@ -71,8 +70,8 @@ def pyflyt_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> 
     numbers: dict[str, Any] = {
         "motor_params": {
             "total_thrust": FOUR * found["thrust"] * most**2,
-            "thrust_coef": found["thrust"] / _RPM**2,
-            "torque_coef": found["yaw"] / _RPM**2,
+            "thrust_coef": found["thrust"] / RPM**2,
+            "torque_coef": found["yaw"] / RPM**2,
             "noise_ratio": 0.0,
             "tau": held.response.lag_s or STEP_S,
         },

@@ -16,7 +16,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.scales import arm
 from cpfls_cli.export.holding import FOUR, Held, Holds, constant_body, held_by, of_a_body, require_two_each_way
-from cpfls_cli.export.numbers import numbers_of, places, spins
+from cpfls_cli.export.numbers import RPM, numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.text import number, xml_text
@@ -30,7 +30,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import scaled
 
 OTHERWISE = "drag along the axes of the world, where the vehicle has it along those of its body"
-_RPM, _GRAVITY = 30 / np.pi, 9.8
+_GRAVITY = 9.8
 """Of gym-pybullet-drones, which has its gravity in its code."""
 _TURNS = np.array([-1.0, 1.0, -1.0, 1.0])
 _HEIGHT_SHARE, _RADIUS_M, _KMH = 0.2, 0.05, 30.0
@@ -101,8 +101,8 @@ def _properties(sheet: Sheet, held: Held) -> dict[str, str]:
     most = FOUR * found["thrust"] * vehicle.rotor_speed_max_rad_s**2 / (held.body.mass * _GRAVITY)
     numbers = {
         "arm": arm(vehicle),
-        "kf": found["thrust"] / _RPM**2,
-        "km": found["yaw"] / _RPM**2,
+        "kf": found["thrust"] / RPM**2,
+        "km": found["yaw"] / RPM**2,
         "thrust2weight": most,
         "max_speed_kmh": _KMH,
         "gnd_eff_coeff": 0.0,
@@ -149,7 +149,7 @@ def fly_urdf(text: str, course: Course, *, own: bool = True) -> State:
     drag = np.array([across, across, along])
 
     def push(speed: Array, air: Array, _rate: Array, rotation: Array) -> tuple[Array, Array]:
-        squares = (_RPM * speed[:, order]) ** 2
+        squares = (RPM * speed[:, order]) ** 2
         force = (kf * squares)[..., None] * [0.0, 0.0, 1.0]
         torque = np.cross(hubs, force).sum(axis=1)
         torque[:, 2] += km * (squares @ _TURNS)

@@ -7,7 +7,6 @@ their value about pitch.
 
 import re
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.export.json_form import HOW_TO_EVALUATE_INERTIA
-from cpfls_cli.export.points import wrench_along
+from cpfls_cli.export.points import parts_along
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.fuzzy.basis import Z_FUNCTION, memberships, z_function
 from cpfls_cli.playback.flight import MeasuredMotion
@@ -138,7 +137,11 @@ def test_the_learned_part_of_a_vehicle(airflow, form, tmp_path):
         require_gcc()
     model, still = airflow.model, np.zeros_like(airflow.air)
     rotor = np.eye(1, 1 + 4 * model.rotors).repeat(len(still), axis=0)
-    wrench = partial(wrench_along, model) if form == "library" else FORMS[form](tmp_path, model).wrench
+
+    def library(*motion):
+        return sum(parts_along(model, *motion).values())
+
+    wrench = library if form == "library" else FORMS[form](tmp_path, model).wrench
     torque = wrench(airflow.air, still, rotor)[:, 0]
     np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-12)
 

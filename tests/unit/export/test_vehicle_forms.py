@@ -9,7 +9,7 @@ import pytest
 
 from cpfls_cli.dynamics import turning_law
 from cpfls_cli.export.json_form import json_text
-from cpfls_cli.export.points import part_sizes, parts_along, reference_points, reference_run, wrench_along
+from cpfls_cli.export.points import part_sizes, parts_along, reference_points, reference_run
 from cpfls_cli.export.source import c_source
 from cpfls_cli.playback.flight import MeasuredMotion, State
 from cpfls_cli.playback.model import VehicleModel
@@ -118,7 +118,8 @@ def test_a_step_under_an_inertia_over_attitude_is_that_of_the_library(name, form
     assert np.max(np.abs(moved - wanted)) < ALLOWED * np.abs(wanted).max()
     assert np.max(np.abs(constant - wanted)) > 1e-5
     air = np.einsum("nji,nj->ni", state.rotation, velocity)
-    torque, turning = wrench_along(model, air, rate, rotor)[:, :3], turning_law(model.fuzzy)(attitude, rate)
+    torque = sum(parts_along(model, air, rate, rotor).values())[:, :3]
+    turning = turning_law(model.fuzzy)(attitude, rate)
     for own, wanted, inertia, direct in zip(found[:, 3:], torque, *turning, strict=True):
         left = inertia @ own + direct - wanted
         assert np.abs(left).max() < ALLOWED * (np.abs(wanted).max() + np.abs(direct).max())
@@ -240,7 +241,7 @@ def test_references_of_json_are_what_it_says(exports):
 
 
 def test_json_is_the_same_each_time_and_strict():
-    sheet = sheet_of_vehicle(MODELS["harmonic"], worth=("caf\u00e9", "\ud800"))
+    sheet = sheet_of_vehicle(MODELS["harmonic"], usage=("caf\u00e9", "\ud800"))
     text = json_text(sheet)
     assert text == json_text(sheet)
     assert text.isascii()

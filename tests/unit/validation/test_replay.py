@@ -18,7 +18,7 @@ from cpfls_cli.validation.bands import physical_sense
 from cpfls_cli.validation.evidence import MODEL, Evidence
 from cpfls_cli.validation.replay import NOTHING_MOVES, replay_steps
 from cpfls_cli.validation.trust import Trust
-from cpfls_cli.validation.verdict import Reason, Verdict, _band, beside_loop, confirmed_axes, region_in_words
+from cpfls_cli.validation.verdict import Reason, Verdict, _band, confirmed_axes, region_in_words, with_loop
 from tests.builders.flights import rigid_torque, rotating_motion, still_flight
 
 INERTIA = np.array([0.6, 0.8, 1.2, 0.0, 0.0, 0.0])
@@ -164,7 +164,7 @@ def test_without_windows_torque_decides():
 @pytest.mark.parametrize("by_past", [False, True])
 @pytest.mark.parametrize("label", [Trust.CONTROL, Trust.INSIDE, Trust.RIGID_BODY])
 def test_no_model_of_flights_that_show_the_loop_is_good(label, by_past):
-    found = beside_loop(Verdict(label, "", (Reason("better", 1),)), LOOP, by_past=by_past)
+    found = with_loop(Verdict(label, "", (Reason("better", 1),)), LOOP, by_past=by_past)
     assert found.label == Trust.LOOP
     assert "50 % of roll, 80 % of pitch" in found.reasons[0].text
     assert ("The past identifies roll and pitch" in found.reasons[0].text) is by_past
@@ -172,14 +172,14 @@ def test_no_model_of_flights_that_show_the_loop_is_good(label, by_past):
 
 
 def test_a_loop_does_not_save_what_is_not_to_be_used():
-    found = beside_loop(Verdict(Trust.DO_NOT_USE, "", (Reason("no body", -1),)), LOOP)
+    found = with_loop(Verdict(Trust.DO_NOT_USE, "", (Reason("no body", -1),)), LOOP)
     assert (found.label, found.reasons[0].text, len(found.reasons)) == (Trust.DO_NOT_USE, "no body", 2)
 
 
 @pytest.mark.parametrize("loop", [None, LOOP._replace(explained=np.array([0.95, 0.95, 0.1]))])
 def test_flights_that_explain_roll_and_pitch_leave_the_verdict(loop):
     found = Verdict(Trust.INSIDE, "", (Reason("better", 1),))
-    assert beside_loop(found, loop) is found
+    assert with_loop(found, loop) is found
 
 
 def test_the_band_of_a_moment_is_no_narrower_than_instruments_know_it():
