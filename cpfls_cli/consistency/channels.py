@@ -18,6 +18,7 @@ SAME = 0.9  # Correlation that noise does not reach over a flight.
 _OTHER = 0.5  # Correlation that noise does not hide where the motion is worth a look.
 TWICE = 2.0  # Ratio of two sizes that neither noise nor a filter makes: at a correlation of 0.6 noise makes up to 1.7.
 BODY_AXES = ("x (roll)", "y (pitch)", "z (yaw)")
+"""Names of the body axes in figures and sentences."""
 TURNING_RAD_S, _TURNING_SHARE = 0.1, 0.1
 """Standard deviation from which on an axis is judged, also as a share of that of the axis which turns most: about one
 that hardly turns, errors of the others decide."""

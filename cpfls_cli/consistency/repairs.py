@@ -13,7 +13,7 @@ from cpfls_cli.result import About, about
 from cpfls_cli.words import capitalised
 
 UP = np.array([0.0, 0.0, 1.0])
-"""Of the world."""
+"""Unit vector upwards, world frame."""
 _SAME = 1e-6
 """Share of an acceleration up to which it is the one made of the accelerometer: the import computes it as here."""
 

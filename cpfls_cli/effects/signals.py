@@ -222,6 +222,10 @@ class Signals:
         """Radius of each propeller, shape (rotor,), m."""
         return np.array([rotor.radius_m for rotor in self.vehicle.rotors], dtype=float)
 
+    def __getstate__(self) -> dict[str, object]:
+        """Leave what was made of the flight to whoever gets a copy: it holds references, which no process can send."""
+        return {name: value for name, value in self.__dict__.items() if name != "made"}
+
     def once(self, key: Hashable, make: Callable[[], _T]) -> _T:
         """Make what follows from the flight, or give what was made before: no stage of a workflow makes it again.
 

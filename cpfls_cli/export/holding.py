@@ -240,7 +240,7 @@ def require_two_each_way(model: VehicleModel, target: str) -> None:
 
 
 def identified_of(model: VehicleModel) -> InertiaFunctions | None:
-    """Give the identified model that an inertia over attitude is that of; None for a constant inertia."""
+    """Give the identified model whose inertia depends on the attitude; None for a constant inertia."""
     assert model.fuzzy is None or isinstance(model.fuzzy, InertiaFunctions), "no other depends on the attitude"
     return model.fuzzy
 

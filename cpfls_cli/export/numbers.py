@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from itertools import combinations_with_replacement, product
+from types import MappingProxyType
 
 import numpy as np
 
@@ -116,15 +117,23 @@ def _weighed(wrench: Vector, rotors: int) -> Array:
 
 
 _MOVING = {each for factors in TERMS for each in factors}
-_KNOWN = ("", *_AXES, "|u|", "|p|", "|q|", "|r|")
-_FACTORS = np.transpose([[_KNOWN.index(each) for each in (*factors, "", "")[:2]] for factors in TERMS])
+_FACTOR_NAMES = ("", *_AXES, "|u|", "|p|", "|q|", "|r|")
+_FACTORS = np.transpose(
+    [[_FACTOR_NAMES.index(each) for each in (*factors, *[""] * (2 - len(factors)))] for factors in TERMS]
+)
 """Places of both factors of each term; of one, or of none, others are 1."""
 
 
 @lru_cache(maxsize=8)
-def weights_by_part(model: VehicleModel) -> dict[str, Array]:
-    """Weigh the terms of all parts of a model, see `weights_of`; remembered, for each target asks several times."""
-    return weights_of(model.parts, model.vehicle)
+def weights_by_part(model: VehicleModel) -> Mapping[str, Array]:
+    """Weigh the terms of all parts of a model, see `weights_of`; cached, because each target asks for it several times.
+
+    Nobody may write to it.
+    """
+    weights = weights_of(model.parts, model.vehicle)
+    for each in weights.values():
+        each.setflags(write=False)
+    return MappingProxyType(weights)
 
 
 def weights_of_model(model: VehicleModel) -> Array:

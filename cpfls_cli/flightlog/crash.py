@@ -272,8 +272,10 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     troubled, hits, strained = (first + np.flatnonzero(own) for own in marked)
     stops = _stops_in_the_air(signs, after)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
+    # What falls since its rotors stopped hits the ground later.
+    lost = lost and not (stops and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S)
     # Who flips and lands, or ends the log in a flip, has lost nothing.
-    if lost and (lies_then or _ignores_rotors(signs, part, int(troubled[0]))):
+    if lost and (len(hits) or lies_then or _ignores_rotors(signs, part, int(troubled[0]))):
         return _crash(signs, troubled, hits, strained)
     if rests_then:
         return {"rests with its rotors on": after}
@@ -283,7 +285,7 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
         size = np.zeros(0) if signs.felt is None else np.linalg.norm(signs.felt, axis=1)
         least = max(HARD, BEYOND * float(size[slice(*part)].max(initial=0.0)))
         struck += (after + np.flatnonzero(size[after : after + round(_LIES_S / signs.period)] > least)).tolist()
-        return {"rotors stop in the air": after} | ({"impact": struck[0]} if struck else {})
+        return {"rotors stop in the air": after} | ({"impact": min(struck)} if struck else {})
     return {}
 
 

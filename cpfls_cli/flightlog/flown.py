@@ -21,12 +21,15 @@ _SHORT_S = 1.0  # Shorter pauses are part of a flight, and shorter flights none.
 _OF_HEIGHT, _LEAST_HEIGHT = 0.1, 0.05  # Above the ground it flies: as a share of the highest, and in m.
 _CLIMBS_M_S = 0.2  # Rate at which no estimate of height drifts for long.
 _MARGIN_S = 0.5  # Left out after take-off and before landing, where the ground pushes.
-# Below the first rate of all a vehicle does not turn; means of rates, rad/s, and of forces, in weights, that nothing on
-# the ground has, and how far those of noise may be beyond what its number of samples makes them.
-_STILL_RAD_S, _SOFT_RAD_S, _PUSHED, _OF_NOISE = 0.005, 0.02, 0.03, 1.3
-# Rate of an estimated height on the ground at most, and its range where no force changes; range of leans that no
-# estimate has there, and of heights, m, and leans, rad, that no hover keeps to.
-_DRIFTS_M_S, _DRIFTS_M, _FAR_RAD, _UNMOVED = 0.12, 1.0, 0.2, 0.01
+_STILL_RAD_S = 0.005  # Rate below which a vehicle does not turn.
+_SOFT_RAD_S = 0.02  # Slow rates, and
+_PUSHED = 0.03  # slow forces in weights, that nothing on the ground has;
+_RANGE = 6.0  # Of means of noise over a log, in their standard deviations;
+_OF_NOISE = 1.3  # how far those of noise may be beyond what its number of samples makes them.
+_DRIFTS_M_S, _DRIFTS_M = 0.12, 1.0  # Rate and range of an estimated height on the ground at most.
+_FAR_RAD = 0.2  # Range of leans that no estimate has there.
+_UNMOVED, _STILL_M = 0.01, 0.3  # Ranges of height, m, and lean, rad, that no hover keeps to; of a height that drifts.
+_ABOVE_IDLE = 1.2  # Times the level at which rotors idle amid a flight.
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
 # vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
 _SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
@@ -209,6 +212,7 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         if felt is None:
             # Once off the ground it hovers at the usual level of a flight, which its flips and climbs are above.
             flight = smoothed(carrying, signs.period, _LONGEST_CUT_S)
+            flight &= level > _ABOVE_IDLE * (np.quantile(level[flight], 0.05) if flight.any() else np.inf)
             carrying[first:] |= level[first:] > _OF_HOVER * (np.median(level[flight]) if flight.any() else hover)
     return smoothed(carrying, signs.period, _SHORT_S)
 
@@ -257,13 +261,16 @@ def _still(signs: Signs, active: BoolArray) -> bool:
     that it would be felt.
     """
     if signs.rate is None:
-        height = signs.height
-        return height is not None and max(float(np.ptp(height[active])), _leans(signs, active)) < _UNMOVED
+        rises = np.inf if signs.height is None else float(np.ptp(signs.height[active]))
+        level = signs.upright is not None and _leans(signs, active) < _UNMOVED
+        return rises < (_STILL_M if level else _UNMOVED)
     if _moves(signs.rate, active, signs.period, (_SOFT_RAD_S, LIVELY_RAD_S)) or _climbs(signs, active):
         return False
-    if signs.felt is None:
-        return _leans(signs, active) < _FAR_RAD
-    return not _moves(signs.felt, active, signs.period, (_PUSHED, np.inf))
+    # Leans say more than a gyroscope that reads next to nothing.
+    dead = np.sqrt((signs.rate[active] ** 2).sum(axis=1).mean()) < _STILL_RAD_S
+    if (dead or signs.felt is None) and _leans(signs, active) >= _FAR_RAD:
+        return False
+    return signs.felt is None or not _moves(signs.felt, active, signs.period, (_PUSHED, np.inf))
 
 
 def _moves(values: Array, active: BoolArray, period: float, sizes: tuple[float, float]) -> bool:
@@ -277,16 +284,21 @@ def _moves(values: Array, active: BoolArray, period: float, sizes: tuple[float, 
 
 def _climbs(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a height changes faster and farther than it drifts, by accelerations that are felt."""
-    second = max(1, round(1 / signs.period))
-    if signs.height is None or len(active) <= 2 * second:
+    second, edge = (max(1, round(seconds / signs.period)) for seconds in (1.0, SLOW_S))
+    if signs.height is None or len(active) <= 2 * (second + edge):
         return False
-    span, height, pushed = second * signs.period, averaged(signs.height, signs.period, SLOW_S), np.inf
-    if signs.felt is not None:
-        pushed = float(np.ptp(averaged(signs.felt, signs.period, SLOW_S)[active], axis=0).max())
-    rates = np.where(active[second:] & active[:-second], height[second:] - height[:-second], np.nan) / span
+    # Means at the ends of a log would bend a steady climb.
+    span, height = second * signs.period, averaged(signs.height, signs.period, SLOW_S)[edge:-edge]
+    there = active[edge:-edge]
+    rates = np.where(there[second:] & there[:-second], height[second:] - height[:-second], np.nan) / span
     needed = np.nanmax(np.abs(rates[second:] - rates[:-second]), initial=0.0) / span / STANDARD_GRAVITY
-    far = pushed > _PUSHED or float(np.ptp(height[active])) > _DRIFTS_M
-    return bool(far and np.nanmax(np.abs(rates), initial=0.0) > _DRIFTS_M_S and needed < max(pushed, _PUSHED))
+    pushed = np.inf
+    if signs.felt is not None:
+        slow = averaged(signs.felt, signs.period, SLOW_S)
+        shakes = (signs.felt - slow)[active].std(axis=0) / np.sqrt(edge)
+        pushed = float((np.ptp(slow[active], axis=0) - _RANGE * shakes).max())
+    far = pushed > _PUSHED or (there.any() and np.ptp(height[there]) > _DRIFTS_M)
+    return bool(far and needed < max(pushed, _PUSHED) and np.nanmax(np.abs(rates), initial=0.0) > _DRIFTS_M_S)
 
 
 def _held(signs: Signs, active: BoolArray) -> str:

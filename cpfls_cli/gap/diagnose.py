@@ -284,8 +284,8 @@ def _significant(named: _Named, given: Instruments) -> _Named:
         fit = fewer
     loose = tuple(effect.name for effect in unidentified(fit, found))
     sure = {each.effect.name: chance for each, chance in kept if np.isfinite(chance)}
-    by_them = named.judgement._replace(found=found)
-    return named._replace(judgement=by_them, refusals=refusals, sure=sure, unidentified=loose)
+    judgement = named.judgement._replace(found=found)
+    return named._replace(judgement=judgement, refusals=refusals, sure=sure, unidentified=loose)
 
 
 def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Named:

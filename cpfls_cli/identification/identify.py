@@ -19,7 +19,7 @@ from cpfls_cli.identification.findings import AXES, FitDiagnostics, axis_evidenc
 from cpfls_cli.identification.judge import Baseline, fit_baselines, score_of
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.samples import Ready, Samples
-from cpfls_cli.identification.search import UNWATCHED, Front, NothingFoundError, SearchRun, StopReason, is_end, search
+from cpfls_cli.identification.search import UNWATCHED, Front, SearchRun, StopReason, is_end, search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import Fit, RidgeCurve, Solver, with_folds
 from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
@@ -106,7 +106,7 @@ def identify(
     result = search(evaluator, settings, rng, run, kept)
     solved = _solve(evaluator, training, result.front.chromosomes[result.front.chosen])
     if solved is None:
-        raise NothingFoundError(result.stop_reason)
+        raise ComputationError("no chromosome gave a finite model; perhaps nothing moves in the data")
     model, fit, system = solved
     baselines = fit_baselines(source_of(freed, training, learned)[1], fit.row_scale, settings.rank_tolerance)
     predictors = {"model": model.torque} | {baseline.name: baseline.torque for baseline in baselines}

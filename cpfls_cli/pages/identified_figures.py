@@ -113,7 +113,7 @@ def _draw_ridge(r: IdentifiedModel, figure: Figure) -> None:
 
 
 def residuals_of(r: IdentifiedModel) -> ResidualAnalysis:
-    """Give what templates and figures ask for only of models that hold it."""
+    """Give the residual analysis; asked only of models that hold one."""
     assert r.residuals is not None, "asked only of models that hold them"
     return r.residuals
 

@@ -157,7 +157,7 @@ def of_other_autopilots(flights: Sequence[FlightNumbers], *, thrusts: bool) -> t
 
 
 def without_voltage(which: str) -> str:
-    """Say of which flights by commands the voltage of the battery is not known, and why it is asked for."""
+    """Say of which flights by commands the voltage of the battery is not known, and why it matters."""
     return (
         f"without the battery's voltage: {which}; an emptier battery looks like a heavier vehicle, so name "
         "import.signals.voltage"

@@ -340,8 +340,11 @@ def unit_of(vector: Array, measure: Measure) -> tuple[float, Array]:
     return largest * length, unit / length
 
 
-def smooth(moves: tuple[Move, ...], directions: Array) -> MoveInSpace:
-    """Refuse moves of unbounded snap, from which the acceleration of the attitude follows."""
+def checked_move(moves: tuple[Move, ...], directions: Array) -> MoveInSpace:
+    """Make a move in space of planned moves along directions, shape (move, 3).
+
+    `SettingError` where one has no solution, or an unbounded snap, from which the acceleration of the attitude follows.
+    """
     for move in moves:
         if not move.outcome.solved:
             raise SettingError("limits", move.outcome.words)

@@ -15,7 +15,7 @@ from typing_extensions import Doc
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import SettingError
 from cpfls_cli.settings import Settings
-from cpfls_cli.trajectory.legs import MoveInSpace, plan_move, smooth, synchronised, unit_of
+from cpfls_cli.trajectory.legs import MoveInSpace, checked_move, plan_move, synchronised, unit_of
 from cpfls_cli.trajectory.profile import BaseProfile, Holds, LimitSettings, covering
 
 _LARGEST_PEAK = 1e100
@@ -437,7 +437,7 @@ class TrajectorySettings(Settings):
             profile = covering(length, self.period or _USUAL_PERIOD, self.holds)
             return MoveInSpace(profiles=(profile,), directions=direction[None])
         if self.coordination == "straight-line":
-            return smooth((plan_move(length, self.limits.along(direction), self.period),), direction[None])
+            return checked_move((plan_move(length, self.limits.along(direction), self.period),), direction[None])
         axes = np.flatnonzero(vector)
         moves = synchronised(vector[axes], self.limits.of_axes(axes), self.period)
-        return smooth(moves, np.eye(3)[axes])
+        return checked_move(moves, np.eye(3)[axes])

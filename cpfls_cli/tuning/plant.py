@@ -115,10 +115,10 @@ class HoverPlant:
 
 
 def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, rotor_lag: float) -> HoverPlant:
-    """Linearise a vehicle in hover, or a model in its place, by the machine that flies it.
+    """Linearise a vehicle in hover, or a model in its place, by the equations that fly it.
 
     `rotor_lag`: of speeds behind commands, s, where the model does not say. `ComputationError` where full thrust does
-    not carry the weight.
+    not carry the weight, or idling rotors do.
     """
     held, effects = with_effects(model, SimulatedEffects())
     flown = vehicle if held is None else held.vehicle
@@ -153,7 +153,7 @@ def _hover_share(flown: Vehicle, held: VehicleModel | None, motors: Motors) -> f
     # Slow to load for who reads gains alone.
     from scipy.optimize import brentq
 
-    start = np.array((0.0,) * VEHICLE_STATES + flown.start)
+    start, numbers = np.array((0.0,) * VEHICLE_STATES + flown.start), "mass_kg, thrust_factor_n_s2"
 
     def climb(share: float) -> float:
         speed = np.full(len(motors.mix), motors.speed_at(share))
@@ -161,8 +161,11 @@ def _hover_share(flown: Vehicle, held: VehicleModel | None, motors: Motors) -> f
 
     if climb(1.0) <= 0:
         raise ComputationError(
-            "vehicle: full thrust does not carry the weight; correct mass_kg, thrust_factor_n_s2 or "
-            "rotor_speed_max_rad_s"
+            f"vehicle: full thrust does not carry the weight; correct {numbers} or rotor_speed_max_rad_s"
+        )
+    if climb(0.0) >= 0:
+        raise ComputationError(
+            f"vehicle: rotors that idle carry more than the weight; correct {numbers} or rotor_speed_max_rad_s"
         )
     return float(brentq(climb, 0.0, 1.0, xtol=1e-15))
 

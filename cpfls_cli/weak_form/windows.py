@@ -58,7 +58,10 @@ class Windows:
         return np.concatenate([first + self.hop * np.arange(count) for first, count in counts])
 
     def modulated(self, frequency: float | Array) -> Self:
-        """Shift windows to a frequency, Hz, ``phi(t) exp(-2 pi i f t)``; to several, the columns of the weights."""
+        """Shift windows to a frequency, Hz: ``phi(t) exp(-2 pi i f t)``, complex.
+
+        Of several frequencies weight and slope have shape (sample, frequency).
+        """
         turn = 2j * np.pi * np.asarray(frequency)
         phase = np.exp(-self.period * np.multiply.outer(turn, np.arange(len(self.weight))))
         slope = self.slope - np.multiply.outer(turn, self.weight)

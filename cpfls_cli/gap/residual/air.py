@@ -117,11 +117,10 @@ def known_motion(flights: Sequence[Signals]) -> Instruments:
     Flights that were asked to stay where they are, and did, were asked for nothing that moves.
     """
     # A flight that holds itself would be freed only by the garbage collector.
-    return flights[0].once((known_motion, *map(ref, flights)), lambda: moved_from_outside(flights))
+    return flights[0].once((known_motion, *map(ref, flights)), lambda: _known_motion(flights))
 
 
-def moved_from_outside(recorded: Sequence[Signals]) -> Instruments:
-    """Find it anew; see `known_motion`."""
+def _known_motion(recorded: Sequence[Signals]) -> Instruments:
     flights = [LoggedFlight.of(each).playback for each in recorded]
     given = instruments(flights)
     if given.kind == "none" and all(held(flight) for flight in flights):

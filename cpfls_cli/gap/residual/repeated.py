@@ -15,7 +15,7 @@ from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import System, negligible, residual_along
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
-from cpfls_cli.gap.residual.air import moved_from_outside
+from cpfls_cli.gap.residual.air import known_motion
 from cpfls_cli.gap.settings import COUNTS
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.balances import BANDS, BANDS_HZ, band_windows, fitting_bands
@@ -222,7 +222,7 @@ class RepeatedRuns:
         are any.
         None where no flight repeats another.
         """
-        given = moved_from_outside(recorded)
+        given = known_motion(recorded)
         pairs = [
             pair
             for path in given.repeats.paths()

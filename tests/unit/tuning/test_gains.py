@@ -161,9 +161,12 @@ def test_lag_and_delay_of_a_model_of_commands_are_those_of_the_rotors():
         assert (axis.lag, axis.delay) == pytest.approx(expected)
 
 
-def test_a_vehicle_that_its_rotors_do_not_carry_is_refused():
-    with pytest.raises(ComputationError, match="does not carry the weight"):
-        hover_plant(AUTOPILOTS["px4"].law(), replace(CROSS, mass_kg=5.0), None, 0.03)
+@pytest.mark.parametrize(
+    ("mass_kg", "why"), [(5.0, "full thrust does not carry the weight"), (0.05, "rotors that idle carry more")]
+)
+def test_a_vehicle_that_hovers_nowhere_between_idle_and_full_thrust_is_refused(mass_kg, why):
+    with pytest.raises(ComputationError, match=why):
+        hover_plant(AUTOPILOTS["ardupilot"].law(), replace(CROSS, mass_kg=mass_kg), None, 0.03)
 
 
 def test_intervals_become_the_corners_of_the_plant():
