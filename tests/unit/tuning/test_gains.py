@@ -9,7 +9,7 @@ import pytest
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.tuning.gains import AskedMargins, proposal_of, with_filters
 from cpfls_cli.tuning.margins import (
@@ -150,6 +150,25 @@ def test_a_rigid_vehicle_in_hover_turns_as_its_allocation_says(name):
         changed[axis] = torque[axis] / CROSS.inertia_kg_m2[axis]
     assert [each.gain for each in hover.axes] == pytest.approx(list(changed.values()), rel=1e-4)
     assert all((each.lag, each.delay, each.slow) == (0.03, 0.0, 0.0) for each in hover.axes)
+
+
+def test_slow_actuation_damping_and_accelerating_rotors_are_those_of_their_formulas():
+    law, plain = AUTOPILOTS["px4"].law(), hover_plant(AUTOPILOTS["px4"].law(), CROSS, None, 0.03)
+    inertia, damping, rotor, slow = np.array(CROSS.inertia_kg_m2[:3]), np.array([1e-3, 2e-3, 3e-3]), 2e-5, (-0.4, 0.3)
+    effects = (ModelEffect("linear_damping", {}, damping), ModelEffect("rotor_acceleration", {}, np.array([rotor])))
+    model = VehicleModel(
+        vehicle=CROSS, response=RotorResponse(slow_roll_pitch=slow[0], slow_yaw=slow[1]), effects=effects
+    )
+    hover = hover_plant(law, CROSS, model, 0.03)
+    share, gain = np.array([slow[0], *slow]), np.array([axis.gain for axis in plain.axes])
+    assert [axis.damping for axis in hover.axes] == pytest.approx(list(damping / inertia))
+    # What comes back slowly is missing at once.
+    assert [axis.gain for axis in hover.axes] == pytest.approx(list((1 - share) * gain))
+    assert [axis.slow for axis in hover.axes] == pytest.approx(list(share * gain))
+    # Yaw torque k_d w^2 and J_r dw/dt of each rotor have one sign.
+    speed = hover.signal * CROSS.rotor_speed_max_rad_s
+    yaw = gain[2] * rotor / (2 * CROSS.rotors[0].drag_factor_n_m_s2 * speed)
+    assert [axis.by_acceleration for axis in hover.axes] == pytest.approx([0.0, 0.0, yaw])
 
 
 def test_lag_and_delay_of_a_model_of_commands_are_those_of_the_rotors():
