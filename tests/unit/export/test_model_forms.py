@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
+from cpfls_cli.export.holding import Held
 from cpfls_cli.export.json_form import json_text
 from cpfls_cli.export.numbers import motion_terms, weights_of
 from cpfls_cli.export.points import parts_along, reference_points
@@ -176,6 +177,8 @@ def test_weights_are_those_of_the_parts(vehicle):
     for name, own in weights.items():
         found = np.einsum("rtu,nt,nu->nr", own, terms, points.rotor)
         assert np.abs((found - parts[name]) / points.scale).max() < 1e-12
+    everything = Held.whole(model).wrench(points.air, points.rate, points.rotor)
+    assert np.abs((everything - sum(parts.values())) / points.scale).max() < 1e-12
 
 
 @pytest.mark.parametrize("work", [lambda x: 1 / x, lambda x: x > 0, lambda x: x**0.5, lambda x: x / x])

@@ -1,6 +1,7 @@
 """Flights for playback keep what their stretches know."""
 
 import gc
+import pickle
 from typing import Any
 from weakref import ref
 
@@ -53,3 +54,9 @@ def test_flights_are_freed_when_nobody_uses_them_any_more() -> None:
         assert [each() for each in freed] == [None] * 3
     finally:
         gc.enable()
+
+
+def test_a_copy_of_a_flight_has_nothing_that_was_made_of_it() -> None:
+    logged = [_part(0, 200), _part(300, 200)]
+    known_motion(logged)
+    assert "made" not in vars(pickle.loads(pickle.dumps(logged[0])))
