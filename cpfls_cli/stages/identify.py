@@ -1,4 +1,4 @@
-"""Identify a model from one or more flights and judge it beside its baselines."""
+"""Identify a model from one or more flights and compare it with its baselines."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def simulate(
             "--model",
             metavar="MODEL",
             help="Fly this model of `cpfls identify`, `extend` or `vehicle` in closed loop in place of the vehicle of "
-            "the config. Effects given come on top. Along a FLIGHT: fly it beside the vehicle of the config.",
+            "the config. Effects given come on top. Along a FLIGHT: fly both it and the vehicle of the config.",
         ),
     ] = None,
     mode: Annotated[
@@ -109,7 +109,7 @@ def simulate(
         bool,
         typer.Option(
             "--gusts",
-            help="Fly in the gusts that the model of `cpfls vehicle` holds, in closed loop. Along a FLIGHT: beside it "
+            help="Fly in the gusts that the model of `cpfls vehicle` holds, in closed loop. Along a FLIGHT: with it "
             "fly vehicles that the model allows, each in gusts of its own, to see what gusts explain.",
         ),
     ] = False,

@@ -162,7 +162,7 @@ def shares_in_words(shares: Sequence[Share], first: int) -> str:
     if named + learned == 0:
         return "the rotors alone"
     share = learned**2 / (named**2 + learned**2)
-    return f"named {percent(1 - share)}, learned {percent(share)} (squares, beside the rotors)"
+    return f"named {percent(1 - share)}, learned {percent(share)} (squares, without the rotors)"
 
 
 WORDS: Mapping[str, Any] = {
@@ -378,7 +378,7 @@ def _require_rotors(flight: LoggedFlight) -> None:
     if flight.playback.wrench is not None:
         raise InputError(
             f"{flight.name}: holds torque instead of rotor speeds; `cpfls vehicle` needs rotor_speed or rotor_command, "
-            "or thrust beside body_torque, of four rotors with known factors: name their columns in import.signals"
+            "or thrust with body_torque, of four rotors with known factors: name their columns in import.signals"
         )
 
 

@@ -35,7 +35,7 @@ class AxisPlant:
     by_acceleration : float, rad/s
         b_a: by the acceleration of the rotors, which carry angular momentum.
     slow, slow_s : float, rad/s^2 and s
-        b_s and T_s: what comes slowly beside `gain`.
+        b_s and T_s: what comes slowly on top of `gain`.
     damping : float, 1/s
     lag, delay : float, s
         tau and d: of the rotors behind the command.
