@@ -14,6 +14,9 @@ from cpfls_cli.errors import InputError
 SPEED_UNITS = frozenset({"rad/s", "rpm"})
 """Units in which a rotor command is a speed."""
 
+RPM: Final = 30 / pi
+"""Revolutions a minute of 1 rad/s."""
+
 STANDARD_GRAVITY: Final = 9.80665
 """m/s^2, by definition; scipy.constants takes 0.1 s to load."""
 

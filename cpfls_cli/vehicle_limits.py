@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.units import STANDARD_GRAVITY
+from cpfls_cli.units import RPM, STANDARD_GRAVITY
 
 Figures = Mapping[str, float]
 """Numbers of a vehicle in SI by the names of `_QUANTITIES`, NaN for what is not known; ``room`` is `room_between` its
@@ -225,16 +225,15 @@ class _Quantity(NamedTuple):
     units: Mapping[str, float]
 
 
-_PER_RPM = (30 / pi) ** 2
 _LENGTHS = {"mm": 1e-3, "cm": 1e-2, "inches": 0.0254}
 _QUANTITIES: Mapping[str, _Quantity] = {
     "mass": _Quantity("a mass", "kg", {"g": 1e-3}),
     "arm": _Quantity("an arm", "m", _LENGTHS),
     "radius": _Quantity("a radius", "m", _LENGTHS),
     "inertia": _Quantity("an inertia", "kg m^2", {"kg cm^2": 1e-4, "g m^2": 1e-3, "kg mm^2": 1e-6, "g cm^2": 1e-7}),
-    "thrust_factor": _Quantity("a factor", "N s^2", {"N/rpm^2": _PER_RPM}),
-    "drag_factor": _Quantity("a factor", "N m s^2", {"N m/rpm^2": _PER_RPM}),
-    "speed_max": _Quantity("a speed", "rad/s", {"rpm": pi / 30}),
+    "thrust_factor": _Quantity("a factor", "N s^2", {"N/rpm^2": RPM**2}),
+    "drag_factor": _Quantity("a factor", "N m s^2", {"N m/rpm^2": RPM**2}),
+    "speed_max": _Quantity("a speed", "rad/s", {"rpm": 1 / RPM}),
     "gravity": _Quantity("an acceleration", "m/s^2", {}),
 }
 

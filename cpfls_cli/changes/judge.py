@@ -296,7 +296,7 @@ class _Space:
         return _total(self._posterior(rows, directions, kinds, losses)[0])
 
     def _moved(self, directions: Array, losses: IntArray) -> dict[tuple[bytes, ...], _Part]:
-        """Part numbers into such that no direction moves together, by what tells them apart.
+        """Part numbers into such that no direction moves together, by what distinguishes them.
 
         `losses`, shape (loss,): directions whose sizes are nearly always above 0.
         """

@@ -350,7 +350,7 @@ def _apart(first: Array, second: Array) -> Off:
 
 
 def sized(title: str, size: Array, floor: Array, off: Off, where: str = Missing.where) -> Missing:
-    """Tell the size of a part, its root mean square, shape (6,), N m and N, also in noise floors."""
+    """State the size of a part, its root mean square, shape (6,), N m and N, also in noise floors."""
     floors = size / floor
     largest = float(np.nanmax(floors)) if np.isfinite(floors).any() else float("nan")
     torque, force = (float(np.where(part < _ROUNDING, 0.0, part).max()) for part in (size[:3], size[3:]))

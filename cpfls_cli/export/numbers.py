@@ -27,9 +27,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import SYMBOLS
 from cpfls_cli.vehicle.values import Each, Functions, NoPolynomialError, Polynomial, Value, Vector
 
-RPM = 30 / math.pi
-"""Revolutions a minute of 1 rad/s."""
-
 _AXES = "uvwpqr"
 _PAIRS = (
     *combinations_with_replacement("uvw", 2),

@@ -293,16 +293,16 @@ def _powers(sides: Sequence[Array], given: Instruments, band: _Band, instrument_
     """Take the power of the non-repeatable residual, by block of a run."""
     left = [_left(band.waves, flight, own) for flight, own in zip(given.flown, sides, strict=True)]
     if instrument_kind == "repeats":
-        beside = [_left(band.waves, flight, given.repeats.others(n, sides)) for n, flight in enumerate(given.flown)]
+        expected = [_left(band.waves, flight, given.repeats.others(n, sides)) for n, flight in enumerate(given.flown)]
     elif instrument_kind == "setpoints":
-        beside = _expected(given, left, band)
+        expected = _expected(given, left, band)
     else:
-        beside = [np.zeros_like(own) for own in left]
+        expected = [np.zeros_like(own) for own in left]
     period = given.flown[0].motion.period
     seen = sum(len(own) for own in left) * band.pieces.hop * period
     block_s = block_length(seen, _PIECE_S, BLOCK_S, _BLOCKS)
     sums, count, each_left = [], [], []
-    for flight, own, known in zip(given.flown, left, beside, strict=True):
+    for flight, own, known in zip(given.flown, left, expected, strict=True):
         there = np.isfinite(known).all(axis=(1, 2))
         both = np.stack([(own * np.conj(own - known)).real[there], np.abs(own[there]) ** 2], axis=1)
         block = (band.pieces.middles(flight.stretches)[there] - len(band.pieces.weight) // 2) * period // block_s

@@ -12,7 +12,7 @@ for there the torques of the rotors cancel. The whole curve is corrected.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi, sqrt
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +21,8 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.simulators.document import Stated
 from cpfls_cli.simulators.literals import Numbers, toml_numbers
 from cpfls_cli.simulators.model import GRAVITY, Rotor, SimulatorModel, of_one_body
+from cpfls_cli.units import RPM
 
-_RPM = 30 / pi
 CANNOT = (
     "its centre of mass, and how high its rotors are: mixing_matrix and L are in the plane of that",
     "what differs between its rotors: it has one curve for all",
@@ -70,10 +70,10 @@ def _rotors(numbers: Numbers, name: str, weight: float) -> tuple[tuple[Rotor, ..
     )
     hover = _speed_at(thrust, weight / count)
     limit = numbers.get(name, "thrust_max")
-    most = None if limit is None else Stated(_speed_at(thrust, limit.value) / _RPM, f"{limit.where}, by rpm2thrust")
+    most = None if limit is None else Stated(_speed_at(thrust, limit.value) / RPM, f"{limit.where}, by rpm2thrust")
     drags = [numbers.need(name, "drag_matrix", axis, axis) for axis in range(2)]
     ends = [Stated(each.value, each.where, each.span, name=each.name) for each in drags]
-    along = -count * hover / _RPM
+    along = -count * hover / RPM
     drag = replace(ends[0], value=ends[0].value / along, scale=along, also=(ends[1],))
     rotors = tuple(
         Rotor(
@@ -116,7 +116,7 @@ def _square(curve: list[Stated], hover: float, *, slope: bool = False) -> Stated
     """Give the factor of squared speed in rad/s that has the value of a curve in hover, or its slope."""
     still, linear, square = (each.value for each in curve)
     whole = still + linear * hover if not slope else linear * hover / 2
-    value, main = (square + whole / hover**2) * _RPM**2, curve[2]
+    value, main = (square + whole / hover**2) * RPM**2, curve[2]
     if not value > 0:
         raise InputError(f"{main.where}: the curve is not above 0 in hover; correct it there")
     rest = tuple(each for each in curve[:2] if each.value != 0)

@@ -23,8 +23,8 @@ from cpfls_cli.simulators.document import Node, Stated, read_xml
 from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, part_of, pose, turning
 from cpfls_cli.simulators.sdf import CANNOT as CANNOT_OF_PLUGINS
 from cpfls_cli.simulators.sdf import MOTOR, in_order, no_motor, not_in_file, rotor_of, text_of
+from cpfls_cli.units import RPM
 
-RPM = 30 / np.pi
 GRAVITY = 9.8
 """Of gym-pybullet-drones, in whose weight `thrust2weight` counts."""
 _PROPELLER = re.compile(r"prop(\d+)_link")

@@ -18,10 +18,11 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, require_four
-from cpfls_cli.export.numbers import RPM, Numbers, numbers_of, places, spins
+from cpfls_cli.export.numbers import Numbers, numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.text import comment_lines, in_json
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.units import RPM
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -18,12 +18,13 @@ import numpy as np
 from cpfls_cli.arrays import IntArray
 from cpfls_cli.effects.scales import arm
 from cpfls_cli.export.holding import FOUR, Held, Holds, constant_body, held_by, of_a_body, require_two_each_way
-from cpfls_cli.export.numbers import RPM, numbers_of, places, spins
+from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.simulators.urdf import add_body, add_point
 from cpfls_cli.export.text import xml_text, yaml_text
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.units import RPM
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 

@@ -16,7 +16,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.scales import arm
 from cpfls_cli.export.holding import FOUR, Held, Holds, constant_body, held_by, of_a_body, require_two_each_way
-from cpfls_cli.export.numbers import RPM, numbers_of, places, spins
+from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import written
 from cpfls_cli.export.text import number, xml_text
@@ -25,6 +25,7 @@ from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Course, fly_body
 from cpfls_cli.simulators.model import ENTRIES
+from cpfls_cli.units import RPM
 from cpfls_cli.vehicle.motion import Instant, Wrench
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import scaled
