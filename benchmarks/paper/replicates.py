@@ -9,8 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.identification.identify import Identification
-from cpfls_cli.identification.judge import Score
+from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.identify import FoundModel
+from cpfls_cli.identification.judge import Score, score_of
 from cpfls_cli.report.source import Source
 from cpfls_cli.result import about, part, result
 from cpfls_cli.rounding import levelled
@@ -66,25 +67,27 @@ class Replicate:
     settled: int = about("generation from which on the least first objective is within 5 % of the last one")
 
 
-def replicate(seed: int, parts: Sequence[str], found: Identification | None) -> Replicate:
+def replicate(seed: int, training: TorqueSource, learned: TorqueSource, found: FoundModel | None) -> Replicate:
     """Describe one run; without a model where no chromosome gave a finite one."""
-    scores = [None if found is None or part not in found.scores else found.scores[part]["model"] for part in parts]
-    mse, max_error, relative_error = np.array(list(map(_errors, scores))).T
-    learned = _errors(None if found is None else found.learned)
-    evaluations = np.zeros(1, dtype=np.int64) if found is None else found.history.evaluations
-    best = np.zeros(1) if found is None else found.history.best[:, 0]
+    score = None if found is None else score_of(training, found.model.torque)
+    of_learned = score if found is None or len(learned) == len(training) else score_of(learned, found.model.torque)
+    result = None if found is None else found.result
+    best = np.zeros(1) if result is None else result.history.best[:, 0]
+    chosen = () if result is None else tuple(result.front.chromosomes[result.front.chosen].tolist())
+    mse, max_error, relative_error = (np.array([error]) for error in _errors(score))
+    learned_mse, learned_max_error, learned_relative_error = _errors(of_learned)
     return Replicate(
         seed=seed,
-        generations=len(evaluations) - 1,
-        evaluations=int(evaluations[-1]),
+        generations=len(best) - 1,
+        evaluations=0 if result is None else int(result.history.evaluations[-1]),
         mse=mse,
         max_error=max_error,
         relative_error=relative_error,
         condition_number=np.nan if found is None else found.system.condition_number,
-        chromosome=() if found is None else tuple(found.front.chromosomes[found.front.chosen].tolist()),
-        learned_mse=learned[0],
-        learned_max_error=learned[1],
-        learned_relative_error=learned[2],
+        chromosome=chosen,
+        learned_mse=learned_mse,
+        learned_max_error=learned_max_error,
+        learned_relative_error=learned_relative_error,
         settled=int(np.argmax(best <= (1.0 + _SETTLED) * best[-1])),
     )
 

@@ -1,7 +1,7 @@
 """Searches of several settings with several seeds each, as Table 5 and the readings of the paper compare them.
 
-A finished run is kept at once in OUTPUT.partial, and the search in progress in OUTPUT.checkpoint: stopped and started
-again with the same words it goes on from both. With another study or flight it begins anew.
+Finished runs are kept in OUTPUT.partial, and a long search in progress in OUTPUT.checkpoint: stopped and started again
+with the same words it goes on from both. With another study or flight it begins anew.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -28,14 +29,19 @@ from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.training import SplitFlights, flight_roles, split_training, uniform_regressor
 from cpfls_cli.identification.data import TRAINING, TorqueSource, gathered
-from cpfls_cli.identification.identify import Identification, identify
-from cpfls_cli.identification.search import NothingFoundError, is_end
-from cpfls_cli.inertia import six_parameters
+from cpfls_cli.identification.identify import FoundModel, find_model
+from cpfls_cli.identification.search import NothingFoundError, SearchRun, StopReason, is_end
 from cpfls_cli.reduction.survey import Survey, survey
 from cpfls_cli.reduction.training_set import Selection, reduce_streamed
 from cpfls_cli.search import Checkpoint, Resumable, StoppedSearch, Watch
 from cpfls_cli.store import Origin, read, write
 from tests.builders.reductions import beginning
+
+_AT_ONCE = 1000
+"""Chromosomes of a search that is not worth a checkpoint of its own: it takes seconds, and begins anew."""
+
+_KEPT_EVERY_S = 10.0
+"""Between two looks at finished runs that are kept: writing all of them takes as long as some runs."""
 
 
 class Compared(StrEnum):
@@ -178,18 +184,22 @@ def main(
     partial, origin = output.with_name(f"{output.name}.partial"), origin_before(study, inputs)
     nothing = Sweep(parts=(TRAINING,), complete=False, settings=tuple(each.without_runs for each in prepared))
     runs, watch = seeds * len(prepared), Watch(job, None)
-    sweep = begun(partial, origin, nothing, runs)
+    sweep, kept = begun(partial, origin, nothing, runs), time.monotonic()
     for number in range(sweep.runs, runs):
         index, own = number % len(prepared), seed + number // len(prepared)
         print(f"run {number + 1} of {runs}: {wanted[index].name}, seed {own}", file=sys.stderr)
-        checkpoint, found = run(job, prepared[index], own, split.training, inputs, watch)
-        if not is_end(found.stop_reason):
+        search, found, reason = run(job, prepared[index], own, split.training, inputs, watch)
+        last = number + 1 == runs or not is_end(reason)
+        if is_end(reason):
+            finished = replicate(own, split.training, prepared[index].learned, found)
+            sweep = sweep.with_run(index, finished, complete=number + 1 == runs)
+        if last or time.monotonic() - kept > _KEPT_EVERY_S:
+            write(partial, sweep, origin)
+            kept = time.monotonic()
+        if not is_end(reason):
             print(f"{partial}: is intact; the same command goes on", file=sys.stderr)
             raise SystemExit(130)
-        known = None if isinstance(found, NothingFoundError) else found
-        sweep = sweep.with_run(index, replicate(own, sweep.parts, known), complete=number + 1 == runs)
-        write(partial, sweep, origin)
-        checkpoint.end(found.stop_reason)
+        search.end(reason)
     partial.replace(output)
 
 
@@ -205,19 +215,21 @@ def begun(partial: Path, origin: Origin, nothing: Sweep, runs: int) -> Sweep:
 
 def run(
     job: Job, setting: Prepared, seed: int, training: TorqueSource, inputs: Mapping[str, InputFile], watch: Watch
-) -> tuple[Resumable, Identification | NothingFoundError]:
-    """Search with one seed, as `cpfls identify --seed` does; of no finite model what is raised."""
+) -> tuple[Resumable, FoundModel | None, StopReason]:
+    """Search with one seed, as `cpfls identify --seed` does, and judge no baselines; None for no finite model."""
     study = setting.study.model_copy(update={"seed": seed})
     selection = InputFile("selection", setting.without_runs.selection, Selection.FORMAT)
     checkpoint = Checkpoint.beside(job.output, origin_before(study, {**inputs, "selection": selection}))
     search = Resumable(checkpoint, left(checkpoint))
     state = search.run(watch, lambda _: None)
-    body, rng = six_parameters(study.vehicle.inertia_kg_m2), generator(study, "identify")
+    if setting.without_runs.chromosomes <= _AT_ONCE:
+        state = SearchRun(workers=state.workers, should_stop=state.should_stop)
     try:
         with settings_of("identification", study):
-            return search, identify(training, setting.learned, {}, study.identification, rng, state, body, None)
+            found = find_model(training, setting.learned, study.identification, generator(study, "identify"), state)
+            return search, found, found.result.stop_reason
     except NothingFoundError as error:
-        return search, error
+        return search, None, error.stop_reason
 
 
 def left(checkpoint: Checkpoint) -> StoppedSearch | None:

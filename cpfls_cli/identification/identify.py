@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -12,21 +12,57 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics import InertiaFunctions, not_positive_definite, vertical, visited_cells
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.evolution.engine import History
-from cpfls_cli.identification.closed_loop import freed_torque, loop_along, source_of
+from cpfls_cli.identification.closed_loop import FreedTorque, freed_torque, loop_along, source_of
 from cpfls_cli.identification.data import TRAINING, TorqueSource, axis_scale
 from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
 from cpfls_cli.identification.findings import AXES, FitDiagnostics, axis_evidence, findings, rule_excitation
 from cpfls_cli.identification.judge import Baseline, fit_baselines, score_of
 from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.samples import Ready, Samples
-from cpfls_cli.identification.search import UNWATCHED, Front, SearchRun, StopReason, is_end, search
+from cpfls_cli.identification.search import UNWATCHED, Front, SearchResult, SearchRun, StopReason, is_end, search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import Fit, RidgeCurve, Solver, with_folds
 from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.result import BODY, EULER, about, result
 
-UNIFORM = "uniform-partitions"
+MODEL, RIGID_BODY, ZERO, UNIFORM = "model", "rigid-body", "torque-zero", "uniform-partitions"
+"""Names of the model and of its baselines among the judged models."""
+
+
+class FoundModel(NamedTuple):
+    """The model that a search chose, solved in full precision, and what it was solved from."""
+
+    evaluator: Evaluator
+    freed: FreedTorque | None
+    result: SearchResult
+    model: InertiaFunctions
+    fit: Fit
+    system: LeastSquares
+
+
+def find_model(
+    training: TorqueSource,
+    learned: TorqueSource,
+    settings: IdentificationSettings,
+    rng: np.random.Generator,
+    run: SearchRun = UNWATCHED,
+    kept: TorqueSource | None = None,
+) -> FoundModel:
+    """Search for a model and solve it, as `identify` does, which then judges it; parameters are those of `identify`.
+
+    Raises
+    ------
+    ComputationError
+        If no chromosome gives a finite model.
+    """
+    freed = freed_torque(training, learned)
+    evaluator = model_evaluator(*source_of(freed, training, learned), settings)
+    result = search(evaluator, settings, rng, run, kept)
+    solved = _solve(evaluator, training, result.front.chromosomes[result.front.chosen])
+    if solved is None:
+        raise ComputationError("no chromosome gave a finite model; perhaps nothing moves in the data")
+    return FoundModel(evaluator, freed, result, *solved)
 
 
 @dataclass(frozen=True)
@@ -101,15 +137,10 @@ def identify(
     ----------
     Paper section 9; method.md sections 4, 5, 7 and 8.
     """
-    freed = freed_torque(training, learned)
-    evaluator = model_evaluator(*source_of(freed, training, learned), settings)
-    result = search(evaluator, settings, rng, run, kept)
-    solved = _solve(evaluator, training, result.front.chromosomes[result.front.chosen])
-    if solved is None:
-        raise ComputationError("no chromosome gave a finite model; perhaps nothing moves in the data")
-    model, fit, system = solved
+    found = find_model(training, learned, settings, rng, run, kept)
+    evaluator, freed, model, fit = found.evaluator, found.freed, found.model, found.fit
     baselines = fit_baselines(source_of(freed, training, learned)[1], fit.row_scale, settings.rank_tolerance)
-    predictors = {"model": model.torque} | {baseline.name: baseline.torque for baseline in baselines}
+    predictors = {MODEL: model.torque} | {baseline.name: baseline.torque for baseline in baselines}
     uniform = _solve(evaluator, training, uniform_chromosome(model.structure))
     if uniform is not None and model.structure.genes > 0:
         predictors[UNIFORM] = uniform[0].torque
@@ -118,11 +149,11 @@ def identify(
         part: {name: score_of(data, torque) for name, torque in predictors.items()} for part, data in parts.items()
     }
     # How much of the fuzzy part alone the samples determine beyond their noise.
-    noise = float(np.sqrt(min(np.mean(scores[TRAINING][name].mse) for name in ("model", baselines[0].name))))
+    noise = float(np.sqrt(min(np.mean(scores[TRAINING][name].mse) for name in (MODEL, baselines[0].name))))
     inertia = float(np.mean(np.abs(baselines[0].parameters[:3])))
     diagnostics = FitDiagnostics(
         fit=fit,
-        system=system,
+        system=found.system,
         excitation=rule_excitation(evaluator.solver.learned, model.partitions, noise, inertia, settings.rank_tolerance),
         axes=axis_evidence(training, settings.rank_tolerance),
         rigid_body=baselines[0].parameters,
@@ -132,13 +163,13 @@ def identify(
         outside={part: _count(data, model.outside) for part, data in parts.items()},
         vertical={part: _count(data, vertical) for part, data in parts.items()},
         scores=scores,
-        learned=scores[TRAINING]["model"] if len(learned) == len(training) else score_of(learned, model.torque),
+        learned=scores[TRAINING][MODEL] if len(learned) == len(training) else score_of(learned, model.torque),
         freed=freed,
         loop=loop_along(training, model.torque) if freed is None or freed.instrument_kind == "past" else None,
     )
     return Identification(
         **vars(diagnostics),
-        **vars(result),
+        **vars(found.result),
         model=model,
         ridge=evaluator.solver.curve(model.partitions),
         baselines=baselines,
@@ -195,9 +226,6 @@ def _solve(
 def _count(source: TorqueSource, flag: Callable[[Array], BoolArray]) -> int:
     return sum(int(np.sum(flag(data.motion.attitude))) for data in source.chunks())
 
-
-MODEL, RIGID_BODY, ZERO = "model", "rigid-body", "torque-zero"
-"""Names of the model and of two of its baselines among the judged models."""
 
 Winner = Literal["model", "rigid-body", "tie"]
 
