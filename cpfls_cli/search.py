@@ -156,14 +156,14 @@ class KeptFile:
     OUTPUT: ClassVar[type[IdentifiedModel | Vehicle]]
 
     @classmethod
-    def beside(cls, output: Path, header: Origin) -> Self:
+    def of_output(cls, output: Path, header: Origin) -> Self:
         """Name what is left of an output, such as ``model.h5.checkpoint`` of ``model.h5``."""
         return cls(output.with_name(f"{output.name}.checkpoint"), header)
 
     @classmethod
     def begun(cls, job: Job, header: Origin, *, resume: bool) -> tuple[Self, Any]:
         """Check what is left and the output of a search before anything is computed; give what it goes on from."""
-        own = cls.beside(job.output, header)
+        own = cls.of_output(job.output, header)
         left = own.read() if resume else None
         if not resume:
             own.require_permission(force=job.force)
@@ -400,7 +400,7 @@ def begin_search(
 ) -> tuple[dict[str, InputFile], Resumable]:
     """Check workers, inputs, checkpoint and output of a search before anything is computed.
 
-    Refused are more processes than this machine can run, and a scheduler beside them or without an address.
+    Refused are more processes than this machine can run, and a scheduler with them or without an address.
     """
     if scheduler is not None and workers > 1:
         raise InputError("--scheduler: brings its own workers; leave out --workers")

@@ -84,12 +84,12 @@ def room(arm_m: float, rotors: int) -> float:
 def room_between(hubs: Array) -> float:
     """Give the diameter, m, of propellers between such hubs, shape (rotor, 3), that touch; NaN for hubs in one place.
 
-    Of rotors above each other the neighbours beside them count.
+    Of rotors above each other the neighbours at their sides count.
     """
     with np.errstate(over="ignore"):
         apart = np.linalg.norm(hubs[:, None, :2] - hubs[:, :2], axis=2)
-    beside = apart[apart > _ABOVE * apart.max()]
-    return float(beside.min()) if len(beside) else nan
+    neighbours = apart[apart > _ABOVE * apart.max()]
+    return float(neighbours.min()) if len(neighbours) else nan
 
 
 def thrust_number(mass_kg: float, diameter_m: float, speed: Array) -> float:

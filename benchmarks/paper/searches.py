@@ -219,7 +219,7 @@ def run(
     """Search with one seed, as `cpfls identify --seed` does, and judge no baselines; None for no finite model."""
     study = setting.study.model_copy(update={"seed": seed})
     selection = InputFile("selection", setting.without_runs.selection, Selection.FORMAT)
-    checkpoint = Checkpoint.beside(job.output, origin_before(study, {**inputs, "selection": selection}))
+    checkpoint = Checkpoint.of_output(job.output, origin_before(study, {**inputs, "selection": selection}))
     search = Resumable(checkpoint, left(checkpoint))
     state = search.run(watch, lambda _: None)
     if setting.without_runs.chromosomes <= _AT_ONCE:

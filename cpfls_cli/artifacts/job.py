@@ -54,7 +54,7 @@ class Job:
     found: Path | None = None
     cautions: dict[str, None] = field(default_factory=dict)
 
-    def beside(self, name: str) -> Path:
+    def sibling(self, name: str) -> Path:
         """Name a file in the folder of the output."""
         return self.output.with_name(name)
 

@@ -25,7 +25,7 @@ except ImportError:
     fcntl = None  # type: ignore[assignment]
 
 _BESIDE = ("", ".checkpoint", ".partial")
-"""What the names of files add to that of the output beside which a command writes them."""
+"""What the names of files add to that of the output next to which a command writes them."""
 
 _NEW: set[str] = set()
 """Outputs of which there was no file when the command began: one that is there in the end is somebody else's."""
@@ -137,7 +137,7 @@ def refuse_inputs(output: Path, inputs: Iterable[Path]) -> None:
 
 
 def refuse_own(path: Path, output: Path) -> None:
-    """Refuse a further output where the command writes its first one, or what it keeps beside that."""
+    """Refuse a further output where the command writes its first one, or what it keeps next to that."""
     if os.path.realpath(path) in {os.path.realpath(f"{output}{addition}") for addition in _BESIDE}:
         raise InputError(f"{path}: is what the command writes for -o {output}; name another file")
 
@@ -154,7 +154,7 @@ def _asked_for(path: Path) -> Iterator[None]:
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside a file, to be moved there by `os.replace`; what is left of it is removed."""
+    """Give a temporary name next to a file, to be moved there by `os.replace`; what is left of it is removed."""
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     except OSError as error:
@@ -298,7 +298,7 @@ def check_folder(folder: Path, force: bool, names: Sequence[str], kept: str = ""
 
 @contextmanager
 def filled_folder(folder: Path, names: Sequence[str]) -> Iterator[Path]:
-    """Give a temporary folder beside a folder, and move its files in place at the end.
+    """Give a temporary folder next to a folder, and move its files in place at the end.
 
     Of the names, files of an earlier run that are not written again are removed; a link to a folder is followed.
     """
@@ -306,7 +306,7 @@ def filled_folder(folder: Path, names: Sequence[str]) -> Iterator[Path]:
     try:
         temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.", suffix=".part"))
     except OSError as error:
-        raise InputError(f"{folder}: cannot write beside it: {error.strerror}") from None
+        raise InputError(f"{folder}: cannot write next to it: {error.strerror}") from None
     try:
         yield temporary
         folder.mkdir(exist_ok=True)

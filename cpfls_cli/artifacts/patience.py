@@ -1,4 +1,4 @@
-"""How long HDF5 may read a file: a process beside this one says where it never comes back, and a timer ends it.
+"""How long HDF5 may read a file: another process says where it never comes back, and a timer ends it.
 
 In a damaged file HDF5 may follow addresses in a circle. It holds the interpreter then, so that neither a thread nor a
 handler of signals runs. A seal shows damage, but not where somebody has sealed it again.
@@ -60,14 +60,14 @@ _GRACE_S = 3.0
 """After a signal, in which a sound file is read to the end of one dataset and the program ends by itself."""
 _GOES_ON = b"0 \n"
 _AFTER_S = 1.0
-"""By which the program ends later than the process beside it says why."""
+"""By which the program ends later than the other process says why."""
 
 _MONOTONIC, _BY_THREAD = 1, 2
 """A clock, and the way in which a timer of POSIX calls a function, as Linux numbers them."""
 
 
 class _Watch:
-    """The process beside this one, started where the first file is read; nothing is watched where it cannot be."""
+    """The other process, started where the first file is read; nothing is watched where it cannot be."""
 
     def __init__(self) -> None:
         self.wanted = False
@@ -87,7 +87,7 @@ class _Watch:
                 os.write(pipe.fileno(), line)
 
     def wake(self) -> int | None:
-        """Let signals reach the process beside; give what they reached before, None where that cannot be changed."""
+        """Let signals reach the other process; give what they reached before, None where that cannot be changed."""
         pipe = self._pipe()
         if pipe is None or os.name != "posix":
             return None
@@ -128,7 +128,7 @@ class _Watch:
 class _Timer:
     """Ends the program with the exit code of wrong input, whatever holds the interpreter.
 
-    Linux calls `_exit` in a thread of its own, which needs no interpreter; elsewhere the process beside ends it.
+    Linux calls `_exit` in a thread of its own, which needs no interpreter; elsewhere the other process ends it.
     """
 
     def __init__(self) -> None:

@@ -217,7 +217,7 @@ def _columns(nominal: VehicleModel, models: tuple[VehicleModel, ...]) -> Iterato
             yield f"gust_{size}", f"{unit}, standard deviation, x y z", gusts[:, 0, axes]
             yield f"gust_{memory}", "s, in which a gust falls to 37 %, x y z", gusts[:, 1, axes]
         for size, unit, axes in (("torque_white_n_m_sqrt_s", "N m", _TURNS), ("force_white_n_sqrt_s", "N", _PUSHES)):
-            yield f"gust_{size}", f"{unit} s^0.5, white noise beside it, x y z", gusts[:, 2, axes]
+            yield f"gust_{size}", f"{unit} s^0.5, white noise with it, x y z", gusts[:, 2, axes]
 
 
 _TURNS, _PUSHES = slice(0, 3), slice(3, 6)

@@ -177,7 +177,7 @@ class Evaluator:
     ----------
     judge : Samples
         The whole training part where `judged_on` does not say otherwise: a membership function that falls between two
-        samples learned from costs nothing there and everything beside them.
+        samples learned from costs nothing there and everything elsewhere.
     cross_validated : bool
         Take the solver's cross-validated error for the first objective, not the training part's.
     """

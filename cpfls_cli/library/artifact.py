@@ -180,7 +180,7 @@ class Artifact(Mapping[str, Any]):
         Parameters
         ----------
         *others : Artifact
-            Given to the report as well: a flight beside its model, models that are compared.
+            Given to the report as well: a flight with its model, models that are compared.
         """
         from cpfls_cli.config.study import ReportSettings
         from cpfls_cli.pages.page import sections_of

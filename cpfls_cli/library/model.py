@@ -36,7 +36,7 @@ def run(*words: str | os.PathLike[str]) -> None:
     Raises
     ------
     CpflsError
-        If the command fails; what it says stands on standard error.
+        If the command fails; its message is on standard error.
     """
     from cpfls_cli.cli.stages import app
 

@@ -135,7 +135,7 @@ class _Space(NamedTuple):
     places: IntArray
     weights: Array
     products: Array
-    beside: int
+    others: int
     crossed: int
 
 
@@ -392,8 +392,8 @@ def _add_up(
     square, cross, dense_cross = sums
     inputs, motion, sample, column = chunk.inputs, chunk.motion, runs.sample, space.column
     # With the three axes side by side: derivatives and residuals, then the columns.
-    active, rows = len(column), program.moved + 3 * space.beside
-    wide_lines, lines = space.beside + len(space.weights), rows + 3 * len(space.weights)
+    active, rows = len(column), program.moved + 3 * space.others
+    wide_lines, lines = space.others + len(space.weights), rows + 3 * len(space.weights)
     start, run = 0, 0
     while start < len(sample):
         stop = min(start + _BATCH, runs.stop[run])
@@ -415,7 +415,7 @@ def _add_up(
                 space.weights[a] = -coefficients[k, column[a]]
             for d in range(dense_weights.shape[1]):
                 space.weights[active + d] = dense_weights[k, d]
-            _combine(wide, space.beside, space.weights, len(space.places) - len(coefficients) + k)
+            _combine(wide, space.others, space.weights, len(space.places) - len(coefficients) + k)
         if what == ERRORS:
             _add_errors(wide, square[own], cross[own])
             continue
@@ -490,16 +490,16 @@ def add_sums(
     active, partitions = len(program.columns), len(program.partitions)
     # The derivatives and the residual, or the residual of each model.
     places = np.arange(len(models[0])) if what != MOVED else np.full(2 * partitions - 1, table.breakpoints)
-    width, beside = fours(active + dense), fours(len(places))
+    width, others = fours(active + dense), fours(len(places))
     space = _Space(
-        lines=np.empty((program.moved + 3 * (width + beside)) * min(_BATCH, runs.longest)),
+        lines=np.empty((program.moved + 3 * (width + others)) * min(_BATCH, runs.longest)),
         column=np.zeros(active, np.int64),
         interval=np.zeros(partitions, np.int64),
         places=places,
         weights=np.zeros(width),
-        products=np.empty((width + beside, width if what == GRAM else beside)),
-        beside=beside,
-        crossed=2 if what == COMBINED else beside,
+        products=np.empty((width + others, width if what == GRAM else others)),
+        others=others,
+        crossed=2 if what == COMBINED else others,
     )
     factors = np.array([1.0, -0.5, -1.0, *scale])
     own = np.zeros_like(label) if what in (COMBINED, MOVED) else label

@@ -150,7 +150,7 @@ class _Layout:
 
     def _write_columns(self, block: Block, carried: list[_Three], columns: list[tuple[int, ...]]) -> None:
         add, features = self.writer.add, self._features(block)
-        beside = [[add((by[1], each[1]), (by[2], each[2])) for by in carried] for each in features]
+        crossed = [[add((by[1], each[1]), (by[2], each[2])) for by in carried] for each in features]
         (roll, along), (pitch, across) = (self._place(block, angle) for angle in (ROLL, PITCH))
         for i, left in enumerate(self._firing(roll, ROLL)):
             for j, right in enumerate(self._firing(pitch, PITCH)):
@@ -159,7 +159,7 @@ class _Layout:
                 for f, feature in enumerate(features):
                     for axis in range(3):
                         to, products = -1 - 3 * len(columns) - axis, (by_axis[axis], feature[0])
-                        add(products, (fires[0], beside[f][axis]), to=to, factor=kernels.OF_AXIS + axis)
+                        add(products, (fires[0], crossed[f][axis]), to=to, factor=kernels.OF_AXIS + axis)
                     columns.append((block.columns.start + f, roll, i, along, pitch, j, across))
 
     def _moves(self, block: Block, carried: list[_Three], input_index: int, first: int) -> Iterator[tuple[int, ...]]:

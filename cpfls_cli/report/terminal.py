@@ -174,7 +174,7 @@ def _printed(drawn: RichTable, width: int | None, colour: bool) -> Sequence[str]
         file=stream,
         width=width or _UNLIMITED,
         force_terminal=colour,
-        # In a notebook rich would show a table by itself, beside the text that it is a part of.
+        # In a notebook rich would show a table by itself, apart from the text that it is a part of.
         force_jupyter=False,
         color_system="standard" if colour else None,
         markup=False,

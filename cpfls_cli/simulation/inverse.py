@@ -1,4 +1,4 @@
-"""The torques, thrust and rotor speeds that a planned motion asks for, and the room that rotors leave beside it."""
+"""The torques, thrust and rotor speeds that a planned motion asks for, and the room that rotors leave for control."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ def hover_squared(vehicle: VehicleSettings) -> Array:
 
 @dataclass(frozen=True)
 class RotorLoad:
-    """Largest shares that a motion takes of what rotors may do beside control, which is `ROTOR_SHARE` of all.
+    """Largest shares that a motion takes of what rotors may do besides control, which is `ROTOR_SHARE` of all.
 
     `fast`: of the square of the largest speed; `slow`: of the way down from the squared speed of hovering to rest.
     """
@@ -249,7 +249,7 @@ def rotor_load(planned: Mapping[str, Array], vehicle: VehicleSettings) -> RotorL
 
 @dataclass(frozen=True)
 class RoomLeft:
-    """Excitation that fits beside its path, and what limits it.
+    """Excitation that fits on top of its path, and what limits it.
 
     Attributes
     ----------

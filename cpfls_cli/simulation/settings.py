@@ -95,7 +95,7 @@ class ClosedLoopSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class SimulationSettings(Settings):
-    """How a flight is simulated, and what it gets beside the vehicle's exact dynamics."""
+    """How a flight is simulated, and what it gets besides the vehicle's exact dynamics."""
 
     mode: Annotated[
         Literal["inverse", "closed-loop"],

@@ -1,1 +1,1 @@
-"""Vehicle models of simulators: what their own files state, where it stands there, and the same file corrected."""
+"""Vehicle models of simulators: what their own files state, where it is there, and the same file corrected."""

@@ -1,4 +1,4 @@
-"""XML in which every element and every number knows where it stands, so that one number alone can be replaced."""
+"""XML in which every element and every number knows its place, so that one number alone can be replaced."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Stated:
-    """A number of a model: its value in SI units, and where it stands.
+    """A number of a model: its value in SI units, and its place.
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ class Controls(NamedTuple):
 
 
 def compiled(file: Path, folder: Path) -> Any:
-    """Compile MJCF whose meshes and pictures are beside another file, in this folder."""
+    """Compile MJCF whose meshes and pictures are next to another file, in this folder."""
     import mujoco
 
     spec = mujoco.MjSpec.from_file(str(file))

@@ -82,7 +82,7 @@ class _File:
         assert node.parent is not None
         file = node.file.parent / node.attributes.get("file", "")
         if not isfile(file):
-            raise node.error(f"includes {node.attributes.get('file')!r}, which is not there; put it beside this file")
+            raise node.error(f"includes {node.attributes.get('file')!r}, which is not there; put it next to this file")
         if file in self.files:
             raise node.error(f"includes {file.name} again; remove that <include>")
         self.files[file] = None

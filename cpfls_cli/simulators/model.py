@@ -55,7 +55,7 @@ class Body:
 
     @property
     def inertia_at(self) -> str:
-        """Where its inertia stands."""
+        """Where its inertia is stated."""
         return self.entries[0].where if self.entries else self.mass.where
 
 
@@ -82,7 +82,7 @@ class Rotor:
     curve : Stated or None
         Of thrust by the volts of a motor: a coefficient of it, with which the others go.
     turn : Stated or None
-        Where its spin stands.
+        Where its spin is stated.
     place : tuple of Stated
         x, y, z of its hub, m, as far as they are stated from the centre of mass; empty where they are not.
     node : Node or None
@@ -232,7 +232,7 @@ class SimulatorModel:
 
     @property
     def where_of_mass(self) -> str:
-        """Where the mass stands."""
+        """Where the mass is stated."""
         with_mass = [body for body in self.bodies if body.mass.value > 0]
         rest = len(with_mass) - 1
         return self.heaviest.mass.where + (f", and {rest} more links fixed to it, rotors among them" if rest else "")

@@ -146,7 +146,7 @@ def _included(node: Node) -> Path:
         if len(model) == 1:
             return model[0]
     raise node.error(
-        f"includes {uri!r}, which is not beside this file; put it there, or give what `gz sdf -p {node.file.name}` "
+        f"includes {uri!r}, which is not next to this file; put it there, or give what `gz sdf -p {node.file.name}` "
         "prints, which has all in it"
     )
 

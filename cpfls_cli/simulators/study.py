@@ -305,7 +305,7 @@ def _speed(model: SimulatorModel, proposal: Proposal | None) -> tuple[float | No
 def corrected_files(model: SimulatorModel, texts: Mapping[str, bytes]) -> Iterator[Path]:
     """Have the files of a model for a while with corrected texts, by their names in the output; give the main one."""
     names = model.output_names
-    # Includes are beside a file where it is named, and not where a link leads.
+    # Includes are next to a file where it is named, and not where a link leads.
     folder = Path(commonpath([abspath(file.parent) for file in model.files]))
     with TemporaryDirectory() as copied:
         for file in model.files:

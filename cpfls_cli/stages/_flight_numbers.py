@@ -110,7 +110,7 @@ _APART = 3
 @stage(FlightNumbers, title="Numbers of each flight", words=WORDS, study=True)
 def flight_numbers(run: Run, flight: Path) -> FlightNumbers:
     """Compute the numbers of a flight, or take those that are kept in the folder of the output."""
-    return kept_numbers(flight, run.take({"flight": flight})["flight"], run.study, run.beside(FOLDER), run.cautions)
+    return kept_numbers(flight, run.take({"flight": flight})["flight"], run.study, run.sibling(FOLDER), run.cautions)
 
 
 def exit_code(verdict: str, *, fail_on_change: bool = False) -> int:

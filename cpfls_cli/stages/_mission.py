@@ -1,4 +1,4 @@
-"""Files of a planned path for autopilots, beside its artifact."""
+"""Files of a planned path for autopilots, next to its artifact."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _home(text: str) -> Home:
 
 
 def mission_paths(job: Job, mission: Mission) -> dict[Path, str]:
-    """Name the files, and the form of each, beside the artifact; of ArduPilot one for each axis, named by it."""
+    """Name the files, and the form of each, next to the artifact; of ArduPilot one for each axis, named by it."""
     output, axes = job.output, job.study.trajectory.excite.axes
     paths = {
         CSV: [output.with_name(f"{output.stem}-waypoints.csv")],

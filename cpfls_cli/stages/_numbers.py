@@ -81,4 +81,4 @@ def to_fly(job: Job, output: Path | None = None) -> Command:
     finer = ("--set", f"trajectory.sample_time_s={coarsest:g}") if planned.sample_time_s > coarsest else ()
     # Its autopilot sweeps by itself, from numbers in a file.
     form = ("--format", "ardupilot") if formats == {_ARDUPILOT} else ()
-    return (*words[:-1], *finer, *form, words[-1], output or job.beside("mission.h5"))
+    return (*words[:-1], *finer, *form, words[-1], output or job.sibling("mission.h5"))

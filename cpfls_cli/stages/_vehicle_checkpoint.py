@@ -1,4 +1,4 @@
-"""What a search for the structure of a vehicle leaves beside its output, as `vehicle` keeps it."""
+"""What a search for the structure of a vehicle leaves next to its output, as `vehicle` keeps it."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ def changed(
     run.exit_code = exit_code(found.verdict, fail_on_change=fail_on_change)
     if found.changed:
         flown = [kept[role] for role in flights]
-        run.go_on("gap", *flown[found.since_flight : len(found.today)], output=run.beside("gap"))
+        run.go_on("gap", *flown[found.since_flight : len(found.today)], output=run.sibling("gap"))
     else:
         run.next.append(("cpfls", "info", run.output / "changed.h5", "-v"))
     return found

@@ -217,7 +217,7 @@ def _next(run: Run, found: Disagreement, flights: Sequence[Path], model: Path | 
         return to_fly(run)
     if not found.is_base(run.study.vehicle):
         return to_gap(run, flights, model)
-    return go_on(run, "diagnose", run.output, output=run.beside("diagnosis.h5"))
+    return go_on(run, "diagnose", run.output, output=run.sibling("diagnosis.h5"))
 
 
 def to_correct(job: Job) -> Command:
@@ -231,7 +231,7 @@ def to_gap(job: Job, flights: Sequence[Path], model: Path | None) -> Command:
         return to_fly(job)
     starts = model is not None and (is_found(model) or format_name(model) == IdentifiedModel.FORMAT)
     given: Sequence[str | Path] = ("--model", model) if model is not None and starts else ()
-    return go_on(job, "gap", *flights, *given, output=job.beside("gap"))
+    return go_on(job, "gap", *flights, *given, output=job.sibling("gap"))
 
 
 def with_seen(given: FlightSet, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> FlightSet:

@@ -211,8 +211,8 @@ def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOpti
         return None
     found = diagnosed(study, split, (*compared.warnings, *held.warnings), compared.base, progress_of(run.progress))
     found = learned_from(run, found, flights, learned, unseen, model=disagreement.name)
-    to_extend = go_on(run, "extend", run.output, output=run.beside("extended.h5"))
-    to_report = ("cpfls", "report", run.config, disagreement, run.output, "-o", run.beside("report.html"))
+    to_extend = go_on(run, "extend", run.output, output=run.sibling("extended.h5"))
+    to_report = ("cpfls", "report", run.config, disagreement, run.output, "-o", run.sibling("report.html"))
     run.next.append(next_command(run, found, to_extend, to_report, run.output))
     return found
 
@@ -225,7 +225,7 @@ def next_command(job: Job, found: Diagnosis, named: Command, unnamed: Command, d
         case GapVerdict.NAMED | GapVerdict.PARTIAL:
             return named
         case GapVerdict.AMBIGUOUS:
-            return go_on(job, "trajectory", "--for", diagnosis, output=job.beside("path.h5"))
+            return go_on(job, "trajectory", "--for", diagnosis, output=job.sibling("path.h5"))
         case GapVerdict.NO_GAP | GapVerdict.NOT_EXCITED:
             return to_fly(job)
     return unnamed

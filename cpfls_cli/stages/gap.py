@@ -236,9 +236,9 @@ def _flights(
 
 
 def _next(run: Run, found: Gap, flights: Sequence[Path], model: Path | None) -> Command:
-    folder, output = run.output, run.beside("replay.h5")
+    folder, output = run.output, run.sibling("replay.h5")
     to_replay: Command = ("cpfls", "replay", run.config, folder / "extended.h5", *flights, "-o", output)
     given = () if model is None else ("--model", model)
-    to_answer = go_on(run, "response", *flights, *given, output=run.beside("response.h5"))
+    to_answer = go_on(run, "response", *flights, *given, output=run.sibling("response.h5"))
     named = to_answer if found.extended is None else to_replay
     return of_diagnosis.next_command(run, found.diagnosis, named, to_answer, folder / "diagnosis.h5")

@@ -124,7 +124,7 @@ def _next(run: Run, made: IdentifiedModel, flights: Sequence[Path]) -> Command:
     """Give the command that hands a good model over, or else shows why it is none."""
     if made.trust in (Trust.SIMULATION, Trust.CONTROL, Trust.INSIDE):
         return "cpfls", "export", run.output, "-o", run.output.with_suffix(".c")
-    return "cpfls", "report", run.config, *flights, run.output, "-o", run.beside("report.html")
+    return "cpfls", "report", run.config, *flights, run.output, "-o", run.sibling("report.html")
 
 
 def _identified(

@@ -28,8 +28,8 @@ def import_(run: Run, log: LogArgument) -> Imported | None:
     warnings = (*made.warnings, *doubts_on_voltage(read.signals, read.units), *doubted)
     # The command that learns from it: a model of a torque, a whole vehicle of rotors alone.
     if not made.lacks:
-        run.go_on("identify", run.output, output=run.beside("model.h5"))
+        run.go_on("identify", run.output, output=run.sibling("model.h5"))
     elif made.has_rotors:
-        run.next.append(("cpfls", "vehicle", run.config, run.output, "-o", run.beside("vehicle.h5")))
+        run.next.append(("cpfls", "vehicle", run.config, run.output, "-o", run.sibling("vehicle.h5")))
     run.also = {"signals": [name for name in made.signals if name != "time"]}
     return replace(made, warnings=warnings, contradictions=never)

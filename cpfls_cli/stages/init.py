@@ -222,7 +222,7 @@ def _rotors_in_words(proposal: Proposal) -> str:
     more = next((f", or more {rival.reason}" for rival in own if rival is not None), "")
     if proposal.airframe is None:
         unknown = (
-            "neither parameters nor the motion say where they are; a log with more motion, given beside this one, may"
+            "neither parameters nor the motion say where they are; a log with more motion, given with this one, may"
         )
         return f"{proposal.rotors} rotors{more}; {unknown}"
     places = ", ".join(
@@ -352,7 +352,7 @@ def _next(run: Run, proposal: Proposal, given: Sequence[Path]) -> Iterator[Comma
     """
     # Many logs are taken as they are.
     as_logs = proposal.has_rotors and len(given) > _IMPORTED
-    named = list(given) if as_logs else [run.beside(name) for name in _flight_names(given)]
+    named = list(given) if as_logs else [run.sibling(name) for name in _flight_names(given)]
     for log, flight in zip([] if as_logs else given, named, strict=False):
         yield ("cpfls", "import", run.output, log, "-o", flight)
     equal = {Path(name) for name in proposal.equal}
@@ -361,13 +361,13 @@ def _next(run: Run, proposal: Proposal, given: Sequence[Path]) -> Iterator[Comma
     learned, judged = (flights[:-1], flights[-1:]) if len(flights) > 1 else (flights, [])
     if proposal.has_rotors:
         apart = [word for flight in judged for word in ("--held-out", flight)]
-        yield ("cpfls", "vehicle", run.output, *learned, *apart, "-o", run.beside("vehicle.h5"))
+        yield ("cpfls", "vehicle", run.output, *learned, *apart, "-o", run.sibling("vehicle.h5"))
         if others:
-            played = run.beside("other-loads.h5")
-            yield ("cpfls", "replay", run.output, run.beside("vehicle.h5"), *others, "-o", played)
+            played = run.sibling("other-loads.h5")
+            yield ("cpfls", "replay", run.output, run.sibling("vehicle.h5"), *others, "-o", played)
     elif proposal.states_torque:
         apart = [word for flight in judged for word in ("--validate", flight)]
-        yield ("cpfls", "identify", run.output, *learned, *apart, "-o", run.beside("model.h5"))
+        yield ("cpfls", "identify", run.output, *learned, *apart, "-o", run.sibling("model.h5"))
 
 
 def _flight_names(logs: Sequence[Path]) -> list[str]:

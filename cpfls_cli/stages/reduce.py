@@ -67,7 +67,7 @@ def reduce(run: Run, flights: TrainingArgument) -> Selection | None:
             return None
         found = reduce_streamed(surveyed, settings, rng, run.progress)
         draws = random_streamed(surveyed, found.selected, RANDOM_DRAWS, rng)
-    run.go_on("identify", *flights, "--selection", run.output, output=run.beside("model.h5"))
+    run.go_on("identify", *flights, "--selection", run.output, output=run.sibling("model.h5"))
     return replace(
         found,
         indices=split.training_indices[found.indices],

@@ -202,7 +202,7 @@ def _next(run: Run, found: Responses, flights: Sequence[Path], model: Path | Non
     if not found.has_instruments or words <= {NOT_JUDGED}:
         return to_fly(run)
     if NOT_ACCEPTABLE not in words and model is not None:
-        return "cpfls", "export", model, "-o", run.beside(f"{model.stem}.c")
+        return "cpfls", "export", model, "-o", run.sibling(f"{model.stem}.c")
     return to_gap(run, flights, model)
 
 

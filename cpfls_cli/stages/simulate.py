@@ -174,7 +174,7 @@ def _inverse(run: Run, time: Array, planned: dict[str, Array], trajectory: Path)
         problems = [infeasible_sentence(each) for each in flight.infeasible]
         remedy = "fly more gently, change the vehicle, or set simulation.infeasible: report"
         raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
-    run.go_on("reduce", run.output, output=run.beside("selection.h5"))
+    run.go_on("reduce", run.output, output=run.sibling("selection.h5"))
     return flight
 
 
@@ -183,5 +183,5 @@ def _closed_loop(run: Run, time: Array, planned: dict[str, Array], model: Vehicl
     flight = measure(time, planned, study.vehicle, study.simulation, rng, run.progress, model)
     if model is not None and model.gusts is not None and not study.simulation.closed_loop.gusts:
         run.say(STILL_AIR)
-    run.go_on("gap", run.output, output=run.beside("gap"))
+    run.go_on("gap", run.output, output=run.sibling("gap"))
     return flight

@@ -114,7 +114,7 @@ MissionOption = Annotated[
     list[MissionFormat] | None,
     typer.Option(
         "--format",
-        help="For an autopilot, beside OUTPUT: the path as csv; a mission for px4 (QGroundControl); ardupilot: sweeps "
+        help="For an autopilot, next to OUTPUT: the path as csv; a mission for px4 (QGroundControl); ardupilot: sweeps "
         "for its System ID mode. May be repeated; --repeat and --excite write csv if none is named.",
     ),
 ]
@@ -127,7 +127,7 @@ HomeOption = Annotated[
     ),
 ]
 PlotOption = Annotated[
-    bool, typer.Option("--plot", help="Draw the derivatives and the attitude, as SVG beside OUTPUT.")
+    bool, typer.Option("--plot", help="Draw the derivatives and the attitude, as SVG next to OUTPUT.")
 ]
 
 
@@ -259,7 +259,7 @@ def trajectory(
     settings = run.study.trajectory if settles else _settings(run.study, waypoints)
     names = () if not plot else ("rotation",) if settings.held else ("derivatives", "attitude")
     figures = [run.output.with_name(f"{run.output.stem}-{name}.svg") for name in names]
-    texts = {run.beside(f"{run.output.stem}-waypoints.csv"): "csv"} if settles else mission_paths(run, mission)
+    texts = {run.sibling(f"{run.output.stem}-waypoints.csv"): "csv"} if settles else mission_paths(run, mission)
     check_outputs(run, *figures, *texts)
     if settles:
         # What reads diagnoses and models is loaded for no other path.
@@ -279,7 +279,7 @@ def trajectory(
     for sentence in mission_words(mission.forms, planned):
         run.say(sentence)
     run.also = {"figures": [str(path) for path in figures], "files": [str(path) for path in texts]}
-    run.go_on("simulate", run.output, output=run.beside("flight.h5"))
+    run.go_on("simulate", run.output, output=run.sibling("flight.h5"))
     return planned
 
 

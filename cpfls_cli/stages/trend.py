@@ -347,4 +347,4 @@ def _go_on(run: Run, found: Trend, paths: Mapping[str, Path]) -> None:
     names, start = column(found.flights, "flight"), found.shifts[-1].flight - 1
     after = [paths[name] for name in names[start:][-_COMPARED:]]
     before = [paths[name] for name in names[: min(len(found.reference_flights), start)][-_BEFORE:]]
-    run.go_on("changed", *after, "--reference", *before, output=run.beside("changed"))
+    run.go_on("changed", *after, "--reference", *before, output=run.sibling("changed"))

@@ -222,7 +222,7 @@ def twin(run: Run, path: Path, model: Path | None = None) -> Twin | None:
     try:
         asked = asked_of(flight, settings, study.vehicle, share=_thrust_is_share(path, study))
     except InputError as error:
-        words = " ".join(map(str, go_on(run, "gap", path, output=run.beside("gap"))))
+        words = " ".join(map(str, go_on(run, "gap", path, output=run.sibling("gap"))))
         raise InputError(f"{error}. Without setpoints `{words}` says where the model of the config differs") from None
     if run.dry_run:
         return None
@@ -353,4 +353,4 @@ def _go_on(run: Run, found: Twin, path: Path, model: Path | None) -> None:
     if (found.in_gusts is not None and found.in_gusts.beyond) or found.judged.parted:
         run.next.append(to_gap(run, [path], model))
     elif model is not None:
-        run.next.append(("cpfls", "export", model, "-o", run.beside(f"{model.stem}.c")))
+        run.next.append(("cpfls", "export", model, "-o", run.sibling(f"{model.stem}.c")))

@@ -389,7 +389,7 @@ def _found(
     checkpoint: VehicleCheckpoint,
     kept: Kept,
 ) -> tuple[FoundVehicle, int | None]:
-    """Search; an interrupt ends the search, and its number is given beside what has been found until then."""
+    """Search; an interrupt ends the search, and its number is given with what has been found until then."""
     study, watch = run.study, Watch(run, None)
 
     def progress(judged: Sequence[Judged], total: int) -> None:

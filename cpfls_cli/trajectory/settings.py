@@ -292,7 +292,7 @@ class WaypointSettings(Settings):
     yaw_rad: Annotated[
         float | None, Doc("yaw there, rad, turned to while it moves; null at all of them: see yaw_turn_rad")
     ] = None
-    pause_s: Annotated[float, Ge(0), Doc("rest there beside pause_s of the path, s")] = 0.0
+    pause_s: Annotated[float, Ge(0), Doc("rest there on top of pause_s of the path, s")] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

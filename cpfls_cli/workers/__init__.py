@@ -1,1 +1,1 @@
-"""Evaluate chromosomes here, in processes beside, or on a cluster: one interface, one result."""
+"""Evaluate chromosomes here, in other processes, or on a cluster: one interface, one result."""

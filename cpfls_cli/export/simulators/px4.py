@@ -50,7 +50,7 @@ def px4_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str
     if Path(file).suffix == AIRFRAME:
         return _airframe(sheet, held, remarks)
     use = (
-        f"For PX4: put this file as Tools/simulation/gz/models/{sheet.name}/model.sdf beside a model.config, and the "
+        f"For PX4: put this file as Tools/simulation/gz/models/{sheet.name}/model.sdf next to a model.config, and the "
         f"airframe file into ROMFS/px4fmu_common/init.d-posix/airframes as a number that is free and _gz_{sheet.name}; "
         "name it in CMakeLists.txt there. Motors are in the order of the config. The world has to have the systems of "
         "PX4's own worlds, and a wind, which may be zero.",

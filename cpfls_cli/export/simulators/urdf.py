@@ -96,7 +96,7 @@ def _use(order: IntArray) -> tuple[str, ...]:
 
 
 def _properties(sheet: Sheet, held: Held) -> dict[str, str]:
-    """Give what gym-pybullet-drones reads beside the links."""
+    """Give what gym-pybullet-drones reads besides the links."""
     found, vehicle = held.numbers, sheet.model.vehicle
     radii = [rotor.radius_m or _RADIUS_M for rotor in vehicle.rotors]
     most = FOUR * found["thrust"] * vehicle.rotor_speed_max_rad_s**2 / (held.body.mass * _GRAVITY)

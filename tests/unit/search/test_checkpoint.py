@@ -58,7 +58,7 @@ def assert_same(one, other):
 
 @pytest.fixture
 def checkpoint(tmp_path):
-    kept = Checkpoint.beside(tmp_path / "model.h5", header())
+    kept = Checkpoint.of_output(tmp_path / "model.h5", header())
     kept.write(evolved())
     return kept
 
@@ -111,7 +111,7 @@ def test_what_was_evaluated_of_the_next_generation_comes_back(checkpoint, finish
 
 def test_it_is_a_good_artifact_and_equal_states_are_equal_files(checkpoint, tmp_path):
     assert store.findings_in(checkpoint.path, SearchState) == []
-    other = Checkpoint.beside(tmp_path / "other.h5", header())
+    other = Checkpoint.of_output(tmp_path / "other.h5", header())
     other.write(checkpoint.read().state)
     assert other.path.read_bytes() == checkpoint.path.read_bytes()
 

@@ -391,7 +391,7 @@ BAD = {
     "template": (GOOD.replace("<pose>0 0 0 0 0 0</pose>", "<pose>${x} 0 0 0 0 0</pose>", 1), "render it first"),
     "include": (
         GOOD.replace('<link name="base_link">', '<include><uri>model://away</uri></include><link name="base_link">'),
-        "includes 'model://away', which is not beside this file",
+        "includes 'model://away', which is not next to this file",
     ),
     "two": (
         GOOD.replace("</sdf>", GOOD[GOOD.index("<model") : GOOD.index("</sdf>")].replace("mine", "yours") + "</sdf>"),
