@@ -199,11 +199,11 @@ def fit_delay(
 def _products(columns: Array, signals: Array, block: IntArray) -> Array:
     """Multiply a one, columns and the signal of each axis with each other over blocks, shape (block, axis, ...)."""
     signals = (signals - signals.mean(axis=0))[..., None]
-    ones, found = np.ones_like(signals), []
-    for begin, end in pairwise(np.searchsorted(block, np.arange(block[-1] + 2))):
-        both = np.concatenate([own[begin:end].transpose(1, 2, 0) for own in (ones, columns, signals)], axis=1)
-        found.append(both @ both.swapaxes(1, 2))
-    return np.array(found)
+    both = np.concatenate([np.ones_like(signals), columns, signals], axis=2)
+    by_axis = np.ascontiguousarray(both.transpose(1, 2, 0))
+    ends = np.searchsorted(block, np.arange(block[-1] + 2))
+    parts = (by_axis[..., begin:end] for begin, end in pairwise(ends))
+    return np.array([part @ part.swapaxes(1, 2) for part in parts])
 
 
 def _solved(gram: Array, cross: Array) -> Array:
