@@ -29,6 +29,7 @@ os.fsync = lambda _: None
 gc.set_threshold(100_000, *gc.get_threshold()[1:])
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes():
     """Compile the loops once, and not in each worker that first calls them."""
     compiled_loops.compile_missing()
