@@ -71,10 +71,10 @@ class Balanced(NamedTuple):
 
     def windowed(self, band: Windows, flight: PlaybackFlight, width: int) -> Array:
         """Lay windows over it, shape (window, axis, column), with so many columns of an axis."""
-        acted = band.over(flight.stretches, band.average, self.acting.values)
+        acted = band.average(self.acting.values, flight.stretches)
         rows = np.zeros((len(acted), 3 * width))
         rows[:, self.acting.places] = acted
-        rows[:, self.changing.places] += band.over(flight.stretches, band.derivative, self.changing.values)
+        rows[:, self.changing.places] += band.derivative(self.changing.values, flight.stretches)
         return rows.reshape(-1, 3, width)
 
 
@@ -209,7 +209,7 @@ class Balances:
         found: dict[Windows, dict[int, Array]] = {band: {} for band in self.bands}
         for band, (number, asked) in product(found, self.asked.items()):
             columns = past_setpoints(asked, band.period, round(_OF_WINDOW * band.hop / (1 - OVERLAP)))
-            found[band][number] = band.over(self.flights[number].stretches, band.average, columns)
+            found[band][number] = band.average(columns, self.flights[number].stretches)
         return found
 
     @property
@@ -335,7 +335,7 @@ class PastBalances(Balances):
             for stretch in self.flights[number].stretches
         ]
         rows = [signals[number].windowed(band, part, width) for number, part in parts]
-        seen = [band.over(part.stretches, band.average, _seen(part)) for _, part in parts]
+        seen = [band.average(_seen(part), part.stretches) for _, part in parts]
         new, expected, _ = innovations(rows, [own[..., 0] for own in rows], seen, _PER_WINDOW, _BEFORE)
         count = max(1, round(_SLOW_S / (band.hop * band.period)))
         slow = [

@@ -78,9 +78,7 @@ def test_the_residual_is_what_the_model_leaves_of_the_motion(flights):
     bands = len(balances.bands_hz)
     for number, band in enumerate(balances.bands):
         changing, acting = (momentum, torque) if number < bands else (STATED.mass_kg * motion.velocity, force)
-        residual = band.over(flight.stretches, band.derivative, changing) + band.over(
-            flight.stretches, band.average, acting
-        )
+        residual = band.balance(acting, changing, stretches)
         assert sums.xtx[:, number, :, 0, 0].sum(axis=0) == pytest.approx((residual**2).sum(axis=0), rel=1e-9)
 
 
