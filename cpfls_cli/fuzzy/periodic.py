@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Integral, Real
 from typing import Annotated, Any, TypeGuard
@@ -29,6 +29,7 @@ from cpfls_cli.fuzzy.basis import (
     row_products,
     uniform_weights,
 )
+from cpfls_cli.least_squares import SMALLEST_SINGULAR_SHARE, Triangle
 from cpfls_cli.rotations import wrapped
 from cpfls_cli.settings import Settings
 
@@ -36,7 +37,7 @@ from cpfls_cli.settings import Settings
 _NO_RANGE = InputRange(0.0, 1.0)
 
 # Blocks of this length stay in the cache of a processor and bound the memory of any number of samples.
-_BLOCK = 2048
+_BLOCK = 4096
 
 
 @dataclass(frozen=True)
@@ -258,15 +259,9 @@ def _finite(name: str, given: Array) -> Array:
     return given
 
 
-SMALLEST_TOLERANCE = 3e-7
-"""The sums of products behind a fit square the singular values: below this share of the largest they are rounding."""
-
 # Two functions share one rule, as one function does.
 _COUNTS = {1: (1, *range(3, 22)), 2: (1, *range(3, 8))}
 _SAMPLES_PER_COEFFICIENT = 3
-# Columns are computed twice rather than kept above this many numbers, 64 MB.
-_MOST_KEPT = 8_000_000
-Blocks = Callable[[], Iterator[tuple[Array, Array]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -284,7 +279,7 @@ class PeriodicSettings(Settings):
     products: Annotated[Products, Doc("whether the features of two inputs are joined or multiplied")] = "tensor"
     ridge_weight: Annotated[float, Ge(0), Doc("weight of the squared coefficients, per sample")] = 0.0
     rank_tolerance: Annotated[
-        float, Ge(SMALLEST_TOLERANCE), Lt(1), Doc("singular values below this share of the largest count as zero")
+        float, Ge(SMALLEST_SINGULAR_SHARE), Lt(1), Doc("singular values below this share of the largest count as zero")
     ] = 1e-6
 
     def __post_init__(self) -> None:
@@ -300,8 +295,10 @@ class PeriodicSettings(Settings):
             raise SettingError("harmonic_order", message)
         if not (isinstance(self.ridge_weight, Real) and 0 <= self.ridge_weight < float("inf")):
             raise SettingError("ridge_weight", f"ridge_weight = {self.ridge_weight!r}: give a number of 0 or more")
-        if not (isinstance(self.rank_tolerance, Real) and SMALLEST_TOLERANCE <= self.rank_tolerance < 1):
-            message = f"rank_tolerance = {self.rank_tolerance!r}: give a number from {SMALLEST_TOLERANCE:g} to below 1"
+        if not (isinstance(self.rank_tolerance, Real) and SMALLEST_SINGULAR_SHARE <= self.rank_tolerance < 1):
+            message = (
+                f"rank_tolerance = {self.rank_tolerance!r}: give a number from {SMALLEST_SINGULAR_SHARE:g} to below 1"
+            )
             raise SettingError("rank_tolerance", message)
 
 
@@ -354,13 +351,24 @@ def fit_periodic(
     wanted, unit = _scaled(as_values(values, len(checked)))
     structure = _structure(settings, len(checked), checked.shape[1])
 
-    def rows() -> Iterator[tuple[Array, Array]]:
-        return ((structure.columns(checked[block]), wanted[block]) for block in blocks(len(checked)))
-
-    kept = list(rows()) if len(checked) * structure.coefficients <= _MOST_KEPT else None
-    weight = settings.ridge_weight * len(checked)
-    solution = solve_ridge(rows if kept is None else lambda: iter(kept), weight, settings.rank_tolerance)
-    return PeriodicSystem(structure, _in_unit(solution, unit), _quality(solution, len(checked), unit))
+    triangle = Triangle.of((structure.columns(checked[block]), wanted[block]) for block in blocks(len(checked)))
+    found = triangle.solve(settings.rank_tolerance)
+    kept = found.singular_values[: found.rank] ** 2
+    # Of each direction that the samples determine a ridge weight leaves a share.
+    share = kept / (kept + settings.ridge_weight * len(checked))
+    coefficients = found.row_space.T @ (share * (found.row_space @ found.coefficients))
+    residual_rms = np.sqrt(triangle.square(coefficients) / len(checked)) * unit
+    unspent = 1.0 - share.sum() / len(checked)
+    quality = FitQuality(
+        samples=len(checked),
+        coefficients=found.parameters,
+        rank=found.rank,
+        condition_number=found.condition_number,
+        effective_coefficients=float(share.sum()),
+        residual_rms=float(residual_rms),
+        cross_validation_rms=float(residual_rms / unspent) if unspent > 0 else float("inf"),
+    )
+    return PeriodicSystem(structure, _in_unit(coefficients, unit), quality)
 
 
 def _settings(settings: object, keys: Mapping[str, Any]) -> PeriodicSettings:
@@ -383,12 +391,12 @@ def _scaled(values: Array) -> tuple[Array, float]:
     return values / unit, unit
 
 
-def _in_unit(solution: RidgeSolution, unit: float) -> Array:
+def _in_unit(coefficients: Array, unit: float) -> Array:
     with np.errstate(over="ignore"):
-        coefficients: Array = solution.coefficients * unit
-    if not np.all(np.isfinite(coefficients)):
+        found = coefficients * unit
+    if not np.all(np.isfinite(found)):
         raise ValueError(f"values: up to {unit:g} in size, the coefficients overflow; scale the values down")
-    return coefficients
+    return found
 
 
 def _structure(settings: PeriodicSettings, samples: int, inputs: int) -> PeriodicStructure:
@@ -415,74 +423,3 @@ def _structure(settings: PeriodicSettings, samples: int, inputs: int) -> Periodi
 def _with(settings: PeriodicSettings, functions: tuple[int, ...]) -> PeriodicStructure:
     partitions = tuple(breakpoints(uniform_weights(count)) for count in functions)
     return PeriodicStructure(partitions, settings.consequents, settings.harmonic_order, settings.products)
-
-
-def _quality(solution: RidgeSolution, samples: int, unit: float) -> FitQuality:
-    residual_rms = float(np.sqrt(solution.residual_square / samples)) * unit
-    unspent = 1.0 - solution.effective_coefficients / samples
-    return FitQuality(
-        samples=samples,
-        coefficients=len(solution.coefficients),
-        rank=solution.rank,
-        condition_number=solution.condition_number,
-        effective_coefficients=solution.effective_coefficients,
-        residual_rms=residual_rms,
-        cross_validation_rms=residual_rms / unspent if unspent > 0 else float("inf"),
-    )
-
-
-@dataclass(frozen=True)
-class RidgeSolution:
-    """Solution of ``min |A c - y|^2 + weight |c|^2``, of minimum norm where the samples do not determine all.
-
-    `rank` and `condition_number` are of the singular values of A above the tolerance, infinite for rank zero;
-    `effective_coefficients`: trace of the matrix that takes y to its fit, the rank without a weight, less with one.
-    """
-
-    coefficients: Array
-    rank: int
-    condition_number: float
-    effective_coefficients: float
-    residual_square: float
-
-
-def solve_ridge(blocks: Blocks, weight: float, rank_tolerance: float) -> RidgeSolution:
-    """Solve a least-squares problem whose rows, of A and y, come in blocks, which are called for twice.
-
-    The eigenvalues of the sums are the squares of the singular values, which costs digits; one step of refinement with
-    the residuals of the samples themselves gives them back. Björck, Numerical Methods for Least Squares Problems
-    (1996), sections 2.9 and 6.6.
-    """
-    gram, moment = _sums(blocks)
-    squares, vectors = np.linalg.eigh(gram)
-    kept = squares > rank_tolerance**2 * squares[-1]
-    squares, vectors = squares[kept], vectors[:, kept]
-
-    def solved(right_side: Array) -> Array:
-        return np.asarray(vectors @ ((vectors.T @ right_side) / (squares + weight)))
-
-    first = solved(moment)
-    square, back = 0.0, np.zeros_like(first)
-    for columns, values in blocks():
-        residual = values - columns @ first
-        square += float(residual @ residual)
-        back += columns.T @ residual
-    step = solved(back - weight * first)
-    rank = len(squares)
-    return RidgeSolution(
-        coefficients=first + step,
-        rank=rank,
-        condition_number=float(np.sqrt(squares[-1] / squares[0])) if rank else float("inf"),
-        effective_coefficients=float(np.sum(squares / (squares + weight))),
-        residual_square=max(0.0, square - float(step @ (2.0 * back - gram @ step))),
-    )
-
-
-def _sums(blocks: Blocks) -> tuple[Array, Array]:
-    gram, moment = None, None
-    for columns, values in blocks():
-        square, product = columns.T @ columns, columns.T @ values
-        gram, moment = (square, product) if gram is None or moment is None else (gram + square, moment + product)
-    if gram is None or moment is None:
-        raise ValueError("no rows")
-    return gram, moment

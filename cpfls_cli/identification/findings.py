@@ -13,10 +13,10 @@ from cpfls_cli.dynamics import VERTICAL, rigid_columns, vertical, why_unphysical
 from cpfls_cli.identification.closed_loop import FreedTorque
 from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale
 from cpfls_cli.identification.judge import Score, VarianceExplained
-from cpfls_cli.identification.least_squares import LeastSquares, Triangle
 from cpfls_cli.identification.samples import Samples
 from cpfls_cli.identification.solver import Fit, regressor_blocks
 from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.least_squares import LeastSquares, Triangle
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.regressor.regressor import RIGID, Breakpoints
 from cpfls_cli.result import about

@@ -17,11 +17,11 @@ from cpfls_cli.identification.data import TRAINING, TorqueSource, axis_scale
 from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
 from cpfls_cli.identification.findings import AXES, FitDiagnostics, axis_evidence, findings, rule_excitation
 from cpfls_cli.identification.judge import Baseline, fit_baselines, score_of
-from cpfls_cli.identification.least_squares import LeastSquares
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import UNWATCHED, Front, SearchResult, SearchRun, StopReason, is_end, search
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import Fit, RidgeCurve, Solver, with_folds
+from cpfls_cli.least_squares import LeastSquares
 from cpfls_cli.regressor.regressor import data_ranges, joined_ranges
 from cpfls_cli.regressor.structure import model_structure
 from cpfls_cli.result import BODY, EULER, about, result

@@ -10,8 +10,8 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics import rigid_columns, vertical
 from cpfls_cli.identification.data import TorqueData, TorqueSource
-from cpfls_cli.identification.least_squares import Triangle
 from cpfls_cli.inertia import symmetric_columns
+from cpfls_cli.least_squares import Triangle
 from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.rotations import body_torque
 

@@ -13,9 +13,9 @@ from cpfls_cli.blocks import contiguous, mean_error
 from cpfls_cli.dynamics import rigid_columns
 from cpfls_cli.errors import SettingError
 from cpfls_cli.identification.data import TorqueData, sample_times
-from cpfls_cli.identification.least_squares import LeastSquares, NormalEquations, Project, Triangle, solve_normal
 from cpfls_cli.identification.samples import Products, Samples
 from cpfls_cli.identification.settings import RidgeSettings
+from cpfls_cli.least_squares import LeastSquares, NormalEquations, Project, Triangle, solve_normal
 from cpfls_cli.regressor.regressor import RIGID, Breakpoints, Regressor
 from cpfls_cli.result import about
 from cpfls_cli.rounding import at_most, levelled

@@ -129,14 +129,10 @@ class _Band(NamedTuple):
         hertz = np.arange(int(top * size * period) + 1) / (size * period)
         return cls(pieces, 2 * np.pi * hertz, pieces.modulated(hertz))
 
-    def averaged(self, flight: PlaybackFlight, values: Array) -> Array:
-        """Average values over pieces, shape (time, column) to (piece, column, frequency)."""
-        return self.waves.over(flight.stretches, self.waves.average, values)
-
 
 def _left(band: Windows, flight: PlaybackFlight, sides: Array) -> Array:
     """Take what both sides of a balance differ by over windows, shape (time, 2, axis) to (window, axis, ...)."""
-    return band.over(flight.stretches, lambda each: band.balance(-each[:, 1], each[:, 0]), sides)
+    return band.balance(-sides[:, 1], sides[:, 0], flight.stretches)
 
 
 def find_gusts(
@@ -322,7 +318,7 @@ def _predicted_parts(
     flat = [own.reshape(len(own), -1) for own in values]
     if instrument_kind == "repeats":
         flat = [given.repeats.others(number, flat) for number in range(len(flat))]
-    laid = [band.averaged(flight, columns) for flight, columns in zip(given.flown, flat, strict=True)]
+    laid = [band.waves.average(columns, flight.stretches) for flight, columns in zip(given.flown, flat, strict=True)]
     if instrument_kind == "setpoints":
         laid = _expected(given, laid, band)
     known = np.concatenate([each[np.isfinite(each).all(axis=(1, 2))] for each in laid])
@@ -354,7 +350,7 @@ def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Ar
     if not numbers:
         return [np.nan * own for own in left]
     asked = np.concatenate(
-        [band.averaged(given.flown[number], np.asarray(given.setpoints[number])) for number in numbers]
+        [band.waves.average(np.asarray(given.setpoints[n]), given.flown[n].stretches) for n in numbers]
     )
     instrument = (asked[:, :, None] * late).reshape(len(asked), -1, len(band.turns)).swapaxes(1, 2)
     instrument = instrument / np.maximum(np.sqrt((np.abs(instrument) ** 2).mean(axis=(0, 1))), np.finfo(float).tiny)

@@ -184,7 +184,7 @@ def _numbers_drawn(
     shares = normal / np.sqrt(rng.chisquare(freedom, (count, 1)) / freedom) / unit
     least, most = np.log(ends)
     loop = np.exp(rng.uniform(least, most, (count, 3)))
-    # By which it has widened intervals; see `beside_loop`.
+    # By which it has widened intervals; see `widened_by_loop`.
     widened = dict(zip(MOMENTS, ends.T.tolist(), strict=True))
     widened[DRAG] = [1.0 / widened[MOMENTS[2]][1], 1.0 / widened[MOMENTS[2]][0]]
     values = np.empty_like(shares)

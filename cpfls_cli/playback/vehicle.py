@@ -163,7 +163,7 @@ def find_vehicle(
     model = replace(solved.model, vehicle=replace(solved.model.vehicle, unknown=()))
     numbers = (*sensed, *bodily(begun, tuple(found_numbers(solved, spread))))
     if forecast is None:
-        numbers = tuple(beside_loop(numbers, loop))
+        numbers = tuple(widened_by_loop(numbers, loop))
     gusts: FoundGusts | None = None
     if forecast is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
@@ -321,7 +321,7 @@ def _beyond_any(vehicle: VehicleSettings, numbers: Sequence[FoundNumber]) -> Ite
                 yield number.name
 
 
-def beside_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[FoundNumber]:
+def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterator[FoundNumber]:
     """Widen the intervals of inertia and drag factor by what the loop leaves open.
 
     About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where

@@ -12,11 +12,11 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics import CELLS, InertiaFunctions, inertia_matrix, not_positive_definite, rigid_columns, vertical
 from cpfls_cli.identification.data import OtherTorque, TorqueSource
 from cpfls_cli.identification.evaluator import Evaluator
-from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.samples import Products, Ready
 from cpfls_cli.identification.settings import ValidationSettings
 from cpfls_cli.identification.solver import Fit
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
+from cpfls_cli.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.regressor.regressor import RIGID, Motion, Regressor
 from cpfls_cli.result import BODY, EULER, about
 from cpfls_cli.validation.replay import CLEAR

@@ -13,7 +13,6 @@ from cpfls_cli.blocks import mean_error
 from cpfls_cli.errors import SettingError
 from cpfls_cli.fuzzy.basis import InputMap
 from cpfls_cli.identification.data import TorqueData, TorqueSource, axis_scale, gathered
-from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.samples import Products, Ready, Samples
 from cpfls_cli.identification.settings import Base, IdentificationSettings
 from cpfls_cli.identification.solver import (
@@ -24,6 +23,7 @@ from cpfls_cli.identification.solver import (
     ridge_curve,
     with_folds,
 )
+from cpfls_cli.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.regressor.regressor import RIGID, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.result import about

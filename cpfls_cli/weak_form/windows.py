@@ -1,6 +1,6 @@
 """Weak form: averages over smooth windows, with derivatives moved onto the window by integration by parts."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Protocol, Self
@@ -15,6 +15,7 @@ from cpfls_cli.errors import InputError
 FEWEST_SAMPLES = 8  # Of a window: fewer do not follow its curve.
 FEWEST_WINDOWS = 16  # Windows below which a flight is too short.
 _SAME_RATE = 1e-3  # Relative difference of sampling periods that clocks of one logger have, and that no floor shows.
+_WHOLE = (slice(None),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,21 +36,18 @@ class Windows:
         first = time[0] + 0.5 * (len(self.weight) - 1) * self.period
         return np.asarray(first + np.arange(self.count(len(time))) * self.hop * self.period)
 
-    def average(self, values: Array) -> Array:
-        """Average values, shape (time, ...), over each window, ``int phi x dt``, shape (window, ...)."""
-        return np.asarray(self.laid(values, self.weight))
+    def average(self, values: Array, stretches: Iterable[slice] = _WHOLE) -> Array:
+        """Average values, shape (time, ...), over windows of each stretch, ``int phi x dt``, shape (window, ...)."""
+        return np.concatenate([self.laid(values[part], self.weight) for part in (slice(0), *stretches)])
 
-    def derivative(self, values: Array) -> Array:
+    def derivative(self, values: Array, stretches: Iterable[slice] = _WHOLE) -> Array:
         """Average the time derivative as `average` does, ``-int phi' x dt``; nothing is differentiated."""
-        return np.asarray(-self.laid(values, self.slope))
+        return np.concatenate([-self.laid(values[part], self.slope) for part in (slice(0), *stretches)])
 
-    def balance(self, direct: Array, momentum: Array | None = None) -> Array:
-        """Average ``direct + d/dt momentum``, shapes (time, ...), over each window, shape (window, ...)."""
-        return self.average(direct) if momentum is None else self.average(direct) + self.derivative(momentum)
-
-    def over(self, stretches: Iterable[slice], seen: Callable[[Array], Array], values: Array) -> Array:
-        """Average, or differentiate, over the windows of one stretch of samples after another, shape (window, ...)."""
-        return np.concatenate([seen(values[part]) for part in (slice(0), *stretches)])
+    def balance(self, direct: Array, momentum: Array | None = None, stretches: Sequence[slice] = _WHOLE) -> Array:
+        """Average ``direct + d/dt momentum``, shapes (time, ...), as `average` does, shape (window, ...)."""
+        averaged = self.average(direct, stretches)
+        return averaged if momentum is None else averaged + self.derivative(momentum, stretches)
 
     def middles(self, stretches: Iterable[slice]) -> IntArray:
         """Give the sample in the middle of each window of these stretches, shape (window,)."""

@@ -18,8 +18,8 @@ from cpfls_cli.identification.evaluator import (
     uniform_chromosome,
 )
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
+from cpfls_cli.least_squares import SMALLEST_SINGULAR_SHARE
 from cpfls_cli.regressor.regressor import RIGID, Motion, Regressor, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 from cpfls_cli.trajectory.planning import plan

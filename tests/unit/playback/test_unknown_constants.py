@@ -10,7 +10,7 @@ from cpfls_cli.playback.fit import Fitted
 from cpfls_cli.playback.loop import LoopBounds, _factors
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.vehicle import FoundNumber, beside_loop, bodily, carrying_weight, find_vehicle
+from cpfls_cli.playback.vehicle import FoundNumber, bodily, carrying_weight, find_vehicle, widened_by_loop
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
 TRUE = truth()
@@ -152,7 +152,7 @@ def test_intervals_hold_what_the_loop_leaves_open():
     names = ("thrust_factor", "drag_factor", "inertia.Ixx", "inertia.Iyy", "inertia.Izz", "rotor_drag.k_d")
     numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in names]
     still = replace_explained(LOOP, 0.95)
-    wide = {number.name: number for number in beside_loop(numbers, still)}
+    wide = {number.name: number for number in widened_by_loop(numbers, still)}
     assert (wide["inertia.Ixx"].low, wide["inertia.Ixx"].high) == pytest.approx((0.72, 1.21))
     assert (wide["inertia.Iyy"].low, wide["inertia.Iyy"].high) == pytest.approx((0.45, 1.76))
     # Of yaw the flights say nothing by which a fit could have been misled.
@@ -164,10 +164,10 @@ def test_flights_that_show_the_loop_determine_what_carries_the_weight_alone():
     names = ("thrust_factor", "drag_factor", "inertia.Ixx", "lag.time_constant_s", "rotor_drag.k_d")
     numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in names]
     assert LOOP.shows_loop
-    assert [number.name for number in beside_loop(numbers, LOOP) if number.determined] == ["thrust_factor"]
+    assert [number.name for number in widened_by_loop(numbers, LOOP) if number.determined] == ["thrust_factor"]
     # A law found beside it carries a part of the weight, and answers with the loop as every effect.
     numbers.append(FoundNumber("thrust_law.linear", "", -0.3, -0.4, -0.2, np.nan, True, False))
-    assert not any(number.determined for number in beside_loop(numbers, LOOP))
+    assert not any(number.determined for number in widened_by_loop(numbers, LOOP))
 
 
 def replace_explained(bounds, share):

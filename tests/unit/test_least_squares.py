@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from cpfls_cli import least_squares
 from cpfls_cli.dynamics import outside_visited, visited_cells
-from cpfls_cli.identification import least_squares
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.findings import rule_excitation
-from cpfls_cli.identification.least_squares import (
+from cpfls_cli.identification.samples import Ready, Samples
+from cpfls_cli.least_squares import (
     SMALLEST_SINGULAR_SHARE,
     NormalEquations,
     Triangle,
@@ -15,7 +16,6 @@ from cpfls_cli.identification.least_squares import (
     solve,
     solve_normal,
 )
-from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.regressor.regressor import Motion, data_ranges, uniform_breakpoints
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
