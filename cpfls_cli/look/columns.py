@@ -50,7 +50,7 @@ class LookedLog:
     def found(self, *signals: str) -> Iterator[Samples]:
         """Give what the rows of `KNOWN` name, in SI and in axes forward, right, down, the first row first."""
         for row in KNOWN:
-            if row.signal in signals and is_of(self.system, row.system):
+            if row.signal in signals and (not self.system or is_of(self.system, row.system)):
                 samples = self.samples(row.columns)
                 if samples is not None:
                     factor = row.scale * (known_unit(row.unit).factor if row.unit else 1.0)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -225,6 +227,14 @@ def test_thrust_that_stays_at_nothing_is_no_flight():
     contents.topics["ATT"] |= {f"Des{name}": contents.topics["ATT"][name] for name in ("Roll", "Pitch", "Yaw")}
     with pytest.raises(InputError, match="stays at 0"):
         read(contents)
+
+
+def test_a_cut_of_a_log_without_a_word_on_its_writer():
+    """Outputs of its rate loop are known by their names."""
+    output = named(logs.command(OWN, "ardupilot"), "ROut", "POut", "YOut")
+    contents = logs.ardupilot(OWN, motors=10, more={"RATE": topic(OWN, 2, output)})
+    found = read(replace(contents, system=""))
+    assert found.command_source == "output of the rate loop, RATE.ROut, POut, YOut"
 
 
 def test_output_in_counts_of_old_copters():
