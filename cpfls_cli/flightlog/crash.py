@@ -15,8 +15,8 @@ ALIVE = 0.02  # Share of the largest command below which rotors stand.
 # some 10 degrees; and that above which it surely flies.
 _REST_S, _CALM_RAD_S, _TURNED_RAD_S, LIVELY_RAD_S = 1.5, 0.5, 0.15, 0.05
 SLOW_S = 0.5  # Means over so long hold no vibration.
-# Of gravity: size of the force that carries a vehicle at rest, and its share along the thrust below which no rotor
-# does: more than 60 degrees off.
+# Of gravity: size of the force that carries a vehicle at rest, its share along the thrust below which no rotor does,
+# more than 60 degrees off, and the mean force from which on it climbs or turns.
 _WEIGHT, _OFF_THRUST, _LIFTS = (0.8, 1.2), 0.5, 1.05
 _SENSES = (0.7, 2.0)  # Of gravity: the median force of a log, by which an accelerometer and its unit are believed.
 # For how long no rotor that carries the weight can be above its vehicle, which would fall 88 m meanwhile; and the share
@@ -355,6 +355,8 @@ def _ignores_rotors(signs: Signs, part: tuple[int, int], troubled: int) -> bool:
         return False
     first, after = part
     begin = max(first, troubled - round(_AT_ONCE_S / signs.period))
+    if (begin - first) * signs.period < _FEWEST_S - _AT_ONCE_S:
+        return False
     turned = np.gradient(averaged(signs.body_rate, signs.period, _TURN_S), signs.period, axis=0)
     driven = averaged(np.nan_to_num(signs.rotors) ** 2, signs.period, _TURN_S)
     # Motors and propellers follow a command late.
