@@ -160,6 +160,8 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
         return Resting(nowhere, nowhere)
     held = active & _held_four(signs)
     free = active & ~held
+    if not free.any():
+        return Resting(held, nowhere)
     lively = free & (signs.slow > LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else free
     turned = averaged(signs.rate, signs.period, _REST_S)

@@ -96,6 +96,12 @@ def test_a_log_that_ends_upside_down_after_a_few_seconds_of_flight():
     assert flown(over).ended == ""
 
 
+def test_a_vehicle_that_hangs_on_one_of_four_rotors_throughout_does_not_fly():
+    time, noise = np.arange(0.0, 20.0, 0.02), np.random.default_rng(0).standard_normal((1000, 3))
+    rotors, force = np.tile([0.9, 0.1, 0.1, 0.1], (1000, 1)), [0.6, 0.0, 0.8] + 0.01 * noise
+    assert not find_flown(Signs(time=time, rotors=rotors, body_rate=0.02 * noise, force=force)).flies
+
+
 def test_a_hop_says_how_it_ended():
     stands = ended.then(flight(0.1), 6.0)
     found = flown(ended.joined(stands, ended.rocks_on_its_back(flight(1.0))), ("force",))
