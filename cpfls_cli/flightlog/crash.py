@@ -15,9 +15,9 @@ ALIVE = 0.02  # Share of the largest command below which rotors stand.
 # some 10 degrees; and that above which it surely flies.
 _REST_S, _CALM_RAD_S, _TURNED_RAD_S, LIVELY_RAD_S = 1.5, 0.5, 0.15, 0.05
 SLOW_S = 0.5  # Means over so long hold no vibration.
-# Of gravity: size of the force that carries a vehicle at rest, and its share along the thrust below which no rotor
-# does: more than 60 degrees off.
-_WEIGHT, _OFF_THRUST = (0.8, 1.2), 0.5
+# Of gravity: size of the force that carries a vehicle at rest, its share along the thrust below which no rotor does,
+# more than 60 degrees off, and the mean force from which on it climbs or turns.
+_WEIGHT, _OFF_THRUST, _LIFTS = (0.8, 1.2), 0.5, 1.05
 _SENSES = (0.7, 2.0)  # Of gravity: the median force of a log, by which an accelerometer and its unit are believed.
 # For how long no rotor that carries the weight can be above its vehicle, which would fall 88 m meanwhile; and the share
 # of the time with rotors on that is so where an attitude is wrong throughout.
@@ -160,13 +160,16 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
         return Resting(nowhere, nowhere)
     held = active & _held_four(signs)
     free = active & ~held
+    if not free.any():
+        return Resting(held, nowhere)
     lively = free & (signs.slow > LIVELY_RAD_S)
     flies = lively if lively.sum() * signs.period > _FEWEST_S else free
     turned = averaged(signs.rate, signs.period, _REST_S)
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
     calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
-    lies = calm & _off_its_feet(signs, flies)
-    rests = calm & (lies | (active & _stuck(signs, flies)))
+    off, pulled = _off_its_feet(signs, flies)
+    lies = pulled | (calm & off)
+    rests = lies | (calm & active & _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
     # A mean over a time says as much of all of it.
     carried = held | binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
@@ -200,18 +203,25 @@ def turns_over(signs: Signs, active: BoolArray) -> bool:
     return long > _OVER * int(on.sum())
 
 
-def _off_its_feet(signs: Signs, flies: BoolArray) -> BoolArray:
+def _off_its_feet(signs: Signs, flies: BoolArray) -> tuple[BoolArray, BoolArray]:
+    """Mark where something else than rotors carries the weight if it is calm, and where it does so in any case."""
     if signs.felt is not None:
-        thrust = np.median(signs.felt[flies], axis=0)
         felt = averaged(signs.felt, signs.period, _REST_S)
         size = np.linalg.norm(felt, axis=1)
-        off = felt @ thrust < _OFF_THRUST * size * float(np.linalg.norm(thrust))
-        return np.asarray(off & (size > _WEIGHT[0]) & (size < _WEIGHT[1]))
+        # Nothing but rotors pushes with more than the weight for long, but where it hits; and it starts on its feet.
+        hit = averaged(np.linalg.norm(signs.felt, axis=1) > HARD, signs.period, 2 * _REST_S) > 0
+        lifts = flies & (size > _LIFTS) & ~hit
+        first = np.flatnonzero(flies)[: max(1, round(_LIES_S / signs.period))]
+        thrust = np.median(felt[lifts if lifts.any() else first], axis=0)
+        along = felt @ thrust / np.maximum(size * float(np.linalg.norm(thrust)), 1e-12)
+        weight = (size > _WEIGHT[0]) & (size < _WEIGHT[1])
+        # No rotor pulls: what feels its weight from the side of its rotors lies on its back, however it rocks.
+        return weight & (along < _OFF_THRUST), weight & (along < -_OFF_THRUST)
     up = np.zeros(len(flies)) if signs.upright is None else _turned_up(signs.upright, flies)
-    return np.asarray(averaged(up, signs.period, _REST_S) < 0)
+    return np.asarray(averaged(up, signs.period, _REST_S) < 0), np.zeros(len(flies), dtype=bool)
 
 
-def _turned_up(upright: Array, flies: BoolArray) -> Array:
+def _turned_up(upright: Array, flies: BoolArray | slice) -> Array:
     return np.asarray(upright * (np.sign(np.median(upright[flies])) or 1.0))
 
 
@@ -293,7 +303,7 @@ def _crash(signs: Signs, troubled: IntArray, hits: IntArray, strained: IntArray)
     """Say where a crash began: where it hit, or lost control before that."""
     begin = _last_burst(troubled, signs.period)
     struck = hits[(hits - begin) * signs.period > -_AT_ONCE_S / 2]
-    at_once = len(struck) > 0 and (struck[0] - begin) * signs.period < _AT_ONCE_S / 2
+    at_once = len(struck) > 0 and (struck[0] - begin) * signs.period < _FALL_S
     begin = min(begin, int(struck[0])) if at_once else begin
     origin = _last_burst(np.append(strained[strained < begin], begin), signs.period)
     for fall, hit in _falls(signs):
@@ -318,7 +328,10 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
     stop = min(len(signs.time), after + round(_THEN_S / signs.period))
     late = np.arange(first, stop) >= before.stop
     nothing = np.zeros(stop - first, dtype=bool)
-    if signs.turning is None or signs.body_rate is None or (before.stop - first) * signs.period < _FEWEST_S:
+    # What lies afterwards, or is upside down where the log ends, flew no more, however short it flew.
+    over = after == len(signs.time) and signs.upright is not None and _turned_up(signs.upright, before)[-1] < 0
+    fewest = _REST_S if lies_then or over else _FEWEST_S
+    if signs.turning is None or signs.body_rate is None or (before.stop - first) * signs.period < fewest:
         return nothing, nothing, nothing
 
     def beyond(values: Array, least: float) -> BoolArray:
@@ -328,7 +341,7 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
     spins = np.linalg.norm(np.gradient(signs.body_rate, signs.period, axis=0), axis=1)
     wild, strained = beyond(signs.turning, _WILD_RAD_S), beyond(signs.turning, _STRAINED_RAD_S)
     if signs.upright is not None:
-        up = _turned_up(signs.upright, np.arange(len(signs.time)) < before.stop)
+        up = _turned_up(signs.upright, slice(before.stop))
         strained |= beyond(np.arccos(np.clip(up, -1.0, 1.0)), _STRAINED_RAD)
     if signs.rotors is not None:
         strained &= (signs.rotors[first:stop] >= _AT_LIMIT * float(np.nanmax(signs.rotors))).any(axis=1)
@@ -344,6 +357,8 @@ def _ignores_rotors(signs: Signs, part: tuple[int, int], troubled: int) -> bool:
         return False
     first, after = part
     begin = max(first, troubled - round(_AT_ONCE_S / signs.period))
+    if (begin - first) * signs.period < _FEWEST_S - _AT_ONCE_S:
+        return False
     turned = np.gradient(averaged(signs.body_rate, signs.period, _TURN_S), signs.period, axis=0)
     driven = averaged(np.nan_to_num(signs.rotors) ** 2, signs.period, _TURN_S)
     # Motors and propellers follow a command late.

@@ -367,10 +367,13 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> Flown
         cut.append((begin + (margin if first > 0 else 0.0), end - (0.0 if free else margin)))
     chosen = max(range(len(cut)), key=lambda index: cut[index][1] - cut[index][0])
     (first, after), (begin, end) = stretches[chosen], cut[chosen]
-    if end - begin < SHORTEST_FLIGHT_S:
-        return FlownPart(None, (f"flies for {too_short(end - begin)}",), flies=False)
-    reasons = []
     early = [index for index, own in enumerate(ends) if own]
+    # How the stretch that is used ended matters more than how another one did.
+    index = chosen if ends[chosen] else early[0] if early else chosen
+    ended = ", ".join(crash.MOMENTS[what].format(time[at]) for what, at in ends[index].items())
+    if end - begin < SHORTEST_FLIGHT_S:
+        return FlownPart(None, ("; ".join(filter(None, (f"flies for {too_short(end - begin)}", ended))),), flies=False)
+    reasons = []
     ground, landed = stretches[0][0], stretches[-1][1]
     if ground > 0 and not any(index < chosen for index in early):
         reasons.append(f"the first {cut[0][0] - time[0]:.1f} s are cut: {_how(signs, slice(0, ground), how)}")
@@ -381,9 +384,6 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> Flown
     if others:
         reasons.append(f"it also flies at {', '.join(others)}; import.crop_s takes one stretch, the longest")
     whole = first == 0 and after == len(time) and not ends[chosen]
-    # How the stretch that is used ended matters more than how another one did.
-    index = chosen if ends[chosen] else early[0] if early else chosen
-    ended = ", ".join(crash.MOMENTS[what].format(time[at]) for what, at in ends[index].items())
     used = f"the {end - begin:.0f} s before it are used" if index == chosen else f"{begin:.1f} to {end:.1f} s are used"
     span = None if whole else (round(begin, 2), round(end, 2))
     moments = tuple((what, float(time[at])) for own in ends for what, at in own.items())

@@ -25,7 +25,7 @@ from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
 if TYPE_CHECKING:
     from cpfls_cli.flightlog.rebuilt import Rebuilt
 
-_TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?")
+_TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?|millis|micros")
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
@@ -118,16 +118,21 @@ class LogTable:
 def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str, str]:
     """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
     ranks: dict[str, int] = {}
+    refused = ""
     groups = Counter(name.rpartition("/")[0] for name in fields)
     for name, values in fields.items():
         # In a struct of MATLAB, or a group of HDF5, what comes last says what it is; alone it is a unit, as in deg/sec.
         (group, _, last), known = name.rpartition("/"), np.asarray(values, dtype=float)
         lower = (last if groups[group] > 1 else name).lower().strip()
-        known = known[np.isfinite(known)]
+        rows = np.flatnonzero(np.isfinite(known))
+        known = known[rows]
         usual = _TIME_NAMES.fullmatch(lower)
-        rises = len(known) > max(2, 0.5 * len(values)) and (np.diff(known) >= 0).all() and np.ptp(known) > 0
+        changes = len(known) > max(2, 0.5 * len(values)) and np.ptp(known) > 0
+        falls = np.flatnonzero(np.diff(known) < 0)
         named = usual or "time" in lower or "stamp" in lower
-        if rises and (named or units.get(name) == "s"):
+        if changes and usual and len(falls):
+            refused = f"{name} falls at row {rows[falls[0] + 1] + 1} of {len(values)}: keep the rows of one flight"
+        if changes and not len(falls) and (named or units.get(name) == "s"):
             ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2 if named else 3
     for name in sorted(ranks, key=ranks.__getitem__):
         step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
@@ -142,11 +147,14 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
             elif step == 1:
                 doubt = f"{name} rises by 1 from row to row, so it may count rows: is import.time_unit right?"
             return name, unit, doubt
+        if ranks[name] < 2:
+            refused = f"{name} rises by {step:.3g} between most rows, as no clock of a flight does: log finer stamps"
     clock = nameless_clock(fields)
     if clock is not None:
         return clock, "s", ""
     raise InputError(
-        "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
+        refused
+        or "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
         " rename it, or write the config by hand (`cpfls config` prints every key)"
     )
 

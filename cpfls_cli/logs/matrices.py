@@ -1,8 +1,10 @@
 """Reader of HDF5 and of MATLAB's .mat: arrays of numbers by their path, the columns of a matrix one by one."""
 
+import contextlib
 import struct
 import subprocess
 import sys
+import warnings
 import zlib
 from collections.abc import Collection, Iterable, Iterator
 from functools import lru_cache
@@ -151,15 +153,22 @@ def _of_mat(path: Path) -> Iterator[tuple[str, Any, str]]:
             yield prefix, value, ""
 
     _refuse_inflated(path)
-    variables = scipy.io.loadmat(str(path), simplify_cells=True)
-    yield from within("", {name: value for name, value in variables.items() if not name.startswith("__")})
+    with warnings.catch_warnings():
+        # Objects of MATLAB's own classes have no names, so that of several the last is kept: none of them is read.
+        warnings.simplefilter("ignore", scipy.io.matlab.MatReadWarning)
+        read = scipy.io.loadmat(str(path), simplify_cells=True)
+    variables = {name: value for name, value in read.items() if not name.startswith("__")}
+    if variables and all(isinstance(value, scipy.io.matlab.MatlabOpaque) for value in variables.values()):
+        raise InputError(f"{path}: holds objects or tables, which MATLAB alone reads: save their columns as vectors")
+    yield from within("", variables)
 
 
 def _refuse_inflated(path: Path) -> None:
     """Refuse a .mat whose compressed variables hold more than memory may, out of proportion to the file."""
     size = path.stat().st_size
-    # What is stored in a byte each is read as numbers of eight.
-    _require_held(path, sum(8 * prod(shape) for _, shape, _ in scipy.io.whosmat(str(path))), size)
+    # What is stored in a byte each is read as numbers of eight. What MATLAB alone reads has no shape.
+    with contextlib.suppress(TypeError):
+        _require_held(path, sum(8 * prod(shape) for _, shape, _ in scipy.io.whosmat(str(path))), size)
     total = 0
     with path.open("rb") as stream:
         head = stream.read(128)

@@ -12,7 +12,7 @@ from cpfls_cli.flightlog.names import is_of
 from cpfls_cli.flightlog.recognised import LogTable
 from cpfls_cli.flightlog.smoothing import low_pass
 from cpfls_cli.flightlog.topics import STAMP, Topics
-from cpfls_cli.flightlog.vocabulary import KNOWN
+from cpfls_cli.flightlog.vocabulary import CRAZYFLIE, KNOWN
 from cpfls_cli.look.flight import Samples
 from cpfls_cli.units import known_unit
 
@@ -49,10 +49,12 @@ class LookedLog:
 
     def found(self, *signals: str) -> Iterator[Samples]:
         """Give what the rows of `KNOWN` name, in SI and in axes forward, right, down, the first row first."""
+        # On its card a Crazyflie puts the name of an event before that of a variable.
+        events = ("", *(f"{topic}." for topic in self.table.topics if self.system.startswith(CRAZYFLIE)))
         for row in KNOWN:
-            if row.signal in signals and is_of(self.system, row.system):
-                samples = self.samples(row.columns)
-                if samples is not None:
+            if row.signal in signals and (not self.system or is_of(self.system, row.system)):
+                named = (self.samples([event + column for column in row.columns]) for event in events)
+                for samples in filter(None, named):
                     factor = row.scale * (known_unit(row.unit).factor if row.unit else 1.0)
                     signs = np.array(row.sign or (1.0,)) * (FRD if row.frame == "FLU" else 1.0)
                     yield samples._replace(values=factor * signs * samples.values)

@@ -52,6 +52,7 @@ def joined(first, second):
 
 UPSIDE_DOWN = (0.0, 0.0, -GRAVITY)
 ONE_AT_FULL = (1.6, 0.3, 0.3, 0.3)
+TWO_AT_FULL = (1.6, 0.3, 1.6, 0.3)
 
 
 def hits(own):
@@ -112,6 +113,16 @@ def rocks_on_the_ground(own):
     rocks = then(struck, 25.0, rotors=ONE_AT_FULL)
     late = rocks.time > struck.time[-1]
     rocks.rate[late] += 0.6 * np.sin(4 * rocks.time[late, None])
+    return rocks
+
+
+def rocks_on_its_back(own, seconds=12.0):
+    """Tumble for a second, hit the ground, and rock on the back with the rotors on."""
+    tumbles = then(own, 1.0, rate=-14.0, felt=(0.0, 0.0, 6.0), rotors=TWO_AT_FULL, falls=4.0)
+    struck = then(tumbles, 0.06, rate=-16.0, felt=(30.0, -20.0, 60.0), rotors=TWO_AT_FULL)
+    rocks = then(struck, seconds, felt=UPSIDE_DOWN, rotors=TWO_AT_FULL, roll=np.pi)
+    late = rocks.time > struck.time[-1]
+    rocks.rate[late] += 2.0 * np.sin(4 * rocks.time[late, None])
     return rocks
 
 

@@ -78,6 +78,38 @@ def test_a_vehicle_on_its_back_does_not_fly_whatever_its_rotors_do(own, known):
     assert found.ended
 
 
+@pytest.mark.parametrize("known", [ALL, ("force",)])
+def test_a_crash_after_a_few_seconds_of_flight(known):
+    """No rotor pulls: what feels its weight from above lies on its back, however it rocks."""
+    found = flown(ended.rocks_on_its_back(flight(4.0)), known)
+    assert found.span_s == (0.0, pytest.approx(4.0, abs=0.2))
+    assert re.fullmatch(r"loss of control at 4\.\d s, impact at 5\.0 s", found.ended)
+
+
+def test_a_log_that_ends_upside_down_after_a_few_seconds_of_flight():
+    found = flown(ended.rocks_on_its_back(flight(4.0), 0.5))
+    assert re.fullmatch(r"loss of control at 4\.\d s, impact at 5\.0 s", found.ended)
+    assert flown(ended.rocks_on_its_back(flight(4.0), 0.5), ("force",)).ended == ""
+    # What turns over and has hit nothing may be in a flip, whose rotors so short a log does not explain.
+    over = ended.then(flight(4.0), 1.0, rate=-16.0, felt=(0.0, 0.0, 3.0), rotors=1.0)
+    assert np.cos(over.angles[-1, 0]) < 0
+    assert flown(over).ended == ""
+
+
+def test_a_vehicle_that_hangs_on_one_of_four_rotors_throughout_does_not_fly():
+    time, noise = np.arange(0.0, 20.0, 0.02), np.random.default_rng(0).standard_normal((1000, 3))
+    rotors, force = np.tile([0.9, 0.1, 0.1, 0.1], (1000, 1)), [0.6, 0.0, 0.8] + 0.01 * noise
+    assert not find_flown(Signs(time=time, rotors=rotors, body_rate=0.02 * noise, force=force)).flies
+
+
+def test_a_hop_says_how_it_ended():
+    stands = ended.then(flight(0.1), 6.0)
+    found = flown(ended.joined(stands, ended.rocks_on_its_back(flight(1.0))), ("force",))
+    assert not found.flies
+    assert found.reasons[0].startswith("flies for only ")
+    assert found.reasons[0].endswith("; from 8.1 s on it rests on something, with its rotors on")
+
+
 @pytest.mark.parametrize("known", [ALL, ("force",), ("height",)])
 def test_rotors_that_stop_in_the_air_are_no_landing(own, known):
     found = flown(ended.stops_in_the_air(own), known)

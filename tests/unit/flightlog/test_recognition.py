@@ -291,6 +291,8 @@ def test_time_on_the_ground_and_idling_is_cut(own):
     [
         ({"speed": named(np.zeros((2000, 4)), "cmd1", "cmd2", "cmd3", "cmd4")}, "the rotors (cmd*) never change"),
         ({"t": None}, "no column of time stamps is recognised"),
+        ({"t": {"t": np.arange(2000) % 1500 * 0.015}}, "t falls at row 1501 of 2000: keep the rows of one flight"),
+        ({"t": {"t": np.arange(2000) // 60 * 1.0}}, "t rises by 0 between most rows, as no clock of a flight does"),
     ],
 )
 def test_what_is_no_flight_is_refused(own, changed, message):
@@ -302,6 +304,11 @@ def test_what_shows_no_flight_is_said_with_what_it_holds(own):
     bare = flat_log(own, **dict.fromkeys(("speed", "rate", "position", "velocity")))
     with pytest.raises(InputError, match=r"^holds attitude and acceleration alone: no rotors, no height and no rates"):
         seen(bare)
+
+
+def test_milliseconds_of_a_counter_are_a_clock(own):
+    recognition = seen(flat_log(own, t={"millis": np.round(1000 * own.time)}))
+    assert (recognition.time_column, recognition.time_unit) == ("millis", "ms")
 
 
 def test_a_date_is_a_clock_whatever_its_name(own):

@@ -495,6 +495,35 @@ def test_a_file_without_columns(tmp_path):
         log_contents(tmp_path / "log.h5")
 
 
+def test_a_table_of_matlab_beside_a_vector_and_alone(tmp_path):
+    def element(kind: int, own: bytes) -> bytes:
+        return struct.pack("<II", kind, len(own)) + own + bytes(-len(own) % 8)
+
+    # An object of one of MATLAB's own classes: it has neither a shape nor a name of its own that SciPy reads.
+    numbers = element(
+        14,
+        element(6, struct.pack("<II", 13, 0))
+        + element(5, struct.pack("<ii", 2, 1))
+        + element(1, b"")
+        + element(6, struct.pack("<II", 1, 2)),
+    )
+    table = element(
+        14,
+        element(6, struct.pack("<II", 17, 0))
+        + element(1, b"log")
+        + element(1, b"MCOS")
+        + element(1, b"table")
+        + numbers,
+    )
+    scipy.io.savemat(tmp_path / "log.mat", {"gyro_x": np.arange(5.0)})
+    with (tmp_path / "log.mat").open("ab") as file:
+        file.write(table)
+    assert list(log_contents(tmp_path / "log.mat").topics[""]) == ["gyro_x"]
+    (tmp_path / "log.mat").write_bytes((tmp_path / "log.mat").read_bytes()[:128] + table)
+    with pytest.raises(InputError, match=r"log\.mat: holds objects or tables, which MATLAB alone reads: save"):
+        log_contents(tmp_path / "log.mat")
+
+
 def test_an_artifact_of_this_program_is_no_log(tmp_path):
     hdf5(tmp_path / "flight.h5")
     with h5py.File(tmp_path / "flight.h5", "a") as file:

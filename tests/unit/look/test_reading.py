@@ -1,7 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
+from cpfls_cli.logs.formats import LogContents
 from cpfls_cli.look.columns import on_clock
 from cpfls_cli.look.flight import Samples
 from cpfls_cli.look.hover import hover_of
@@ -225,6 +228,28 @@ def test_thrust_that_stays_at_nothing_is_no_flight():
     contents.topics["ATT"] |= {f"Des{name}": contents.topics["ATT"][name] for name in ("Roll", "Pitch", "Yaw")}
     with pytest.raises(InputError, match="stays at 0"):
         read(contents)
+
+
+def test_a_cut_of_a_log_without_a_word_on_its_writer():
+    """Outputs of its rate loop are known by their names."""
+    output = named(logs.command(OWN, "ardupilot"), "ROut", "POut", "YOut")
+    contents = logs.ardupilot(OWN, motors=10, more={"RATE": topic(OWN, 2, output)})
+    found = read(replace(contents, system=""))
+    assert found.command_source == "output of the rate loop, RATE.ROut, POut, YOut"
+
+
+def test_variables_of_an_event_on_the_card_of_a_crazyflie():
+    """Neither followed nor compared, setpoints and outputs are known by what stands after the name of the event."""
+    asked, acts = np.random.default_rng(4).standard_normal(OWN.rate.shape), logs.command(OWN, "ardupilot")
+    columns = (
+        named(np.degrees(OWN.rate), "gyro.x", "gyro.y", "gyro.z")
+        | named(np.degrees(asked), "controller.rollRate", "controller.pitchRate", "controller.yawRate")
+        | named(65536 * acts, "controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw")
+    )
+    found = read(LogContents({"fixedFrequency": topic(OWN, 1, columns)}, {}, {}, "Crazyflie uSD"))
+    assert found.command_source.startswith("output of the rate loop, fixedFrequency.controller.cmd_roll")
+    np.testing.assert_allclose(found.command[2:-2:2], on(found, acts)[2:-2:2], atol=5e-3)
+    np.testing.assert_allclose(found.rate_setpoint[2:-2:2], on(found, asked * [1, 1, -1])[2:-2:2], atol=5e-3)
 
 
 def test_output_in_counts_of_old_copters():
