@@ -20,7 +20,7 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.balance_system import System, system
+from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import TURNING, Preparation, WeakFlight
 from cpfls_cli.gap.extended import ExtendedModel, renewed
@@ -32,6 +32,7 @@ from cpfls_cli.gap.naming.by_instruments import (
     unidentified_axes,
     with_lean,
 )
+from cpfls_cli.gap.naming.by_samples import small_effects, with_small_effects
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     all_numbers,
@@ -123,6 +124,7 @@ def diagnose(
             named = _judged_with_lags(_significant(searched, given), given, across)
             if _wrong_inertia(named):
                 named = _at_stated_inertia(searched, flights, given, across) or named
+            named = _with_small(named, gusts, given, across)
             gusts = _gusts(named, given, settings)
     losses = _losses(flights, named, settings, rng)
     if losses:
@@ -308,6 +310,35 @@ def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Name
     return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure)
 
 
+def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) -> _Named:
+    """Add what is significant by samples, which averages over windows do not resolve in gusts."""
+    found, last = named.judgement.found, named.steps[-1]
+    chosen = [each.effect for each in found.hypothesis.chosen]
+    names = {each.name for each in chosen}
+    held = frozenset[str]().union(*(each.holds for each in chosen))
+    candidates = [
+        each
+        for each in (*(scored.candidate for scored in last.ranking), *last.hypothesis.chosen)
+        if is_free(each)
+        and found.hypothesis.can(each)
+        and each.effect.name not in names | held
+        and not (each.effect.is_lag or each.effect.physical)
+    ]
+    # Filtered noise correlates with what was before.
+    open_ = np.all([np.isinf(flight.cut_off) for flight in (*found.hypothesis.flights, *named.judge.repaired)], axis=0)
+    small = small_effects(found, named.judge.repaired, candidates, gusts.split & open_)
+    if named.differ or not small:
+        return named
+    judgement = named.judge.judge(with_lean(with_small_effects(found, small, given), across))
+    if min(judgement.held_out.shares().values()) < found.settings.named_share:
+        return named
+    return named._replace(
+        judgement=judgement,
+        alike=(*named.alike, *(rival for each in small for rival in each.rivals)),
+        sure={**named.sure, **{each.candidate.effect.name: each.chance for each in small}},
+    )
+
+
 def _at_stated_inertia(named: _Named, flights: _Flights, given: Instruments, across: Array) -> _Named | None:
     """Find what explains as an inertia that is wrong does, and leaves it as the config states it; None if nothing.
 
@@ -427,6 +458,9 @@ def _concluded(
     if effects:
         remains = gap_remains(before, after, remainder, settings.named_share, len(named))
     verdict = verdict_of(effects, rivals, remains, tuple(removed.values()) or (1.0,), excited, settings)
+    if verdict is GapVerdict.NAMED and any(not CATALOGUE[rival.instead_of].is_lag for rival in found.alike):
+        # A rival that does as well as a small effect may be there instead.
+        verdict = GapVerdict.AMBIGUOUS
     # A fit that asks for numbers that no vehicle has says that the log is wrong, not the vehicle; or that its rotors,
     # held between rare samples, do not turn it.
     ratios = impossible_ratios(estimates.parameters)

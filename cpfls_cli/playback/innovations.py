@@ -3,12 +3,17 @@
 A gust blows whatever the vehicle does: nothing before predicts its innovations, nor any loop, and they are as large in
 gentle flight as in fierce. Those of an effect come from the motion, which goes on as it was, and are large where that
 is fierce.
+
+They are taken of windows that do not overlap, or of samples: ``r(t+1) - a r(t)`` is new since t, and so is the noise in
+it. Such differences correlate with those next to them, by noise that is differentiated. A filter that looks ahead makes
+them white and leaves the past an instrument; one that looks back would bring in old noise, which the past has as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +36,17 @@ MOST_PREDICTED = 1 / 5
 
 _DRAWS = 999
 """Of chance, so many that a rare one is known to a third."""
+
+ROW_S = 0.01
+"""Length of a row, s: samples of faster logs are averaged."""
+STRETCH = 40
+"""Rows that errors are taken over: longer than the filter."""
+_PAST = (2, 4, 8, 16, 32, 64)
+"""Rows ago between which the past is averaged; the nearest one has no sample of what is new."""
+_AHEAD = 20
+"""Rows that the filter looks ahead: beyond, noise of usual sensors shows no more; and over which a memory is taken."""
+_TINY = 1e-9
+"""Share of noise that is taken for none: what has no spectrum at some frequency cannot be made white there."""
 
 
 class Innovations(NamedTuple):
@@ -206,3 +222,120 @@ def ranks(rows: Array) -> Array:
     """Rank the rows of each column, equal ones alike, doubled and about their mean, so that products are exact."""
     places = [np.unique(levelled(column), return_inverse=True)[1] for column in rows.T]
     return np.array([2.0 * each - each.max(initial=0) for each in places]).T
+
+
+class Whitening(NamedTuple):
+    """What makes the innovations of a residual white, by channel.
+
+    Attributes
+    ----------
+    kept : array, shape (channel,)
+        Share of the disturbance that lasts from a row to the next.
+    ahead : array, shape (channel, row)
+        Weights of a difference and of those that follow.
+    scale : array, shape (channel,)
+        Standard deviation of the white residual; infinite for channels that are left out.
+    """
+
+    kept: Array
+    ahead: Array
+    scale: Array
+
+    def white(self, rows: Array) -> Array:
+        """Filter rows, shape (row, channel, ...), without the first ones, which have no past, and the last ones."""
+        from scipy.signal import lfilter
+
+        new = rows[1:] - self.kept.reshape(-1, *[1] * (rows.ndim - 2)) * rows[:-1]
+        channels = enumerate(zip(self.ahead, self.scale, strict=True))
+        each = [lfilter(ahead, [1.0], new[::-1, place], axis=0)[::-1] / scale for place, (ahead, scale) in channels]
+        return np.stack(each, axis=1)[_PAST[-1] : max(_PAST[-1], len(new) - _AHEAD)]
+
+
+def whitening(residual: Sequence[Array], used: BoolArray) -> Whitening:
+    """Find what makes the innovations of a residual white.
+
+    What lasts is the regression of the residual on itself, with its past as the instrument; the filter is that of an
+    autoregression in reversed time.
+
+    Parameters
+    ----------
+    residual : sequence of array, shape (row, channel)
+        Of each run.
+    used : array of bool, shape (channel,)
+
+    References
+    ----------
+    Hayashi and Sims 1983 (forward filtering, with instruments that are predetermined but not exogenous).
+    """
+    from scipy.linalg import solve_toeplitz
+
+    # What a run is off by throughout is no innovation.
+    off = [rows - rows.mean(axis=0) for rows in residual]
+    past = [before(rows)[..., 1:-1].mean(axis=-1) for rows in off]
+    later, now = (
+        np.sum([(own[_PAST[-1] + by :][: len(z)] * z).sum(axis=0) for own, z in zip(off, past, strict=True)], axis=0)
+        for by in (_AHEAD, 0)
+    )
+    kept = np.clip(later / np.where(now > 0, now, np.inf), 0.0, 1.0) ** (1 / _AHEAD)
+    new = [rows[1:] - kept * rows[:-1] for rows in off]
+    ahead, scale = np.eye(1, _AHEAD + 1) * np.ones((len(kept), 1)), np.full(len(kept), np.inf)
+    for channel in np.flatnonzero(used):
+        own = [rows[:, channel] for rows in new]
+        alike = np.array([sum(each[lag:] @ each[: len(each) - lag] for each in own) for lag in range(_AHEAD + 1)])
+        if alike[0] > 0:
+            alike[0] *= 1 + _TINY
+            weights = solve_toeplitz(alike[:-1], alike[1:])
+            ahead[channel, 1:] = -weights
+            scale[channel] = np.sqrt((alike[0] - weights @ alike[1:]) / sum(map(len, own)))
+    return Whitening(kept, ahead, scale)
+
+
+def before(rows: Array) -> Array:
+    """Average what was before each row that `Whitening.white` gives, shape (row, ..., part): over longer parts of it.
+
+    Parameters
+    ----------
+    rows : array, shape (row, ...)
+    """
+    total = np.concatenate([np.zeros((1, *rows.shape[1:])), np.cumsum(rows, axis=0)])
+    at = np.arange(_PAST[-1], len(rows) - 1 - _AHEAD)
+    parts = [(total[at - near + 1] - total[at - far + 1]) / (far - near) for near, far in pairwise(_PAST)]
+    return np.stack(parts, axis=-1)
+
+
+def predicted(common: Sequence[Array], own: Sequence[Array], values: Sequence[Array]) -> list[Array]:
+    """Predict columns of each run from instruments, by the other runs; of a single one by itself.
+
+    Parameters
+    ----------
+    common : sequence of array, shape (row, instrument)
+        Of all columns.
+    own : sequence of array, shape (row, column, instrument)
+        Of each column.
+    values : sequence of array, shape (row, column)
+
+    Returns
+    -------
+    list of array, shape (row, column)
+    """
+    sums = [_products_of_columns(*each) for each in zip(common, own, values, strict=True)]
+    out = []
+    for number, (z, its) in enumerate(zip(common, own, strict=True)):
+        others = [each for place, each in enumerate(sums) if place != number or len(sums) == 1]
+        gram, moment = (np.sum(each, axis=0) for each in zip(*others, strict=True))
+        scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=1, axis2=2), np.finfo(float).tiny))
+        gram = gram / (scale[:, :, None] * scale[:, None, :]) + RIDGE * np.eye(gram.shape[1])
+        weights = np.linalg.solve(gram, (moment / scale)[..., None])[..., 0] / scale
+        of_common, of_own = np.split(weights, [z.shape[1]], axis=1)
+        out.append(z @ of_common.T + np.einsum("tkp,kp->tk", its, of_own))
+    return out
+
+
+def _products_of_columns(z: Array, own: Array, values: Array) -> tuple[Array, Array]:
+    """Multiply the instruments of each column with each other, and with the column."""
+    count, width, parts = own.shape
+    cross = (z.T @ own.reshape(count, -1)).reshape(-1, width, parts).transpose(1, 0, 2)
+    turned = own.transpose(1, 2, 0)
+    common = np.broadcast_to(z.T @ z, (width, z.shape[1], z.shape[1]))
+    gram = np.block([[common, cross], [cross.transpose(0, 2, 1), turned @ turned.transpose(0, 2, 1)]])
+    return gram, np.concatenate([(z.T @ values).T, (turned @ values.T[..., None])[..., 0]], axis=1)

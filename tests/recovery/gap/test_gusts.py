@@ -26,6 +26,8 @@ HEAVY = 1.15
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 DAMPED = TRUE._replace(damping=6e-5)
+SMALL_DAMPING = 2e-5
+"""A third of what averages over windows show in these gusts, N m s."""
 SPUN = TRUE._replace(rotor_inertia=1e-7)
 INERTIA = np.array(TRUE.inertia)
 FEW = GapSettings(shifts=39)
@@ -46,8 +48,14 @@ def flown():
         for truth, swing in ((SPUN, 0.15), (TRUE, 0.5))
         for run in range(10, 14)
     ]
-    each = list(gusty_flights([*asked, *again, *damped, *late, *swung], 30.0))
-    parts = {"asked": 4, "again": 4, "calm": 3, "damped": 3, "late": 4, "spun": 4, "turned": 4}
+    # Rotor speeds are logged with three times the noise, which no loop sees.
+    small = [
+        Flight(truth._replace(speed_noise=0.003), GUSTS, path, path, reach=3.0, swing=0.15)
+        for truth in (TRUE._replace(damping=SMALL_DAMPING), TRUE)
+        for path in range(20, 26)
+    ]
+    each = list(gusty_flights([*asked, *again, *damped, *late, *swung, *small], 30.0))
+    parts = {"asked": 4, "again": 4, "calm": 3, "damped": 3, "late": 4, "spun": 4, "turned": 4, "small": 6, "noisy": 6}
     return {name: [each.pop(0) for _ in range(count)] for name, count in parts.items()}
 
 
@@ -154,6 +162,29 @@ def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
     assert effect.name == "motor_lag"
     # The gyroscope's noise is inside of the loop.
     assert number.low < TRUE.lag_s < number.high < 1.25 * TRUE.lag_s
+
+
+@pytest.mark.parametrize("setpoints", [True, False])
+def test_what_is_small_against_gusts_is_found_by_samples(flown, setpoints):
+    """Both of a damping's rivals do without it, and it without them, so that they are listed."""
+    recordings = recorded(flown["small"], TRUE.vehicle, setpoints=setpoints)
+    found = diagnose(recordings[:3], recordings[3:], FEW, np.random.default_rng(1)).diagnosis
+    (effect,) = found.effects
+    assert (found.verdict, effect.name) == (GapVerdict.AMBIGUOUS, "linear_damping")
+    assert "rotor_plane_damping" in {each.name for each in found.alternatives}
+    roll, pitch, yaw = effect.numbers
+    assert all(each.low < SMALL_DAMPING < each.high for each in (roll, pitch, yaw))
+    # Noise of the rotors does not bias it, and the loop's answers to gusts do not.
+    assert all(abs(each.value / SMALL_DAMPING - 1) < 0.25 for each in (roll, pitch))
+
+
+@pytest.mark.parametrize("setpoints", [True, False])
+def test_noise_of_rotors_that_no_loop_sees_is_no_small_effect(flown, setpoints):
+    recordings = recorded(flown["noisy"], TRUE.vehicle, setpoints=setpoints)
+    run = diagnose(recordings[:3], recordings[3:], FEW, np.random.default_rng(1))
+    assert run.air is not None
+    assert run.air.split.all()
+    assert run.diagnosis.verdict is GapVerdict.NO_GAP
 
 
 def test_what_instruments_identify_hangs_on_no_inertia_that_a_loop_gave_a_fit(flown):

@@ -1,0 +1,71 @@
+"""Innovations of a disturbance that lasts, with noise that is differentiated: white, and nothing that was before."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from cpfls_cli.playback.innovations import before, predicted, whitening
+
+KEPT = np.array([0.97, 0.99])
+
+
+@pytest.fixture(scope="module")
+def residual():
+    """Two runs of two channels: a Gauss-Markov process, and the derivative of noise as large as it."""
+    rng = np.random.default_rng(5)
+    runs = []
+    for _ in range(2):
+        drawn = rng.standard_normal((40000, 2)) * np.sqrt(1 - KEPT**2)
+        gusts = np.stack([lfilter([1.0], [1.0, -kept], own) for kept, own in zip(KEPT, drawn.T, strict=True)], axis=1)
+        runs.append(gusts + np.diff(rng.standard_normal((40001, 2)), axis=0))
+    return runs
+
+
+def test_what_lasts_is_found_below_noise_that_is_differentiated(residual):
+    found = whitening(residual, np.ones(2, dtype=bool))
+    assert np.allclose(found.kept, KEPT, atol=0.002)
+
+
+def test_innovations_are_white_and_correlate_with_nothing_before(residual):
+    found = whitening(residual, np.ones(2, dtype=bool))
+    for rows in residual:
+        new = found.white(rows)
+        assert np.allclose(new.std(axis=0), 1.0, atol=0.03)
+        error = 1 / np.sqrt(len(new))
+        for lag in (1, 2, 5, 20):
+            assert (np.abs((new[lag:] * new[:-lag]).mean(axis=0)) < 4 * error).all()
+        past = before(rows)
+        past = past / past.std(axis=0)
+        assert (np.abs((new[..., None] * past).mean(axis=0)) < 4 * error).all()
+
+
+def test_channels_that_are_left_out_weigh_nothing(residual):
+    found = whitening(residual, np.array([True, False]))
+    assert np.isinf(found.scale[1])
+    assert not found.white(residual[0])[:, 1].any()
+
+
+@pytest.mark.parametrize("count", [10, 60, 85, 90])
+def test_what_has_no_past_or_nothing_ahead_is_left_out(residual, count):
+    found = whitening(residual, np.ones(2, dtype=bool))
+    new, past = found.white(residual[0][:count]), before(residual[0][:count])
+    assert len(new) == len(past) == max(0, count - 85)
+
+
+def test_columns_are_predicted_by_the_other_runs():
+    rng = np.random.default_rng(6)
+    common = [rng.standard_normal((500, 2)) for _ in range(2)]
+    own = [rng.standard_normal((500, 3, 2)) for _ in range(2)]
+    weights = [(np.array([1.0, -2.0]), 3.0), (np.array([0.5, 1.0]), -1.0)]
+    values = [
+        z @ of_common[:, None] + of_own * x.sum(axis=2)
+        for z, x, (of_common, of_own) in zip(common, own, weights, strict=True)
+    ]
+    found = predicted(common, own, values)
+    # What the one shows is said of the other.
+    for place, (of_common, of_own) in enumerate(weights[::-1]):
+        assert np.allclose(
+            found[place], common[place] @ of_common[:, None] + of_own * own[place].sum(axis=2), atol=1e-3
+        )
+    (alone,) = predicted(common[:1], own[:1], values[:1])
+    assert np.allclose(alone, values[0], atol=1e-3)
