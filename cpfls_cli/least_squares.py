@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import linalg
 from scipy.linalg import lapack
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from cpfls_cli.arrays import Array, Numbers
 
@@ -258,6 +257,9 @@ def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
 
 def _extreme(apply: Callable[[Array], Array], size: int, count: int) -> tuple[float, Array] | None:
     """Find the largest eigenvalue of a symmetric operator, and directions, by Lanczos; None if it does not settle."""
+    # Slow to load, and most that solve have few columns.
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
     operator = LinearOperator((size, size), matvec=apply, dtype=np.float64)
     start = np.random.default_rng(0).standard_normal(size)
     try:

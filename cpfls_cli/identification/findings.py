@@ -253,7 +253,7 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
     if freed.setpoints:
         asked = joined("the sticks" if name == "sticks" else f"the setpoint of {name}" for name in freed.setpoints)
         know = "know" if len(freed.setpoints) > 1 or freed.setpoints == ("sticks",) else "knows"
-        source = f"{asked} {know} no gust, so the parameters come from the torque that follows, {pure}"
+        source = f"{asked} {know} no gust, so the rigid body comes from the torque that follows, {pure}"
         little, without = "too little of yaw follows", "have no such setpoint"
     elif freed.instrument_kind == "past":
         source = (
@@ -262,7 +262,7 @@ def _instruments(diagnostics: FitDiagnostics) -> Iterator[str]:
         little, without = "past windows do not identify it", ""
     else:
         paths = "1 path" if freed.paths == 1 else f"{freed.paths} paths"
-        source = f"{freed.runs} runs repeat {paths}, so the parameters come from the repeatable torque, {pure}"
+        source = f"{freed.runs} runs repeat {paths}, so the rigid body comes from the repeatable torque, {pure}"
         little, without = "too little of yaw is repeatable", "repeat none"
     moments = ", ".join(
         f"{name} {value:.3g} ({value * np.exp(-half):.3g} to {value * np.exp(half):.3g})"

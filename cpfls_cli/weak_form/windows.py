@@ -38,16 +38,21 @@ class Windows:
 
     def average(self, values: Array, stretches: Iterable[slice] = _WHOLE) -> Array:
         """Average values, shape (time, ...), over windows of each stretch, ``int phi x dt``, shape (window, ...)."""
-        return np.concatenate([self.laid(values[part], self.weight) for part in (slice(0), *stretches)])
+        return self._over(values, self.weight, stretches)
 
     def derivative(self, values: Array, stretches: Iterable[slice] = _WHOLE) -> Array:
         """Average the time derivative as `average` does, ``-int phi' x dt``; nothing is differentiated."""
-        return np.concatenate([-self.laid(values[part], self.slope) for part in (slice(0), *stretches)])
+        return -self._over(values, self.slope, stretches)
 
     def balance(self, direct: Array, momentum: Array | None = None, stretches: Sequence[slice] = _WHOLE) -> Array:
         """Average ``direct + d/dt momentum``, shapes (time, ...), as `average` does, shape (window, ...)."""
         averaged = self.average(direct, stretches)
         return averaged if momentum is None else averaged + self.derivative(momentum, stretches)
+
+    def _over(self, values: Array, kernel: Numbers, stretches: Iterable[slice]) -> Array:
+        if stretches is _WHOLE:
+            return np.asarray(self.laid(values, kernel))
+        return np.concatenate([self.laid(values[part], kernel) for part in (slice(0), *stretches)])
 
     def middles(self, stretches: Iterable[slice]) -> IntArray:
         """Give the sample in the middle of each window of these stretches, shape (window,)."""

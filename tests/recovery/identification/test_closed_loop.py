@@ -61,7 +61,7 @@ def test_what_comes_again_tells_the_body_in_gusts(sources):
 def test_least_squares_of_the_freed_torque_is_the_estimate_by_instruments(identified):
     result = identified["gusts"]
     np.testing.assert_allclose(result.rigid_body[:3], result.freed.rigid_body[:3], rtol=5e-3)
-    assert any("come from the repeatable torque" in finding for finding in result.findings)
+    assert any("comes from the repeatable torque" in finding for finding in result.findings)
     assert result.loop is None
 
 
@@ -92,8 +92,21 @@ def test_what_was_before_tells_no_body_in_a_quarter_of_a_minute(sources):
     assert any("Past windows do not identify them better" in finding for finding in result.findings)
 
 
-def test_a_rest_that_comes_again_is_an_effect_and_not_taken_for_gusts(sources):
+def test_a_damping_that_comes_again_is_not_taken_for_the_body(sources):
+    """Least squares finds Iyy 1.3 % too large."""
     source = sources["lacks an effect"]
+    found = freed_torque(source, source)
+    assert np.abs(off(found.rigid_body)).max() < 0.002
+    assert np.abs(off(found.least_squares)).max() > 0.01
+
+
+def test_where_no_effect_explains_a_rest_that_comes_again_the_torque_stays_as_measured(sources):
+    """A body that hangs and swings by itself twice a second."""
+    stiffness = SMALL.inertia[0] * (4 * np.pi) ** 2 * np.array([1.0, 1.0, 0.0])
+    flights = [
+        replace(flight, torque=flight.torque + stiffness * flight.motion.attitude) for flight in sources["calm"].flights
+    ]
+    source = joined(flights)
     assert freed_torque(source, source) is None
 
 
