@@ -1,26 +1,30 @@
-"""Balances of torque and force of a vehicle, with derivatives by its numbers, in bands of frequency; instruments."""
+"""Balances of torque and force, polynomials of a vehicle's numbers, in bands of frequency, and their instruments."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import product
-from typing import ClassVar, NamedTuple
+from itertools import chain, pairwise
+from math import prod
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import block_length
 from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
-from cpfls_cli.playback.evaluation import TIMES, VehicleAt
+from cpfls_cli.inertia import INERTIA_PARAMETERS
+from cpfls_cli.playback.evaluation import DRAG_OVER_THRUST, TIMES, VehicleAt, acting_numbers, inertia_entries
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.innovations import innovations
 from cpfls_cli.playback.instruments import Instruments, past_setpoints
-from cpfls_cli.playback.parameters import SLOW, FreeNumbers
+from cpfls_cli.playback.parameters import DRAG, LEARNED, LOG_MASS, SLOW, THRUST, FreeNumbers
 from cpfls_cli.playback.rotors import TimeOfResponse
 from cpfls_cli.playback.windows import Rotors
 from cpfls_cli.vehicle.values import (
+    ARRAYS,
+    Polynomial,
     Tangent,
     Value,
     Vector,
@@ -28,87 +32,166 @@ from cpfls_cli.vehicle.values import (
     cross,
     scaled,
     subtract,
-    times,
     transposed,
     value_of,
-    zero,
 )
 from cpfls_cli.weak_form.resampling import marked_rows
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
 
+_MASS = "mass"
+_BODY = (*INERTIA_PARAMETERS, _MASS)
+"""Numbers of the body that is moved."""
 
-class Side(NamedTuple):
-    """What changes, or what acts, in a balance along a flight.
 
-    `places` are those of columns that are not always 0, of all axes one after another; see `Sums` for those of one.
-    `values` has shape (time, column).
+class Column(NamedTuple):
+    """What balances are linear in: a product of numbers of the vehicle, along an axis.
+
+    `by` names the time of the rotors' response by which it is differentiated; empty for none.
     """
 
-    places: IntArray
-    values: Array
-
-    @classmethod
-    def of(cls, vector: Vector, takes: Vector, at: VehicleAt, samples: int) -> Side:
-        """Take a vector with derivatives by numbers, and the part of it that the motion takes."""
-        scales, columns = [number.scale for number in at.free.numbers], dict[int, Value]()
-        for axis, (value, own) in enumerate(zip(vector, takes, strict=True)):
-            first = axis * (2 + len(scales))
-            slopes = value.by.items() if isinstance(value, Tangent) else ()
-            columns |= {first: value_of(value), first + 1 + len(scales): value_of(own)}
-            columns |= {first + 1 + place: times(scales[place], slope) for place, slope in slopes}
-        known = {place: column for place, column in columns.items() if not zero(column)}
-        values = np.empty((samples, len(known)))
-        for row, column in zip(values.T, known.values(), strict=True):
-            row[:] = column
-        return cls(np.array(list(known), dtype=np.int64), values)
+    axis: int
+    factors: tuple[str, ...]
+    by: str
 
 
 class Balanced(NamedTuple):
-    """A balance of torque, or of force, along a flight: what changes, whose derivative is taken, and what acts."""
+    """What is balanced along a flight: what changes, whose derivative is taken, and what acts; (time, column) each."""
 
-    changing: Side
-    acting: Side
-
-    def windowed(self, band: Windows, flight: PlaybackFlight, width: int) -> Array:
-        """Lay windows over it, shape (window, axis, column), with so many columns of an axis."""
-        acted = band.average(self.acting.values, flight.stretches)
-        rows = np.zeros((len(acted), 3 * width))
-        rows[:, self.acting.places] = acted
-        rows[:, self.changing.places] += band.derivative(self.changing.values, flight.stretches)
-        return rows.reshape(-1, 3, width)
+    changing: Array
+    acting: Array
 
 
-def balances_along(at: VehicleAt, flight: PlaybackFlight, translates: bool) -> Iterator[Balanced]:
-    """Balance torque, body axes, then force if asked for, world axes, along a flight, with derivatives by numbers."""
-    motion, flown = flight.motion, at.differentiated
-    rotation, velocity, rate = motion.rotation.transpose(1, 2, 0), tuple(motion.velocity.T), tuple(motion.rate.T)
-    torque, force = flown.wrench(apply(transposed(rotation), velocity), rate, _rotors(at, flight))
-    momentum = apply(flown.body.inertia, rate)
-    turning = cross(rate, momentum)
-    sides = [(momentum, momentum), (subtract(turning, torque), turning)]
-    if translates:
-        mass = flown.body.mass
-        momentum, weight = scaled(mass, velocity), (0, 0, mass * flown.body.gravity)
-        sides += [(momentum, momentum), (subtract(weight, apply(rotation, force)), weight)]
-    made = [Side.of(*side, at, len(flight)) for side in sides]
-    return map(Balanced, made[::2], made[1::2])
+class Form(NamedTuple):
+    """Columns of a balance of torque or of force, those of one axis after those of another.
+
+    `changing` are those in which something changes, `acting` those in which something acts.
+    """
+
+    columns: tuple[Column, ...]
+    changing: IntArray
+    acting: IntArray
+
+    @property
+    def slices(self) -> list[slice]:
+        """Columns of each axis."""
+        ends = np.searchsorted([column.axis for column in self.columns], range(4)).tolist()
+        return [slice(*pair) for pair in pairwise(ends)]
 
 
-def _rotors(at: VehicleAt, flight: PlaybackFlight) -> Rotors:
-    """Give what drives the vehicle at the samples, with derivatives by the times of the response."""
+@dataclass(frozen=True)
+class Equations:
+    """Balances of torque and force of a vehicle at values of its numbers.
 
-    def filled(terms: Callable[..., Array], *by: TimeOfResponse) -> Array:
-        found = np.zeros((len(flight), 1 + 4 * flight.speed.shape[1]))
-        for part in flight.stretches:
-            found[part] = terms(flight.speed[part], flight.motion.period, flight.hold, *by)
-        return found
+    They are evaluated as polynomials of the numbers, so that they follow at other values too.
+    """
 
-    response, index = at.response, at.free.index
-    slopes = {index[name]: filled(response.terms_at_samples, TIMES[name]) for name in at.times}
-    if SLOW in index:
-        # The number is the logarithm of the slow time.
-        slopes[index[SLOW]] *= response.slow_s
-    return Rotors.of(filled(response.terms_at_samples), slopes)
+    at: VehicleAt
+
+    def hold(self, other: Equations) -> bool:
+        """Check whether those of another vehicle follow: its rotors respond alike, and it has no other numbers."""
+        own, free = self.at.free, other.at.free
+        # Numbers of a remainder mean something else with other rules; those of no remainder have none.
+        rules = own.rules == free.rules or LEARNED.keys().isdisjoint(free.blocks)
+        alike = own.vehicle == free.vehicle and rules and self.at.response == other.at.response
+        # Only what is not 0 is differentiated by times of the response.
+        return alike and {*free.index} <= {*own.index} and (not other.at.times or other._in_use <= self._in_use)
+
+    @property
+    def _in_use(self) -> set[str]:
+        return {name for name, value in zip(self.at.free.index, self.at.values.tolist(), strict=True) if value}
+
+    @cached_property
+    def known(self) -> Mapping[str, Value]:
+        """Numbers as they act, those of the body among them, with derivatives by the free numbers, by place."""
+        at, index = self.at, self.at.free.index
+        number = acting_numbers(at.free, lambda name: Tangent(at.get(name, 0.0), {index[name]: 1.0}))
+        known = {name: number(name) for name in (*index, DRAG_OVER_THRUST)}
+        known |= dict(zip(INERTIA_PARAMETERS, inertia_entries(at.free, number, ARRAYS), strict=True))
+        return known | {_MASS: Tangent(at.mass, {index[LOG_MASS]: at.mass} if LOG_MASS in index else {})}
+
+    def product(self, factors: Sequence[str]) -> Value:
+        """Multiply `known` numbers; those that are not there are what they are in a model without them."""
+        return prod((self.known.get(name, float(name in (THRUST, DRAG))) for name in factors), start=1.0)
+
+    def along(self, flight: PlaybackFlight, translates: bool) -> tuple[list[Form], list[Balanced]]:
+        """Evaluate the balance of torque, and of force if asked for, along a flight."""
+        forms, signals = [], []
+        for balance in self._balances(flight, translates):
+            parts = [
+                {
+                    Column(axis, factors, by): values
+                    for axis, component in enumerate(vector)
+                    for factors, by, values in self._terms(component)
+                }
+                for vector in balance
+            ]
+            columns = sorted(dict.fromkeys(chain(*parts)), key=lambda column: column.axis)
+            filled = [np.empty((len(flight), len(part))) for part in parts]
+            for out, part in zip(filled, parts, strict=True):
+                for row, values in zip(out.T, part.values(), strict=True):
+                    row[:] = values
+            forms.append(Form(tuple(columns), *(np.array([columns.index(each) for each in part]) for part in parts)))
+            signals.append(Balanced(*filled))
+        return forms, signals
+
+    def weights(self, columns: Sequence[Column]) -> Array:
+        """Weigh columns so that they give the residual, its derivatives by each number, and what the motion takes.
+
+        Returns
+        -------
+        array, shape (column, 2 + number)
+            Derivatives by numbers in their natural sizes.
+        """
+        index, scales = self.at.free.index, [number.scale for number in self.at.free.numbers]
+        weights = np.zeros((len(columns), 2 + len(scales)))
+        for row, (_, factors, by) in zip(weights, columns, strict=True):
+            value = self.product(factors)
+            slopes: Mapping[int, float] = value.by if isinstance(value, Tangent) else {}
+            if by:
+                slopes = {index[by]: value_of(value)} if by in index else {}
+            else:
+                row[0] = value_of(value)
+                row[-1] = row[0] if any(name in _BODY for name in factors) else 0.0
+            for place, slope in slopes.items():
+                row[1 + place] = scales[place] * slope
+        return weights
+
+    def _balances(self, flight: PlaybackFlight, translates: bool) -> Iterator[tuple[Vector, Vector]]:
+        """Write the balance of torque, body axes, then of force, world axes: what changes, and what acts against it."""
+        motion, number = flight.motion, Polynomial.number
+        rotation, velocity, rate = motion.rotation.transpose(1, 2, 0), tuple(motion.velocity.T), tuple(motion.rate.T)
+        air = apply(transposed(rotation), velocity)
+        torque, force = self.at.polynomial.wrench(air, rate, self._rotors(flight))
+        xx, yy, zz, xy, xz, yz = map(number, INERTIA_PARAMETERS)
+        momentum = apply(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), rate)
+        yield momentum, subtract(cross(rate, momentum), torque)
+        if translates:
+            weight = number(_MASS) * self.at.free.vehicle.gravity_m_s2
+            yield scaled(number(_MASS), velocity), subtract((0, 0, weight), apply(rotation, force))
+
+    def _rotors(self, flight: PlaybackFlight) -> Rotors:
+        """Give what drives the vehicle at the samples, with derivatives by the times of the response."""
+
+        def filled(terms: Callable[..., Array], *by: TimeOfResponse) -> Array:
+            found = np.zeros((len(flight), 1 + 4 * flight.speed.shape[1]))
+            for part in flight.stretches:
+                found[part] = terms(flight.speed[part], flight.motion.period, flight.hold, *by)
+            return found
+
+        response, index = self.at.response, self.at.free.index
+        slopes = {index[name]: filled(response.terms_at_samples, TIMES[name]) for name in self.at.times}
+        if SLOW in index:
+            # The number is the logarithm of the slow time.
+            slopes[index[SLOW]] *= response.slow_s
+        return Rotors.of(filled(response.terms_at_samples), slopes)
+
+    def _terms(self, component: Value) -> Iterator[tuple[tuple[str, ...], str, Value]]:
+        """List the terms of a polynomial, then the derivatives by times of the response of those that are not 0."""
+        for factors, value in Polynomial.of(component).terms.items():
+            yield factors, "", value_of(value)
+            if isinstance(value, Tangent) and value_of(self.product(factors)):
+                for place, slope in value.by.items():
+                    yield factors, self.at.free.numbers[place].name, slope
 
 
 BANDS = ((0.08, 0.2), (0.15, 0.4), (0.3, 0.8), (0.6, 1.6), (1.2, 3.2))
@@ -135,8 +218,7 @@ one of them, and logs that were filtered forward and backward what they know of 
 class Sums(NamedTuple):
     """Products of balances X and of what instruments know of them Z, by block of the path, band and axis.
 
-    `ztx`, `xtx`, `ztz`: shape (block, band, axis, column, column), columns being the residual, its derivatives by each
-    number in its natural size, and what the motion takes; `windows`: shape (block, band).
+    `ztx`, `xtx`, `ztz`: shape (block, band, axis, column, column); `windows`: shape (block, band).
     """
 
     ztx: Array
@@ -144,12 +226,24 @@ class Sums(NamedTuple):
     ztz: Array
     windows: Array
 
+    @classmethod
+    def of(cls, bands: Sequence[tuple[Array, Array]]) -> Sums:
+        """Arrange products of bands for one axis, shape (3, block, column, column), with counts of their windows."""
+        ztx, xtx, ztz = (np.stack(each, axis=1)[:, :, None] for each in zip(*(own for own, _ in bands), strict=True))
+        return cls(ztx, xtx, ztz, np.stack([count for _, count in bands], axis=1))
+
+    @classmethod
+    def joined(cls, axes: Sequence[Sums]) -> Sums:
+        """Put axes beside each other."""
+        ztx, xtx, ztz = (np.concatenate(each, axis=2) for each in zip(*(own[:3] for own in axes), strict=True))
+        return cls(ztx, xtx, ztz, axes[0].windows)
+
 
 class Rows(NamedTuple):
     """Balances of a flight in windows.
 
     `own` are its columns, `known` what of them is known from outside of its loop (NaN where nothing is), shape (window,
-    axis, column); `middles` the sample in the middle of each window.
+    column); `middles` the sample in the middle of each window.
     """
 
     number: int
@@ -158,12 +252,25 @@ class Rows(NamedTuple):
     middles: IntArray
 
 
-@dataclass(frozen=True)
+class _Laid(NamedTuple):
+    """Equations that were evaluated along all flights, and what is kept of their balances of torque, and of force."""
+
+    equations: Equations
+    forms: Sequence[Form]
+    kept: Sequence[Any]
+
+
+@dataclass
 class Balances:
-    """Balances of flights, and what of them comes from outside of the loop."""
+    """Balances of flights, and what of them comes from outside of the loop.
+
+    They are polynomials of the numbers of the vehicle. So products are taken of what the numbers' products multiply,
+    and again only where the rotors' response has changed.
+    """
 
     flights: Sequence[PlaybackFlight]
     given: Instruments
+    _laid: _Laid | None = field(default=None, init=False)
     of_past: ClassVar[bool] = False
     """Whether they are of what is new, which is another thing at other values."""
 
@@ -203,15 +310,6 @@ class Balances:
             if asked is not None and not self.given.repeats.places[number]
         }
 
-    @cached_property
-    def _asked_before(self) -> dict[Windows, dict[int, Array]]:
-        """What was asked of these flights before, averaged over the windows of each band."""
-        found: dict[Windows, dict[int, Array]] = {band: {} for band in self.bands}
-        for band, (number, asked) in product(found, self.asked.items()):
-            columns = past_setpoints(asked, band.period, round(_OF_WINDOW * band.hop / (1 - OVERLAP)))
-            found[band][number] = band.average(columns, self.flights[number].stretches)
-        return found
-
     @property
     def longest_s(self) -> float:
         """Length of the longest stretch of a flight that has instruments."""
@@ -240,51 +338,95 @@ class Balances:
         return np.asarray(np.where(np.isfinite(place), block, -1), dtype=np.int64)
 
     def sums(self, free: FreeNumbers, values: Array) -> Sums:
-        """Sum products at values of the numbers, shape (number,)."""
-        at, turning, width, parts = VehicleAt(free, values), len(self.bands_hz), 2 + len(values), []
-        along = {number: [*balances_along(at, self.flights[number], self.translates)] for number in self.path}
-        for kind, bands in enumerate((self.bands[:turning], self.bands[turning:])[: 1 + self.translates]):
-            signals = {number: balances[kind] for number, balances in along.items()}
-            parts += [self.of_band(rows, width) for rows in self._rows(bands, signals, width)]
-        counts = np.stack([count for _, count in parts], axis=1)
-        seen = counts.any(axis=1)
-        ztx, xtx, ztz = np.stack([products[:, seen] for products, _ in parts], axis=2)
-        return Sums(ztx, xtx, ztz, counts[seen])
+        """Sum products at values of the numbers, shape (number,), in their natural sizes.
 
-    def of_band(self, rows: Iterable[Rows], width: int) -> tuple[Array, Array]:
-        """Sum products by block, shape (3, block, axis, column, column), and count windows."""
-        counts, sums = np.zeros(len(self.blocks)), np.zeros((3, len(self.blocks), 3, width, width))
+        Returns
+        -------
+        Sums
+            First column: the residual; then derivatives by each number; last what the motion takes.
+        """
+        equations = Equations(VehicleAt(free, values))
+        if self._laid is None or not self._laid.equations.hold(equations):
+            self._laid = self._lay(equations)
+        kinds = [
+            self._summed(kept, form, equations.weights(form.columns))
+            for form, kept in zip(self._laid.forms, self._laid.kept, strict=True)
+        ]
+        sums = Sums(*(np.concatenate(each, axis=1) for each in zip(*kinds, strict=True)))
+        seen = sums.windows.any(axis=1)
+        return Sums(*(each[seen] for each in sums))
+
+    def _lay(self, equations: Equations) -> _Laid:
+        """Evaluate the vehicle along all flights, and reduce what is balanced to what is kept."""
+        forms: list[Form] = []
+        along: dict[int, list[Balanced]] = {}
+        for number in self.path:
+            forms, along[number] = equations.along(self.flights[number], self.translates)
+        turning = len(self.bands_hz)
+        kept = [
+            self._reduced(bands, form, {number: each.pop(0) for number, each in along.items()})
+            for form, bands in zip(forms, (self.bands[:turning], self.bands[turning:]), strict=False)
+        ]
+        return _Laid(equations, forms, kept)
+
+    def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Balanced]) -> Any:
+        """Sum products of all columns, by axis."""
+        others = self._of_other_runs(signals)
+        found = (self.of_band(self._rows(band, signals, others, form), form.slices) for band in bands)
+        return [Sums.of(each) for each in zip(*found, strict=True)]
+
+    def _summed(self, kept: Any, form: Form, weights: Array) -> Sums:
+        """Sum products of the combinations of columns that weights make."""
+        combined = []
+        for own, columns in zip(kept, form.slices, strict=True):
+            ztx, xtx, ztz = (weights[columns].T @ each @ weights[columns] for each in own[:3])
+            combined.append(Sums(ztx, xtx, ztz, own.windows))
+        return Sums.joined(combined)
+
+    def of_band(self, rows: Iterable[Rows], slices: Sequence[slice]) -> list[tuple[Array, Array]]:
+        """Sum products of columns of each axis by block, shape (3, block, column, column), and count windows."""
+        counts, widths = np.zeros(len(self.blocks)), [each.stop - each.start for each in slices]
+        sums = [np.zeros((3, len(counts), width, width)) for width in widths]
         for number, own, known, middles in rows:
             first, path = self.path[number]
-            block = np.where(np.isfinite(known).all(axis=(1, 2)), self._block(number, path[middles]), -1)
+            place = path[middles]
+            block = np.where(np.isfinite(known).all(axis=1), self._block(number, place), -1)
             for each in np.unique(block[block >= 0]).tolist():
-                at, there = self.blocks[first, each], marked_rows(block == each)
-                x, z = own[there].swapaxes(0, 1), known[there].swapaxes(0, 1)
-                for total, (one, other) in zip(sums, ((z, x), (x, x), (z, z)), strict=True):
-                    total[at] += one.swapaxes(1, 2) @ other
-                counts[at] += x.shape[1]
-        return sums, counts
+                at, rows_there = self.blocks[first, each], marked_rows(block == each)
+                mine, theirs = own[rows_there], known[rows_there]
+                for axis, columns in zip(sums, slices, strict=True):
+                    x, z = mine[:, columns], theirs[:, columns]
+                    for total, (one, other) in zip(axis[:, at], ((z, x), (x, x), (z, z)), strict=True):
+                        total += one.T @ other
+                counts[at] += len(mine)
+        return [(axis, counts) for axis in sums]
 
-    def _rows(self, bands: Sequence[Windows], signals: Mapping[int, Balanced], width: int) -> Iterator[list[Rows]]:
-        """Lay windows of each band over balances, and over what is known of them."""
-        others = {number: self._of_other_runs(number, signals) for number in self.path if number not in self.asked}
-        for band in bands:
-            own, known = (
-                {number: each.windowed(band, self.flights[number], width) for number, each in balances.items()}
-                for balances in (signals, others)
-            )
-            known |= first_stage_fit_by_run(self._asked_before[band], own)
-            yield [
-                Rows(number, own[number], known[number], band.middles(self.flights[number].stretches))
-                for number in self.path
-            ]
+    def _of_other_runs(self, signals: Mapping[int, Balanced]) -> dict[int, Balanced]:
+        """Average what the other runs of its path have at the places of each flight."""
+        every = [signals.get(n) or Balanced(*np.zeros((2, len(flight), 0))) for n, flight in enumerate(self.flights)]
+        return {
+            number: Balanced(*(self.given.repeats.others(number, each) for each in zip(*every, strict=True)))
+            for number in self.path
+            if number not in self.asked
+        }
 
-    def _of_other_runs(self, number: int, signals: Mapping[int, Balanced]) -> Balanced:
-        """Average what the other runs of its path have at the places of a flight."""
-        repeats, sides = self.given.repeats, zip(*signals.values(), strict=True)
-        by_number = [{n: side.values for n, side in zip(signals, each, strict=True)} for each in sides]
-        pairs = zip(signals[number], by_number, strict=True)
-        return Balanced(*(side._replace(values=repeats.others(number, values)) for side, values in pairs))
+    def _rows(
+        self, band: Windows, signals: Mapping[int, Balanced], others: Mapping[int, Balanced], form: Form
+    ) -> Iterator[Rows]:
+        own = {number: windowed(band, self.flights[number], form, each) for number, each in signals.items()}
+        known = {number: windowed(band, self.flights[number], form, each) for number, each in others.items()}
+        known |= self._expected(band, {number: own[number] for number in self.asked})
+        for number in self.path:
+            yield Rows(number, own[number], known[number], band.middles(self.flights[number].stretches))
+
+    def _expected(self, band: Windows, own: dict[int, Array]) -> dict[int, Array]:
+        """Predict balances from what was asked for."""
+        apart = round(_OF_WINDOW * band.hop / (1 - OVERLAP))
+        asked = {
+            number: band.average(past_setpoints(self.asked[number], band.period, apart), self.flights[number].stretches)
+            for number in own
+        }
+        return first_stage_fit_by_run(asked, own)
 
 
 def fitting_bands(period: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:
@@ -297,6 +439,15 @@ def band_windows(period: float, short_s: float, long_s: float | None) -> Windows
     """Make windows that leave a band: what short ones see less what long ones do; all of it without long ones."""
     short = windows(period, short_s, OVERLAP)
     return short if long_s is None else short.less(windows(period, long_s, OVERLAP))
+
+
+def windowed(band: Windows, flight: PlaybackFlight, form: Form, signals: Balanced) -> Array:
+    """Lay windows over what is balanced, shape (window, column)."""
+    acted = band.average(signals.acting, flight.stretches)
+    rows = np.zeros((len(acted), len(form.columns)))
+    rows[:, form.acting] = acted
+    rows[:, form.changing] += band.derivative(signals.changing, flight.stretches)
+    return rows
 
 
 class PastBalances(Balances):
@@ -326,24 +477,40 @@ class PastBalances(Balances):
         """Each flight is a path of its own."""
         return {number: (number, np.arange(len(flight), dtype=float)) for number, flight in enumerate(self.flights)}
 
-    def _rows(self, bands: Sequence[Windows], signals: Mapping[int, Balanced], width: int) -> Iterator[list[Rows]]:
-        """Take innovations of balances with their predictions, fast ones and slow ones, of each stretch as a flight."""
+    def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Balanced]) -> Any:
+        """Average all columns over windows, by stretch, each as its own flight."""
         (band, *_) = bands
-        parts = [
-            (number, replace(self.flights[number], stretches=(stretch,)))
+        return [
+            (
+                number,
+                part,
+                band.average(_seen(part), part.stretches),
+                windowed(band, part, form, signals[number]),
+            )
             for number in self.path
-            for stretch in self.flights[number].stretches
+            for part in (replace(self.flights[number], stretches=(each,)) for each in self.flights[number].stretches)
         ]
-        rows = [signals[number].windowed(band, part, width) for number, part in parts]
-        seen = [band.average(_seen(part), part.stretches) for _, part in parts]
-        new, expected, _ = innovations(rows, [own[..., 0] for own in rows], seen, _PER_WINDOW, _BEFORE)
+
+    def _summed(self, kept: Any, form: Form, weights: Array) -> Sums:
+        """Sum products of innovations with their predictions, fast ones and slow ones."""
+        (band, *_) = self.bands
         count = max(1, round(_SLOW_S / (band.hop * band.period)))
-        slow = [
-            Rows(number, own, _mean_of_last(known, count), band.middles(part.stretches)[-len(own) :][: len(own)])
-            for (number, part), own, known in zip(parts, new, expected, strict=True)
-        ]
-        yield [each._replace(known=known - each.known) for each, known in zip(slow, expected, strict=True)]
-        yield slow
+        rows = list(self._new(band, form, kept, weights))
+        slow = [own._replace(known=_mean_of_last(own.known, count)) for own in rows]
+        fast = [own._replace(known=own.known - mean.known) for own, mean in zip(rows, slow, strict=True)]
+        width = weights.shape[1]
+        slices = [slice(axis * width, (axis + 1) * width) for axis in range(3)]
+        found = (self.of_band(each, slices) for each in (fast, slow))
+        return Sums.joined([Sums.of(each) for each in zip(*found, strict=True)])
+
+    def _new(self, band: Windows, form: Form, kept: Any, weights: Array) -> Iterator[Rows]:
+        rows = [np.stack([own[:, axis] @ weights[axis] for axis in form.slices], axis=1) for *_, own in kept]
+        seen = [each for _, _, each, _ in kept]
+        new, expected, _ = innovations(rows, [own[..., 0] for own in rows], seen, _PER_WINDOW, _BEFORE)
+        for (number, part, *_), own, predicted in zip(kept, new, expected, strict=True):
+            middles = band.middles(part.stretches)
+            flat, known = (each.reshape(len(own), -1) for each in (own, predicted))
+            yield Rows(number, flat, known, middles[len(middles) - len(own) :])
 
 
 def _seen(flight: PlaybackFlight) -> Array:
@@ -353,8 +520,8 @@ def _seen(flight: PlaybackFlight) -> Array:
 
 
 def _mean_of_last(values: Array, count: int) -> Array:
-    """Average over so many last windows, of the first over as many as there are, shape (window, axis, column)."""
-    sums = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    """Average over so many last windows, of the first over as many as there are, shape (window, column)."""
+    sums = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
     last = np.arange(1, len(values) + 1)
     first = np.maximum(last - count, 0)
-    return np.asarray((sums[last] - sums[first]) / (last - first)[:, None, None])
+    return np.asarray((sums[last] - sums[first]) / (last - first)[:, None])

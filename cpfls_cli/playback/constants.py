@@ -345,7 +345,7 @@ class _Search(NamedTuple):
         """
         free = self.free(blocks)
         values = free.values(known)
-        problem = self.problem(free, values, bands, held)
+        problem, at = self.problem(free, values, bands, held), values.copy()
         # The weakest first: conditional on a number that nothing identifies, nothing identifies the others either.
         while len(problem.places) and problem.strength.min() < STRONG:
             weakest = free.numbers[problem.places[np.argmin(problem.strength)]]
@@ -355,12 +355,13 @@ class _Search(NamedTuple):
         places, scales = problem.places, free.scales[problem.places]
 
         def equations(natural: Array) -> Normal:
-            nonlocal problem
+            nonlocal problem, at
             moved = values.copy()
             moved[places] = natural * scales
             if LOG_INERTIA[2] in held and INERTIA in self.vehicle.unknown:
                 moved[free.index[LOG_INERTIA[2]]] = _of_a_flat_body(free, moved)
-            problem = self.problem(free, moved, bands, held)
+            if not np.allclose(moved, at, rtol=1e-12, atol=0.0):
+                problem, at = self.problem(free, moved, bands, held), moved
             return problem.normal(places)
 
         if len(places):

@@ -49,6 +49,7 @@ from cpfls_cli.vehicle.tracing import Graph, Symbol, array_symbols, traced_in_tw
 from cpfls_cli.vehicle.values import (
     ARRAYS,
     Functions,
+    Polynomial,
     Tangent,
     Value,
     Vector,
@@ -223,10 +224,10 @@ class VehicleAt:
         return Slopes(numbers, places, function(tuple(self.values.tolist())))
 
     @cached_property
-    def differentiated(self) -> Flown:
-        """The vehicle with derivatives by its numbers, by their places."""
-        places = self.free.index
-        return _flown_of(self.free, lambda name: Tangent(self.get(name, 0.0), {places[name]: 1.0}), ARRAYS)
+    def polynomial(self) -> Flown:
+        """The vehicle as a polynomial of its numbers, coefficients in SI."""
+        acting, drag_scale = acting_at(self.free, Polynomial.number)
+        return Flown(Vehicle(self.free.vehicle, acting), self._body, drag_scale)
 
     @property
     def _body(self) -> Body:
@@ -294,30 +295,25 @@ def acting_at(free: FreeNumbers, number: Callable[[str], Value]) -> tuple[tuple[
     return tuple(acting), number(DRAG_OVER_THRUST)
 
 
-def _flown_of(free: FreeNumbers, number: Callable[[str], Value], functions: Functions) -> Flown:
-    """Make a vehicle of free numbers of any kind."""
-    vehicle = free.vehicle
-    acting, drag_scale = acting_at(free, acting_numbers(free, number, functions))
-    xx, yy, zz, xy, xz, yz = inertia_entries(free, number, functions)
-    inertia: Any = (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
-    inverted: Any = inverse(inertia)
-    growth = functions.exp(number(LOG_MASS)) if LOG_MASS in free.index else 1.0
-    body = Body(growth * vehicle.mass_kg, vehicle.gravity_m_s2, inertia, inverted)
-    return Flown(Vehicle(vehicle, acting), body, drag_scale, functions=functions)
-
-
 class _Traced:
     """A vehicle of symbols, and its numbers."""
 
     def __init__(self, free: FreeNumbers, *, differentiated: bool = False) -> None:
-        self.free, self.graph = free, Graph()
+        vehicle, self.free, self.graph = free.vehicle, free, Graph()
         self.values = self.graph.inputs("number", len(free.numbers))
         symbols = dict(zip(free.index, self.values, strict=True))
 
         def number(name: str) -> Value:
             return Tangent(symbols[name], {STATES + free.index[name]: 1.0}) if differentiated else symbols[name]
 
-        self.flown = _flown_of(free, number, array_symbols(len(free.vehicle.rotors)))
+        functions = array_symbols(len(vehicle.rotors))
+        acting, drag_scale = acting_at(free, acting_numbers(free, number, functions))
+        xx, yy, zz, xy, xz, yz = inertia_entries(free, number, functions)
+        inertia: Any = (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
+        inverted: Any = inverse(inertia)
+        growth = functions.exp(number(LOG_MASS)) if LOG_MASS in free.index else 1.0
+        body = Body(growth * vehicle.mass_kg, vehicle.gravity_m_s2, inertia, inverted)
+        self.flown = Flown(Vehicle(vehicle, acting), body, drag_scale, functions=functions)
 
     def inputs(self, name: str, count: int) -> tuple[Symbol, ...]:
         """Make arguments with one value for each rotor."""

@@ -241,14 +241,14 @@ class Repeats:
             groups = [group for group in groups if not group & joined] + [joined]
         return tuple(tuple(sorted(group)) for group in groups)
 
-    def others(self, number: int, values: Sequence[Array] | Mapping[int, Array]) -> Array:
+    def others(self, number: int, values: Sequence[Array]) -> Array:
         """Average over the other runs what they have at the same places of the path.
 
         Parameters
         ----------
         number : int
             Of the flight.
-        values : sequence or mapping by number of array, shape (time, ...)
+        values : sequence of array, shape (time, ...)
             Of each flight, at its samples.
 
         Returns

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 Value = Any
-"""A float, an array, a `Tangent` of them, a `Polynomial`, a `tracing.Symbol`, or `Each`."""
+"""A float, an array, a `Tangent` or a `Polynomial` of them, a `tracing.Symbol`, or `Each`."""
 Vector = tuple[Value, ...]
 """Components along x, y, z, or as many as a state has."""
 
@@ -68,7 +68,7 @@ class Tangent:
         return Tangent(value, by)
 
     def __add__(self, other: Value) -> Value:
-        if isinstance(other, Each):
+        if isinstance(other, (Each, Polynomial)):
             return NotImplemented
         if isinstance(other, Tangent):
             return self._merged(plus(self.value, other.value), other)
@@ -81,7 +81,7 @@ class Tangent:
         return (-self).__add__(other)
 
     def __mul__(self, other: Value) -> Value:
-        if isinstance(other, Each):
+        if isinstance(other, (Each, Polynomial)):
             return NotImplemented
         if not isinstance(other, Tangent):
             return self.chained(times(self.value, other), other)
@@ -91,7 +91,7 @@ class Tangent:
         return given if zero(other.value) else given._merged(given.value, self.chained(0, other.value))
 
     def __truediv__(self, other: Value) -> Value:
-        if isinstance(other, (Each, Tangent)):
+        if isinstance(other, (Each, Tangent, Polynomial)):
             return self * other**-1
         return Tangent(0 if zero(self.value) else self.value / other, {at: d / other for at, d in self.by.items()})
 
@@ -138,7 +138,7 @@ def _extreme(
     choose: Callable[[Value, Value], Value], where: Callable[[Value, Value, Value], Value], *, largest: bool
 ) -> Callable[[Value, Value], Value]:
     def called(a: Value, b: Value) -> Value:
-        if not isinstance(a, Tangent) and not isinstance(b, Tangent):
+        if not isinstance(a, (Tangent, Polynomial)) and not isinstance(b, (Tangent, Polynomial)):
             return choose(a, b)
         return where(value_of(a) > value_of(b), *((a, b) if largest else (b, a)))
 
@@ -146,12 +146,15 @@ def _extreme(
 
 
 def differentiable(base: Functions, spread: Callable[[Value, Value], Value]) -> Functions:
-    """Make functions of numbers with derivatives from those of numbers without.
+    """Make functions of numbers with derivatives, and of polynomials, from those of numbers without.
 
     ``spread(value, other)``: the value for each rotor, where it is the same for all and the other one is not.
     """
 
     def where(condition: Value, yes: Value, no: Value) -> Value:
+        if isinstance(yes, Polynomial) or isinstance(no, Polynomial):
+            first, second = Polynomial.of(yes).terms, Polynomial.of(no).terms
+            return Polynomial({at: where(condition, first.get(at, 0), second.get(at, 0)) for at in {**first, **second}})
         if not (isinstance(yes, Tangent) or isinstance(no, Tangent)):
             return base.where(condition, yes, no)
         ends = [one if isinstance(one, Tangent) else Tangent(one, {}) for one in (yes, no)]
@@ -170,6 +173,9 @@ def differentiable(base: Functions, spread: Callable[[Value, Value], Value]) -> 
         return Tangent(angle, turned.by)
 
     def total(x: Value) -> Value:
+        if isinstance(x, Polynomial):
+            shape = np.broadcast_shapes(*(np.shape(value_of(value)) for value in x.terms.values()))
+            return x.each(lambda value: total(plus(np.zeros(shape), value)))
         if not isinstance(x, Tangent):
             return x if zero(x) else base.total(x)
         # What is the same for all rotors counts once for each.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.playback.balances import Balances
+from cpfls_cli.playback.balances import Balances, PastBalances
 from cpfls_cli.playback.evaluation import VehicleAt
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, Rules, blocks_of
@@ -32,9 +32,9 @@ def somewhere(seed=0, free=FREE):
     return np.clip(start + 0.05 * scale * np.random.default_rng(seed).standard_normal(len(start)), low, high)
 
 
-def balances_of(flights):
+def balances_of(flights, kind=Balances):
     given = instruments(flights)
-    return Balances(given.flown, given)
+    return kind(given.flown, given)
 
 
 def squares(sums):
@@ -43,11 +43,9 @@ def squares(sums):
 
 
 def test_slopes_are_difference_quotients_for_every_number(flights):
-    balances, values = balances_of(flights), somewhere(free=NAMED)
+    balances, values, step = balances_of(flights), somewhere(free=NAMED), 1e-4
     here = balances.sums(NAMED, values)
     for place, number in enumerate(NAMED.numbers):
-        # Balances are linear in coefficients of effects, and central differences of squares are exact at any step.
-        step = 0.05 if number.block in CATALOGUE else 1e-4
         moved = step * number.scale * np.eye(len(values))[place]
         ahead, behind = (squares(balances.sums(NAMED, each)) for each in (values + moved, values - moved))
         # A product's slope has that of either factor.
@@ -57,6 +55,22 @@ def test_slopes_are_difference_quotients_for_every_number(flights):
         size = np.sqrt(np.abs(squares(here) * own)).max(axis=(1, 3), keepdims=True) + 1e-9 * np.abs(squares(here)).max()
         off = np.abs((ahead - behind) / (2 * step) - slopes)
         assert (off <= 1e-5 * size).all(), number.name
+
+
+@pytest.mark.parametrize("kind", [Balances, PastBalances])
+def test_what_follows_from_an_evaluation_is_what_another_gives(flights, kind):
+    """Of other numbers, and of fewer: a vehicle is evaluated again only where its rotors respond otherwise."""
+    balances = balances_of(flights, kind)
+    balances.sums(FREE, somewhere(1))
+    fewer = replace(FREE, chosen=("inertia", "drag_factor", "rotor_mismatch", "linear_damping"))
+    values = somewhere(2)
+    for name, place in FREE.index.items():
+        if name.split(".")[0] in ("lag", "delay", "slow_actuation"):
+            values[place] = somewhere(1)[place]
+    for free, own in ((FREE, values), (fewer, np.array([values[FREE.index[name]] for name in fewer.index]))):
+        found, fresh = balances.sums(free, own), balances_of(flights, kind).sums(free, own)
+        for one, other in zip(found, fresh, strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-11 * np.abs(other).max())
 
 
 def test_the_residual_is_what_the_model_leaves_of_the_motion(flights):

@@ -68,12 +68,18 @@ def test_what_is_linear_has_no_value_and_a_factor_for_each_number():
 
 
 def test_a_polynomial_has_a_value_for_each_product_of_its_numbers():
-    a, b = Polynomial.number("a"), Polynomial.number("b")
-    given = (2.0 * a - b) * (a + 1.0) - 0.5 + b**2 / 4.0
-    assert given.terms == {("a", "a"): 2.0, ("a",): 2.0, ("a", "b"): -1.0, ("b",): -1.0, ("b", "b"): 0.25, (): -0.5}
+    a, b, array = Polynomial.number("a"), Polynomial.number("b"), np.array([[1.0, 2.0], [3.0, 4.0]])
+    given = F.total((a * array - 2.0 * b) * (a + 1.0) - array / 2.0) + Tangent(np.ones(2), {0: 3.0})
+    found = {factors: value for factors, value in given.terms.items() if factors}
+    assert set(found) == {("a",), ("a", "a"), ("a", "b"), ("b",)}
+    assert found["a", "a"].tolist() == found["a",].tolist() == [4.0, 6.0]
+    assert given.terms[()].value.tolist() == [-1.0, -2.0]
+    branch = F.where(array > 2.0, a * array, b)
+    assert branch.terms["a",].tolist() == [[0.0, 0.0], [3.0, 4.0]]
+    assert branch.terms["b",].tolist() == [[1.0, 1.0], [0.0, 0.0]]
 
 
-@pytest.mark.parametrize("case", [lambda a: 1.0 / a, lambda a: a**0.5, lambda a: a > 1.0])
+@pytest.mark.parametrize("case", [lambda a: 1.0 / a, lambda a: a**0.5, lambda a: F.largest(a, 1.0)])
 def test_what_is_no_polynomial_is_refused(case):
     with pytest.raises(NoPolynomialError):
         case(Polynomial.number("a"))
