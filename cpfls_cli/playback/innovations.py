@@ -303,6 +303,14 @@ def before(rows: Array) -> Array:
     return np.stack(parts, axis=-1)
 
 
+def about_mean(rows: Array) -> Array:
+    """Take off the mean of a run, shape (row, ...): slow gusts have one too, and windows show it as well as samples."""
+    if not len(rows):
+        return rows
+    away = rows - rows.mean(axis=0)
+    return np.asarray(np.where(np.abs(away).max(axis=0) > _TINY * np.abs(rows).max(axis=0), away, 0.0))
+
+
 def predicted(common: Sequence[Array], own: Sequence[Array], values: Sequence[Array]) -> list[Array]:
     """Predict columns of each run from instruments, by the other runs; of a single one by itself.
 

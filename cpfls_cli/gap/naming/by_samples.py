@@ -23,7 +23,7 @@ from cpfls_cli.gap.naming.ranking import within_bounds
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.naming.search import alternative
 from cpfls_cli.gap.settings import ERRORS
-from cpfls_cli.playback.innovations import ROW_S, STRETCH, Whitening, before, predicted, whitening
+from cpfls_cli.playback.innovations import ROW_S, STRETCH, Whitening, about_mean, before, predicted, whitening
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -81,8 +81,8 @@ class _Sampled:
 
     @cached_property
     def new(self) -> Array:
-        """White residual, shape (row, 6)."""
-        return np.concatenate([self.white.white(rows) for rows in self.residual])
+        """White residual about the mean of each flight, shape (row, 6)."""
+        return np.concatenate([about_mean(self.white.white(rows)) for rows in self.residual])
 
     def of(self, candidate: Candidate) -> list[Array]:
         """Average the columns of a candidate over rows."""
@@ -123,7 +123,7 @@ class _Sampled:
         each = [self.nuisance, *(self.of(candidate) for candidate in candidates)]
         columns, known = self._predicted([np.concatenate(own, axis=2) for own in zip(*each, strict=True)])
         # What a gust keeps beyond one memory goes with the residual before.
-        left = np.concatenate([before(rows) for rows in self.residual]) / self.white.scale[:, None]
+        left = np.concatenate([about_mean(before(rows)) for rows in self.residual]) / self.white.scale[:, None]
         past = np.einsum("tcb,cd->tcdb", left, np.eye(6)).reshape(len(left), 6, -1)
         z = np.concatenate([past, known], axis=2).reshape(-1, past.shape[2] + known.shape[2])
         x = np.concatenate([past, columns], axis=2).reshape(z.shape)
@@ -146,7 +146,8 @@ class _Sampled:
             past = [before(rows[:, channel][:, there]) for rows in each]
             for place, own in enumerate(predicted(motion, past, [rows[:, channel][:, there] for rows in columns])):
                 known[place][:, channel, there] = own
-        return np.concatenate(columns), np.concatenate(known)
+        every = (np.concatenate([about_mean(rows) for rows in each]) for each in (columns, known))
+        return next(every), next(every)
 
 
 class _Products(NamedTuple):

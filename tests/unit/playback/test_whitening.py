@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.playback.innovations import before, predicted, whitening
+from cpfls_cli.playback.innovations import about_mean, before, predicted, whitening
 
 KEPT = np.array([0.97, 0.99])
 
@@ -69,3 +69,12 @@ def test_columns_are_predicted_by_the_other_runs():
         )
     (alone,) = predicted(common[:1], own[:1], values[:1])
     assert np.allclose(alone, values[0], atol=1e-3)
+
+
+def test_a_mean_is_taken_off_and_a_constant_leaves_nothing(residual):
+    rows = np.column_stack([residual[0] + 5.0, np.full(len(residual[0]), 0.1)])
+    about = about_mean(rows)
+    assert np.allclose(about[:, :2], residual[0] - residual[0].mean(axis=0))
+    # Not even rounding, which a test of its size would divide by.
+    assert not about[:, 2].any()
+    assert about_mean(rows[:0]).shape == (0, 3)
