@@ -7,8 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import linalg
-from scipy.linalg import lapack
 
 from cpfls_cli.arrays import Array, Numbers
 
@@ -71,6 +69,8 @@ class Triangle:
         blocks : iterable of tuple of array
             Columns, shape (rows, parameters), and right-hand side, shape (rows,), block by block.
         """
+        from scipy import linalg
+
         triangle: Array | None = None
         for columns, right_side in blocks:
             block = np.column_stack([columns, right_side])
@@ -99,6 +99,8 @@ def solve(matrix: Array, right_side: Array, rank_tolerance: float) -> LeastSquar
 
     Paper section 5: ``c = V S^-1 U^T tau``; method.md section 5 for rank-deficient data.
     """
+    from scipy import linalg
+
     U, singular_values, Vt = linalg.svd(matrix, full_matrices=False, check_finite=False, lapack_driver="gesdd")
     largest = singular_values[0] if len(singular_values) else 0.0
     rank = int(np.count_nonzero(singular_values > rank_tolerance * largest)) if largest > 0 else 0
@@ -208,12 +210,17 @@ def _reduced(matrix: Array, tolerance: float) -> _Inverse | None:
 
     Directions that count as zero get the largest eigenvalue, and nothing of a vector that is multiplied.
     """
+    from scipy import linalg
+    from scipy.linalg import lapack
+
     size = len(matrix)
     if size < _FEW:
         return None
     form, diagonal, off_diagonal, reflectors, _ = lapack.dsytrd(matrix, lower=1, lwork=_WORK * size)
 
     def turned_back(vectors: Numbers) -> Numbers:
+        from scipy.linalg import lapack
+
         below = lapack.dormqr("L", "N", form[1:, :-1], reflectors, vectors[1:], _WORK * size)[0]
         return np.concatenate([vectors[:1], below])
 
@@ -228,6 +235,8 @@ def _reduced(matrix: Array, tolerance: float) -> _Inverse | None:
     factor = linalg.cho_factor(matrix + largest * none @ none.T, check_finite=False)
 
     def apply(right_side: Array) -> Array:
+        from scipy import linalg
+
         inside = right_side - none @ (none.T @ right_side)
         return np.asarray(linalg.cho_solve(factor, inside, check_finite=False))
 
@@ -242,9 +251,13 @@ def _reduced(matrix: Array, tolerance: float) -> _Inverse | None:
 
 def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
     """Invert by Cholesky; None where the rank may not be full."""
+    from scipy import linalg
+
     factor = linalg.cho_factor(matrix, check_finite=False)
 
     def apply(right_side: Array) -> Array:
+        from scipy import linalg
+
         return np.asarray(linalg.cho_solve(factor, right_side, check_finite=False))
 
     size = len(matrix)
@@ -274,6 +287,8 @@ def quick_solution(equations: NormalEquations) -> tuple[Array, tuple[Array, bool
 
     The factor, for `scipy.linalg.cho_solve`, is of the matrix with rows and columns multiplied by the scale.
     """
+    from scipy import linalg
+
     matrix = equations.matrix
     diagonal = np.diag(matrix)
     scale = 1.0 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
