@@ -137,7 +137,11 @@ def diagnose(
     tried = [each for each in named.effects if gusts is None or not each.is_lag]
     wider, unnamed = with_unnamed(found, named.steps[-1], tried, rng)
     pairs = zip(hypothesis.chosen, estimates.effects, wider.effects, strict=True)
-    held_by = tuple(own if each.effect.is_lag and named.sure else with_it for each, own, with_it in pairs)
+    # Averages over windows, which widen the others, are biased by the loop for what is small.
+    held_by = tuple(
+        own if (each.effect.is_lag and named.sure) or each.effect.name in named.small else with_it
+        for each, own, with_it in pairs
+    )
     estimates = replace(wider, effects=held_by)
     fit = found._replace(estimates=estimates)
     judged = [named.in_gusts(each) for each in judge_effects(fit, named.effects, rng)]
@@ -215,6 +219,8 @@ class _Named(NamedTuple):
     losses: tuple[RotorLoss, ...] = ()
     sure: Mapping[str, float] = MappingProxyType({})
     unidentified: tuple[str, ...] = ()
+    small: frozenset[str] = frozenset()
+    """Effects whose numbers are by samples."""
 
     def in_gusts(self, judged: JudgedEffect) -> JudgedEffect:
         """Take the p-value of an effect by instruments, and drop rivals of a lag: a fit sees the loop."""
@@ -312,22 +318,29 @@ def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Name
 
 def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) -> _Named:
     """Add what is significant by samples, which averages over windows do not resolve in gusts."""
-    found, last = named.judgement.found, named.steps[-1]
+    found, last, judged = named.judgement.found, named.steps[-1], named.judge.repaired
+    signals = (*found.hypothesis.signals, *(flight.signals for flight in judged))
+
+    def known(effect: Effect) -> bool:
+        return not any(effect.missing(own) for own in signals)
+
     chosen = [each.effect for each in found.hypothesis.chosen]
+    if named.differ or not all(map(known, chosen)):
+        return named
     names = {each.name for each in chosen}
     held = frozenset[str]().union(*(each.holds for each in chosen))
     candidates = [
         each
         for each in (*(scored.candidate for scored in last.ranking), *last.hypothesis.chosen)
         if is_free(each)
-        and found.hypothesis.can(each)
+        and known(each.effect)
         and each.effect.name not in names | held
         and not (each.effect.is_lag or each.effect.physical)
     ]
     # Filtered noise correlates with what was before.
-    open_ = np.all([np.isinf(flight.cut_off) for flight in (*found.hypothesis.flights, *named.judge.repaired)], axis=0)
-    small = small_effects(found, named.judge.repaired, candidates, gusts.split & open_)
-    if named.differ or not small:
+    open_ = np.all([np.isinf(flight.cut_off) for flight in (*found.hypothesis.flights, *judged)], axis=0)
+    small = small_effects(found, judged, candidates, gusts.split & open_)
+    if not small:
         return named
     judgement = named.judge.judge(with_lean(with_small_effects(found, small, given), across))
     if min(judgement.held_out.shares().values()) < found.settings.named_share:
@@ -336,6 +349,7 @@ def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) ->
         judgement=judgement,
         alike=(*named.alike, *(rival for each in small for rival in each.rivals)),
         sure={**named.sure, **{each.candidate.effect.name: each.chance for each in small}},
+        small=frozenset(each.candidate.effect.name for each in small),
     )
 
 

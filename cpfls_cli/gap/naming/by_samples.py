@@ -160,7 +160,9 @@ class _Products(NamedTuple):
 
     def tested(self, effect: Effect, own: IntArray, others: Sequence[IntArray]) -> _Test:
         """Test an effect jointly with others; numbers beyond a bound at 0 are 0, and beyond another is no effect."""
-        width, kept = len(own), self._whole[own, own] > 0
+        # What is left of a column that others are a multiple of is the ridge's.
+        left = np.diagonal(self._adjusted(own, others)[0].sum(axis=0))
+        width, kept = len(own), left > 10 * RIDGE * np.abs(self._whole[own, own])
         while kept.any():
             found = self._test(own, others, kept)
             inside, admissible = within_bounds(effect, found.linear, found.error, self.vehicle)

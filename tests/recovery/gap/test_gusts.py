@@ -12,6 +12,7 @@ from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming import by_instruments as by_instruments_module
 from cpfls_cli.gap.naming.by_instruments import _windows_of_runs, by_instruments
+from cpfls_cli.gap.naming.by_samples import small_effects
 from cpfls_cli.gap.naming.estimate import fitted
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import GapVerdict
@@ -329,3 +330,23 @@ def test_what_the_vehicle_does_is_not_called_gusts(flown, kind, turning):
     # In gusts four fifths of what is left are theirs.
     assert found.gusts_only[:2].tolist() == turning
     assert np.all(found.found.predicted[:2] > 3 * found.found.predicted_error[:2])
+
+
+def test_flights_of_which_some_lack_a_signal_are_tried_by_what_all_have(flown):
+    recordings = recorded(flown["small"], TRUE.vehicle, setpoints=True)
+    lacking = replace(recordings[2], velocity=None)
+    for held in (recordings[3:], [recordings[3], replace(recordings[4], velocity=None)]):
+        run = diagnose([*recordings[:2], lacking], held, FEW, np.random.default_rng(1))
+        assert {each.name for each in run.diagnosis.effects} <= {"linear_damping"}
+
+
+def test_a_copy_of_an_effect_is_no_second_one(flown, monkeypatch):
+    asked = []
+    monkeypatch.setattr("cpfls_cli.gap.diagnose.small_effects", lambda *given: asked.append(given) or [])
+    recordings = recorded(flown["small"], TRUE.vehicle, setpoints=True)
+    diagnose(recordings[:3], recordings[3:], FEW, np.random.default_rng(1))
+    found, held, candidates, gusty = asked[-1]
+    one = next(each for each in candidates if each.effect.name == "linear_damping")
+    copy = one._replace(effect=replace(one.effect, name="copy"))
+    (effect,) = small_effects(found, held, [one, copy], gusty)
+    assert [each.name for each in effect.rivals] == [copy.effect.name if effect.candidate is one else one.effect.name]
