@@ -212,7 +212,10 @@ def _off_its_feet(signs: Signs, flies: BoolArray) -> tuple[BoolArray, BoolArray]
         hit = averaged(np.linalg.norm(signs.felt, axis=1) > HARD, signs.period, 2 * _REST_S) > 0
         lifts = flies & (size > _LIFTS) & ~hit
         first = np.flatnonzero(flies)[: max(1, round(_LIES_S / signs.period))]
-        thrust = np.median(felt[lifts if lifts.any() else first], axis=0)
+        ways = [np.median(felt[each], axis=0) for each in ((lifts,) if lifts.any() else ()) + (first, flies)]
+        unit = np.array(ways) / np.maximum(np.linalg.norm(ways, axis=1), 1e-12)[:, None]
+        # Two of the three agree: one alone is wrong where an accelerometer reads too much, or a log begins turned over.
+        thrust = ways[int(np.argmax((unit @ unit.T > _OFF_THRUST).sum(axis=1)))]
         along = felt @ thrust / np.maximum(size * float(np.linalg.norm(thrust)), 1e-12)
         weight = (size > _WEIGHT[0]) & (size < _WEIGHT[1])
         # No rotor pulls: what feels its weight from the side of its rotors lies on its back, however it rocks.

@@ -78,6 +78,15 @@ def test_a_vehicle_on_its_back_does_not_fly_whatever_its_rotors_do(own, known):
     assert found.ended
 
 
+@pytest.mark.parametrize("bias", [-0.6, -1.0])
+def test_an_accelerometer_that_reads_too_little_does_not_turn_a_flight_over(own, bias):
+    log = ended.rocks_on_its_back(own, 15.0)
+    log.specific_force = log.specific_force + np.array([0.0, 0.0, bias])
+    found = flown(log, ("force",))
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.3))
+    assert "impact at " in found.ended
+
+
 @pytest.mark.parametrize("known", [ALL, ("force",)])
 def test_a_crash_after_a_few_seconds_of_flight(known):
     """No rotor pulls: what feels its weight from above lies on its back, however it rocks."""

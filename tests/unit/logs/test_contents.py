@@ -495,7 +495,7 @@ def test_a_file_without_columns(tmp_path):
         log_contents(tmp_path / "log.h5")
 
 
-def test_a_table_of_matlab_beside_a_vector_and_alone(tmp_path):
+def test_a_table_of_matlab_with_a_vector_and_alone(tmp_path):
     def element(kind: int, own: bytes) -> bytes:
         return struct.pack("<II", kind, len(own)) + own + bytes(-len(own) % 8)
 
