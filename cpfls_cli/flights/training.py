@@ -113,8 +113,15 @@ def _torque_data(rows: Sequence[Array]) -> TorqueData:
 def require_signals(path: Path, held: Container[str], *needed: str) -> None:
     """Refuse a flight that lacks what is needed."""
     missing = [name for name in needed if name not in held]
+    rotors = [name for name in ("rotor_speed", "rotor_command") if name in held]
+    remedy = ""
+    if missing == [_TORQUE] and rotors:
+        remedy = (
+            f"; import its log again with --set import.torque_source={rotors[0].replace('_', '-')}, and with --model "
+            "VEHICLE.h5 of `cpfls vehicle` where the config does not know the factors of the rotors"
+        )
     if missing:
-        raise InputError(f"{path}: lacks {', '.join(missing)}; this stage needs {', '.join(needed)}")
+        raise InputError(f"{path}: lacks {', '.join(missing)}; this stage needs {', '.join(needed)}{remedy}")
 
 
 def part_of(source: TorqueSource, samples: slice) -> TorqueSource:

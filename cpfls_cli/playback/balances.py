@@ -508,9 +508,10 @@ class PastBalances(Balances):
         seen = [each for _, _, each, _ in kept]
         new, expected, _ = innovations(rows, [own[..., 0] for own in rows], seen, _PER_WINDOW, _BEFORE)
         for (number, part, *_), own, predicted in zip(kept, new, expected, strict=True):
-            middles = band.middles(part.stretches)
-            flat, known = (each.reshape(len(own), -1) for each in (own, predicted))
-            yield Rows(number, flat, known, middles[len(middles) - len(own) :])
+            if len(own):
+                middles = band.middles(part.stretches)
+                flat, known = (each.reshape(len(own), -1) for each in (own, predicted))
+                yield Rows(number, flat, known, middles[len(middles) - len(own) :])
 
 
 def _seen(flight: PlaybackFlight) -> Array:

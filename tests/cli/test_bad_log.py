@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 
 import h5py
 import numpy as np
@@ -269,6 +270,17 @@ def test_what_later_stages_will_miss_is_said_and_kept(cpfls, imported, signals, 
     assert all(note.endswith("cpfls vehicle and replay need rotors instead") for note in notes if NO_TORQUE in note)
     again = cpfls("info", flight, "-v").stderr.splitlines()
     assert [f"cpfls: note: {note}" for note in notes] == again
+
+
+@pytest.mark.parametrize("rotors", ["rotor_speed", "rotor_command"])
+def test_identify_says_how_rotors_give_the_torque_that_it_lacks(cpfls, imported, refuse, tmp_path, rotors):
+    _, _, flight = imported("attitude", rotors)
+    config, out = tmp_path / "study.yaml", tmp_path / "out.h5"
+    (message,) = refuse("identify", config, flight, "-o", out)
+    remedy = re.search(r"--set (import.torque_source=\S+),", message).group(1)
+    cpfls.done("import", config, tmp_path / "log.csv", "-o", flight, "--force", "--set", remedy)
+    size = "identification={population: 4, generations: 1}"
+    cpfls.done("identify", config, flight, "-o", out, "--set", size)
 
 
 def test_commands_are_shares_of_the_largest_speed_and_it_says_so(imported):

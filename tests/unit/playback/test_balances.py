@@ -73,6 +73,16 @@ def test_what_follows_from_an_evaluation_is_what_another_gives(flights, kind):
             np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-11 * np.abs(other).max())
 
 
+@pytest.mark.parametrize("kind", [Balances, PastBalances])
+def test_a_stretch_shorter_than_a_window_adds_nothing(flights, kind):
+    *others, last = flights
+    long = slice(0, 500), slice(520, len(last))
+    without, added = (replace(last, stretches=each) for each in (long, (long[0], slice(505, 515), long[1])))
+    of_each = (balances_of([*others, each], kind).sums(NAMED, somewhere(free=NAMED)) for each in (without, added))
+    for one, other in zip(*of_each, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-11 * np.abs(other).max())
+
+
 def test_the_residual_is_what_the_model_leaves_of_the_motion(flights):
     """By the model of the numbers, flight by flight and window by window."""
     balances, values = balances_of(flights[2:]), somewhere(3)
