@@ -296,10 +296,13 @@ def before(rows: Array) -> Array:
     ----------
     rows : array, shape (row, ...)
     """
-    total = np.concatenate([np.zeros((1, *rows.shape[1:])), np.cumsum(rows, axis=0)])
-    at = np.arange(_PAST[-1], len(rows) - 1 - _AHEAD)
-    parts = [(total[at - near + 1] - total[at - far + 1]) / (far - near) for near, far in pairwise(_PAST)]
-    return np.stack(parts, axis=-1)
+    # Products over time are twice as fast where it is last in memory.
+    total = np.zeros((*rows.shape[1:], len(rows) + 1))
+    np.cumsum(np.moveaxis(rows, 0, -1), axis=-1, out=total[..., 1:])
+    first, count = _PAST[-1] + 1, max(0, len(rows) - 1 - _AHEAD - _PAST[-1])
+    ends = [total[..., first - ago : first - ago + count] for ago in _PAST]
+    parts = [(one - other) / own for (one, other), own in zip(pairwise(ends), np.diff(_PAST), strict=True)]
+    return np.moveaxis(np.stack(parts, axis=-2), -1, 0)
 
 
 def about_mean(rows: Array) -> Array:
