@@ -338,8 +338,8 @@ def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) ->
         and not (each.effect.is_lag or each.effect.physical)
     ]
     # Filtered noise correlates with what was before.
-    open_ = np.all([np.isinf(flight.cut_off) for flight in (*found.hypothesis.flights, *judged)], axis=0)
-    small = small_effects(found, judged, candidates, gusts.split & open_)
+    unfiltered = np.all([np.isinf(flight.cut_off) for flight in (*found.hypothesis.flights, *judged)], axis=0)
+    small = small_effects(found, judged, candidates, gusts.split & unfiltered)
     if not small:
         return named
     judgement = named.judge.judge(with_lean(with_small_effects(found, small, given), across))

@@ -20,7 +20,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import BLOCK_S
-from cpfls_cli.estimation.first_stage import OF_MANY, RIDGE, first_stage_fit_by_run
+from cpfls_cli.estimation.first_stage import FOLDS, OF_MANY, RIDGE, first_stage_fit_by_run, fits_of_others
 from cpfls_cli.rounding import levelled
 from cpfls_cli.weak_form.resampling import blocks_of
 from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
@@ -38,7 +38,7 @@ _DRAWS = 999
 """Of chance, so many that a rare one is known to a third."""
 
 ROW_S = 0.01
-"""Length of a row, s: samples of faster logs are averaged."""
+"""Length of a row, s, of faster logs, whose samples are averaged; of slower ones a sample is a row."""
 STRETCH = 40
 """Rows that errors are taken over: longer than the filter."""
 _PAST = (2, 4, 8, 16, 32, 64)
@@ -241,14 +241,13 @@ class Whitening(NamedTuple):
     ahead: Array
     scale: Array
 
-    def white(self, rows: Array) -> Array:
-        """Filter rows, shape (row, channel, ...), without the first ones, which have no past, and the last ones."""
+    def white(self, rows: Array, channel: int) -> Array:
+        """Filter rows of a channel, shape (row, ...), without the first ones, which have no past, and the last ones."""
         from scipy.signal import lfilter
 
-        new = rows[1:] - self.kept.reshape(-1, *[1] * (rows.ndim - 2)) * rows[:-1]
-        channels = enumerate(zip(self.ahead, self.scale, strict=True))
-        each = [lfilter(ahead, [1.0], new[::-1, place], axis=0)[::-1] / scale for place, (ahead, scale) in channels]
-        return np.stack(each, axis=1)[_PAST[-1] : max(_PAST[-1], len(new) - _AHEAD)]
+        new = rows[1:] - self.kept[channel] * rows[:-1]
+        white = lfilter(self.ahead[channel], [1.0], new[::-1], axis=0)[::-1] / self.scale[channel]
+        return np.asarray(white[_PAST[-1] : max(_PAST[-1], len(new) - _AHEAD)])
 
 
 def whitening(residual: Sequence[Array], used: BoolArray) -> Whitening:
@@ -297,10 +296,13 @@ def before(rows: Array) -> Array:
     ----------
     rows : array, shape (row, ...)
     """
-    total = np.concatenate([np.zeros((1, *rows.shape[1:])), np.cumsum(rows, axis=0)])
-    at = np.arange(_PAST[-1], len(rows) - 1 - _AHEAD)
-    parts = [(total[at - near + 1] - total[at - far + 1]) / (far - near) for near, far in pairwise(_PAST)]
-    return np.stack(parts, axis=-1)
+    # Products over time are twice as fast where it is last in memory.
+    total = np.zeros((*rows.shape[1:], len(rows) + 1))
+    np.cumsum(np.moveaxis(rows, 0, -1), axis=-1, out=total[..., 1:])
+    first, count = _PAST[-1] + 1, max(0, len(rows) - 1 - _AHEAD - _PAST[-1])
+    ends = [total[..., first - ago : first - ago + count] for ago in _PAST]
+    parts = [(one - other) / own for (one, other), own in zip(pairwise(ends), np.diff(_PAST), strict=True)]
+    return np.moveaxis(np.stack(parts, axis=-2), -1, 0)
 
 
 def about_mean(rows: Array) -> Array:
@@ -311,32 +313,50 @@ def about_mean(rows: Array) -> Array:
     return np.asarray(np.where(np.abs(away).max(axis=0) > _TINY * np.abs(rows).max(axis=0), away, 0.0))
 
 
-def predicted(common: Sequence[Array], own: Sequence[Array], values: Sequence[Array]) -> list[Array]:
-    """Predict columns of each run from instruments, by the other runs; of a single one by itself.
+def predicted(motion: Sequence[Array], columns: Sequence[Array], white: Sequence[Array]) -> list[Array]:
+    """Predict white columns of each run by the other runs, of a single one parts by the other parts; about the mean.
+
+    Instruments are a constant, and what was before of the motion and of the column itself.
 
     Parameters
     ----------
-    common : sequence of array, shape (row, instrument)
-        Of all columns.
-    own : sequence of array, shape (row, column, instrument)
-        Of each column.
-    values : sequence of array, shape (row, column)
+    motion : sequence of array, shape (row, signal)
+    columns : sequence of array, shape (row, column)
+    white : sequence of array
+        As `Whitening.white` gives them.
 
     Returns
     -------
-    list of array, shape (row, column)
+    list of array
+        Of the shapes of `white`.
     """
-    sums = [_products_of_columns(*each) for each in zip(common, own, values, strict=True)]
-    out = []
-    for number, (z, its) in enumerate(zip(common, own, strict=True)):
-        others = [each for place, each in enumerate(sums) if place != number or len(sums) == 1]
-        gram, moment = (np.sum(each, axis=0) for each in zip(*others, strict=True))
-        scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=1, axis2=2), np.finfo(float).tiny))
-        gram = gram / (scale[:, :, None] * scale[:, None, :]) + RIDGE * np.eye(gram.shape[1])
-        weights = np.linalg.solve(gram, (moment / scale)[..., None])[..., 0] / scale
-        of_common, of_own = np.split(weights, [z.shape[1]], axis=1)
-        out.append(z @ of_common.T + np.einsum("tkp,kp->tk", its, of_own))
-    return out
+    parts = FOLDS if len(white) == 1 else 1
+
+    def instruments(number: int) -> list[tuple[Array, Array]]:
+        past, own = before(motion[number]), before(columns[number])
+        common = np.column_stack([np.ones(len(past)), past.reshape(len(past), -1)])
+        return list(zip(np.array_split(common, parts), np.array_split(own, parts), strict=True))
+
+    # Made twice: those of all runs at once take five times the memory of the columns.
+    sums = [
+        _products_of_columns(*own, values)
+        for number, each in enumerate(white)
+        for own, values in zip(instruments(number), np.array_split(each, parts), strict=True)
+    ]
+    gram, moment = (np.array(each) for each in zip(*sums, strict=True))
+    size = np.sqrt(np.diagonal(gram.sum(axis=0), axis1=1, axis2=2))
+    size = np.where(size > 0, size, 1.0)
+    fit = fits_of_others(gram / (size[:, :, None] * size[:, None, :]), (moment / size)[..., None], RIDGE)[..., 0] / size
+    return [
+        about_mean(np.concatenate([_weighted(*each) for each in zip(instruments(number), weights, strict=True)]))
+        for number, weights in enumerate(fit.reshape(len(white), parts, *fit.shape[1:]))
+    ]
+
+
+def _weighted(instruments: tuple[Array, Array], weights: Array) -> Array:
+    common, own = instruments
+    of_common, of_own = np.split(weights, [common.shape[1]], axis=1)
+    return np.asarray(common @ of_common.T + np.einsum("tkp,kp->tk", own, of_own))
 
 
 def _products_of_columns(z: Array, own: Array, values: Array) -> tuple[Array, Array]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise, permutations
+from itertools import chain, groupby, pairwise, permutations
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import BLOCK_S, mean_error
+from cpfls_cli.blocks import BLOCK_S, contiguous, mean_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.estimation.first_stage import RIDGE
@@ -25,6 +26,7 @@ from cpfls_cli.gap.naming.search import alternative
 from cpfls_cli.gap.settings import ERRORS
 from cpfls_cli.playback.innovations import ROW_S, STRETCH, Whitening, about_mean, before, predicted, whitening
 from cpfls_cli.playback.instruments import Instruments
+from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -51,21 +53,18 @@ class _Sampled:
         return system(self.flights, self.found.hypothesis.chosen)
 
     @cached_property
-    def length(self) -> int:
+    def _length(self) -> int:
         """Samples of a row."""
         return max(1, round(ROW_S / self.flights[0].windows.period))
 
-    def rows(self, each: Sequence[Columns]) -> list[Array]:
-        """Average columns of each flight over rows, shape (row, 6, ...)."""
-        period, rows = self.flights[0].windows.period, []
-        for columns, flight in zip(each, self.flights, strict=True):
-            direct, momentum = columns.direct, columns.momentum
-            total = np.zeros_like(direct)
-            np.cumsum(0.5 * period * (direct[1:] + direct[:-1]), axis=0, out=total[1:])
-            total = total if momentum is None else total + momentum
-            known = flight.known.reshape(-1, *[1] * (direct.ndim - 2))
-            rows.append(np.diff(total[:: self.length], axis=0) / (self.length * period) * known)
-        return rows
+    def _rows(self, columns: Columns, number: int) -> Array:
+        """Average columns of a flight over rows, shape (row, 6, ...)."""
+        flight, direct, momentum = self.flights[number], columns.direct, columns.momentum
+        midway = 0.5 * (direct[1:] + direct[:-1])[: (len(direct) - 1) // self._length * self._length]
+        rows = midway.reshape(-1, self._length, *direct.shape[1:]).mean(axis=1)
+        if momentum is not None:
+            rows += np.diff(momentum[:: self._length], axis=0) / (self._length * flight.windows.period)
+        return np.asarray(rows * flight.known.reshape(-1, *[1] * (direct.ndim - 2)))
 
     @cached_property
     def residual(self) -> list[Array]:
@@ -73,30 +72,19 @@ class _Sampled:
 
     def _residual_of(self, hypothesis: System) -> list[Array]:
         linear = self.found.estimates.linear
-        return self.rows([residual_along(hypothesis, number, linear) for number in range(len(self.flights))])
+        return [self._rows(residual_along(hypothesis, number, linear), number) for number in range(len(self.flights))]
 
     @cached_property
     def white(self) -> Whitening:
         return self.whitening or whitening(self.residual, self.gusty)
 
     @cached_property
-    def new(self) -> Array:
+    def white_residual(self) -> list[Array]:
         """White residual about the mean of each flight, shape (row, 6)."""
-        return np.concatenate([about_mean(self.white.white(rows)) for rows in self.residual])
-
-    def of(self, candidate: Candidate) -> list[Array]:
-        """Average the columns of a candidate over rows."""
-        return self.rows([columns_of(candidate, signals) for signals in self.hypothesis.signals])
+        each = ([self.white.white(rows[:, channel], channel) for channel in range(6)] for rows in self.residual)
+        return [about_mean(np.stack(channels, axis=1)) for channels in each]
 
     @cached_property
-    def nuisance(self) -> list[Array]:
-        """Columns of the config's numbers and of the chosen effects, of each flight."""
-        vehicle = nuisance()
-        stated = np.isin([each.name for each in vehicle.effect.coefficients], list(NUMBERS))
-        parts = [[rows[..., stated] for rows in self.of(vehicle)]]
-        parts += [self.of(each) for each in self.hypothesis.chosen if is_free(each)]
-        return [np.concatenate(each, axis=2) for each in zip(*parts, *self._slopes(), strict=True)]
-
     def _slopes(self) -> list[list[Array]]:
         """Follow the shapes of the chosen effects, by differences."""
         values, slopes = self.hypothesis.shape_values, []
@@ -107,86 +95,106 @@ class _Sampled:
             slopes.append([(one - other)[..., None] / size for one, other in zip(less, more, strict=True)])
         return slopes
 
+    def _columns(self, number: int, candidates: Sequence[Candidate]) -> tuple[dict[tuple[int, int], Array], int]:
+        """Average over rows of a flight all columns: the config's numbers, chosen effects, their shapes, candidates.
+
+        Result: those that are not 0, by channel and column, which few are; and how many columns there are.
+        """
+        vehicle, signals = nuisance(), self.hypothesis.signals[number]
+        stated = np.isin([each.name for each in vehicle.effect.coefficients], list(NUMBERS))
+        chosen = [each for each in self.hypothesis.chosen if is_free(each)]
+        of_vehicle, *own = (self._rows(columns_of(each, signals), number) for each in (vehicle, *chosen, *candidates))
+        slopes = [each[number] for each in self._slopes]
+        every = np.concatenate([of_vehicle[..., stated], *own[: len(chosen)], *slopes, *own[len(chosen) :]], axis=2)
+        there = np.argwhere(np.isfinite(self.white.scale)[:, None] & every.any(axis=0)).tolist()
+        return {(channel, at): every[:, channel, at].copy() for channel, at in there}, every.shape[2]
+
     @cached_property
     def _motion(self) -> list[Array]:
-        """What moved before each row: torque and force of rotors and of inertia, and rates; shape (row, 6, signal)."""
-        pairs = list(zip(self.flights, self.hypothesis.signals, strict=True))
-        wrench = self.rows([Columns(signals.wrench) for _, signals in pairs])
-        inertial = self.rows([flight.inertial for flight, _ in pairs])
-        rate = self.rows([Columns(np.tile(signals.body_rate, 2)) for _, signals in pairs])
-        past = (before(np.stack(each, axis=2)) for each in zip(wrench, inertial, rate, strict=True))
-        moved = (rows.reshape(*rows.shape[:2], -1) for rows in past)
-        return [np.concatenate([np.ones((len(rows), 6, 1)), rows], axis=2) for rows in moved]
+        """Torque and force of rotors and of inertia, and body rates, of each flight; shape (row, 6, signal)."""
+        sides = [
+            (Columns(signals.wrench), flight.inertial, Columns(np.tile(signals.body_rate, 2)))
+            for flight, signals in zip(self.flights, self.hypothesis.signals, strict=True)
+        ]
+        return [np.stack([self._rows(each, at) for each in own], axis=2) for at, own in enumerate(sides)]
 
     def products(self, candidates: Sequence[Candidate]) -> _Products:
-        """Multiply what the past predicts of all columns with these and the residual, by stretches of a window."""
-        each = [self.nuisance, *(self.of(candidate) for candidate in candidates)]
-        columns, known = self._predicted([np.concatenate(own, axis=2) for own in zip(*each, strict=True)])
+        """Multiply what the past predicts of all columns with these and the residual, by stretches of each flight."""
+        each = (self._columns(number, candidates) for number in range(len(self.flights)))
+        columns, (total, *_) = zip(*each, strict=True)
+        widths = [len(own.effect.coefficients) for own in candidates]
+        ends = np.cumsum([total - sum(widths), *widths])
+        counts = [max(1, round(len(own) / STRETCH)) for own in self.white_residual]
+        products = np.zeros((sum(counts), ends[-1], ends[-1] + 1))
+        for channel, pairs in groupby(sorted(set[tuple[int, int]]().union(*columns)), key=itemgetter(0)):
+            there = list(pairs)
+            rows = [
+                np.stack([flight.pop(own, np.zeros(len(left))) for own in there], axis=1)
+                for flight, left in zip(columns, self.residual, strict=True)
+            ]
+            flights = zip(counts, *self._of_channel(channel, rows), strict=True)
+            stretches = [zip(*(np.array_split(own, count) for own in both), strict=True) for count, *both in flights]
+            place = np.array(there)[:, 1]
+            products[:, place[:, None], [*place, -1]] += [z.T @ x for z, x in chain(*stretches)]
+        in_block = BLOCK_S / (STRETCH * self._length * self.flights[0].windows.period)
+        block = [np.diff(contiguous(count, max(1, round(count / in_block))), prepend=-1) for count in counts]
+        places = tuple(np.arange(*pair) for pair in pairwise(ends))
+        return _Products(products, np.flatnonzero(np.concatenate(block)), ends[0], places, self.hypothesis.vehicle)
+
+    def _of_channel(self, channel: int, columns: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+        """Give what the past predicts of white columns of each flight, and these with the white residual.
+
+        `columns`: of each flight, shape (row, column).
+        """
+        white = [self.white.white(own, channel) for own in columns]
+        known = predicted([own[:, channel] for own in self._motion], columns, white)
         # What a gust keeps beyond one memory goes with the residual before.
-        left = np.concatenate([about_mean(before(rows)) for rows in self.residual]) / self.white.scale[:, None]
-        past = np.einsum("tcb,cd->tcdb", left, np.eye(6)).reshape(len(left), 6, -1)
-        z = np.concatenate([past, known], axis=2).reshape(-1, past.shape[2] + known.shape[2])
-        x = np.concatenate([past, columns], axis=2).reshape(z.shape)
-        x = np.column_stack([x, self.new.reshape(-1)])
-        ends = [*range(0, len(z), 6 * STRETCH), len(z)]
-        products = np.array([z[begin:end].T @ x[begin:end] for begin, end in pairwise(ends)])
-        first = past.shape[2] + self.nuisance[0].shape[2]
-        widths = np.cumsum([first, *(own[0].shape[2] for own in each[1:])])
-        return _Products(products, first, tuple(np.arange(*ends) for ends in pairwise(widths)), self.hypothesis.vehicle)
-
-    def _predicted(self, each: Sequence[Array]) -> tuple[Array, Array]:
-        """Whiten columns of each flight, and predict them from the past, each flight by the others."""
-        columns = [self.white.white(rows) for rows in each]
-        known = [np.zeros_like(rows) for rows in columns]
-        for channel in np.flatnonzero(np.isfinite(self.white.scale)):
-            there = np.flatnonzero(np.any([rows[:, channel].any(axis=0) for rows in columns], axis=0))
-            if not len(there):
-                continue
-            motion = [own[:, channel] for own in self._motion]
-            past = [before(rows[:, channel][:, there]) for rows in each]
-            for place, own in enumerate(predicted(motion, past, [rows[:, channel][:, there] for rows in columns])):
-                known[place][:, channel, there] = own
-        every = (np.concatenate([about_mean(rows) for rows in each]) for each in (columns, known))
-        return next(every), next(every)
+        left = [about_mean(before(own[:, channel])) for own in self.residual]
+        share = np.linalg.lstsq(np.concatenate(left), np.concatenate(known))[0]
+        z = [own - one @ share for own, one in zip(known, left, strict=True)]
+        new = [own[:, channel] for own in self.white_residual]
+        return z, [np.column_stack([about_mean(own), one]) for own, one in zip(white, new, strict=True)]
 
 
-class _Products(NamedTuple):
+@dataclass(frozen=True)
+class _Products:
     """Products of instruments with columns and residual."""
 
     each: Array  # Shape (stretch, number, number + 1).
+    starts: IntArray  # First stretches of blocks.
     nuisance: int  # Numbers that are free in all tests, the first ones.
     places: tuple[IntArray, ...]  # Numbers of each candidate.
     vehicle: VehicleSettings
 
+    @cached_property
+    def _whole(self) -> Array:
+        return np.asarray(self.each.sum(axis=0))
+
     def tested(self, effect: Effect, own: IntArray, others: Sequence[IntArray]) -> _Test:
         """Test an effect jointly with others; numbers beyond a bound at 0 are 0, and beyond another is no effect."""
+        slope, score = self._adjusted(own, others)
         # What is left of a column that others are a multiple of is the ridge's.
-        left = np.diagonal(self._adjusted(own, others)[0].sum(axis=0))
-        width, kept = len(own), left > 10 * RIDGE * np.abs(self._whole[own, own])
+        kept = np.diagonal(slope.sum(axis=0)) > 10 * RIDGE * np.abs(self._whole[own, own])
         while kept.any():
-            found = self._test(own, others, kept)
+            found = self._test(slope, score, kept)
             inside, admissible = within_bounds(effect, found.linear, found.error, self.vehicle)
             if not admissible:
                 break
             if inside[kept].all():
                 return found
             kept = kept & inside
-        return _Test(1.0, np.zeros(width), np.zeros(width), np.zeros((len(self.each), width)))
+        return _Test(1.0, np.zeros(len(own)), np.zeros(len(own)), np.zeros(score.shape))
 
-    @property
-    def _whole(self) -> Array:
-        return np.asarray(self.each.sum(axis=0))
-
-    def _test(self, own: IntArray, others: Sequence[IntArray], kept: BoolArray) -> _Test:
+    def _test(self, slope: Array, score: Array, kept: BoolArray) -> _Test:
         from scipy.special import chdtrc
 
-        slope, score = self._adjusted(own[kept], others)
-        total, inverse = score.sum(axis=0), np.linalg.pinv(slope.sum(axis=0))
         linear, error, without = (np.zeros((*before, len(kept))) for before in ((), (), (len(score),)))
+        slope, score = slope[:, kept][:, :, kept], score[:, kept]
+        total, inverse = score.sum(axis=0), np.linalg.pinv(slope.sum(axis=0))
         linear[kept] = inverse @ total
         left = score - slope @ linear[kept]
         # Of gusts of several memories something slow is left, which scatters more over blocks than over stretches.
-        blocks = np.add.reduceat(left, np.arange(0, len(left), round(BLOCK_S / (STRETCH * ROW_S))))
+        blocks = np.add.reduceat(left, self.starts)
         slow = float(np.trace(np.linalg.pinv(left.T @ left, hermitian=True) @ blocks.T @ blocks)) / kept.sum()
         # By one step without each stretch.
         apart = np.sqrt(max(1.0, slow)) * left @ inverse.T
@@ -204,14 +212,13 @@ class _Products(NamedTuple):
 
     def _adjusted(self, own: IntArray, others: Sequence[IntArray]) -> tuple[Array, Array]:
         """Take off the instruments of numbers what others explain: products with their columns, and the residual."""
-        rest = np.concatenate([np.arange(self.nuisance), *others])
-        whole = self._whole
-        rest = rest[whole[rest, rest] > 0]
-        size = np.sqrt(whole[rest, rest])
-        free = whole[np.ix_(rest, rest)] / np.outer(size, size) + RIDGE * np.eye(len(rest))
-        less = np.linalg.solve(free.T, (whole[np.ix_(own, rest)] / size).T).T / size
-        adjusted = self.each[:, own] - less @ self.each[:, rest]
-        return adjusted[:, :, own], adjusted[..., -1]
+        rest, wanted = np.concatenate([np.arange(self.nuisance), *others]), np.append(own, -1)
+        rest = rest[self._whole[rest, rest] > 0]
+        size = np.sqrt(self._whole[rest, rest])
+        free = self._whole[np.ix_(rest, rest)] / np.outer(size, size) + RIDGE * np.eye(len(rest))
+        less = np.linalg.solve(free.T, (self._whole[np.ix_(own, rest)] / size).T).T / size
+        adjusted = self.each[:, own[:, None], wanted] - less @ self.each[:, rest[:, None], wanted]
+        return adjusted[..., :-1], adjusted[..., -1]
 
 
 class SmallEffect(NamedTuple):
@@ -265,7 +272,7 @@ def small_effects(
     """
     here = _Sampled(found, found.hypothesis.flights, None, gusty)
     there = _Sampled(found, tuple(held), here.white, gusty)
-    if not (len(here.new) and len(there.new)):
+    if not all(any(map(len, each.white_residual)) for each in (here, there)):
         return []
     learned, named = here.products(candidates), list[tuple[_Tried, tuple[Alternative, ...]]]()
     while True:
@@ -300,7 +307,7 @@ def _surest(
     Of these the first of the catalogue, which is the usual one. None where an effect with shapes is to be chosen: it
     would have to be sought at all of them.
     """
-    sure = sorted((each for each in tried if each.test.chance <= rate), key=lambda each: each.test.chance)
+    sure = ascending((each for each in tried if each.test.chance <= rate), lambda each: each.test.chance)
     if not sure or len(tried) * sure[0].test.chance > rate:
         return None, ()
     unneeded = np.zeros((len(sure), len(sure)), dtype=bool)

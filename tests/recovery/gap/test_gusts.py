@@ -1,5 +1,6 @@
 """Gusts called gusts where instruments tell, names and numbers beside them, in flights of known truth."""
 
+import tracemalloc
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,7 +13,7 @@ from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming import by_instruments as by_instruments_module
 from cpfls_cli.gap.naming.by_instruments import _windows_of_runs, by_instruments
-from cpfls_cli.gap.naming.by_samples import small_effects
+from cpfls_cli.gap.naming.by_samples import _Sampled, small_effects
 from cpfls_cli.gap.naming.estimate import fitted
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import GapVerdict
@@ -338,6 +339,43 @@ def test_flights_of_which_some_lack_a_signal_are_tried_by_what_all_have(flown):
     for held in (recordings[3:], [recordings[3], replace(recordings[4], velocity=None)]):
         run = diagnose([*recordings[:2], lacking], held, FEW, np.random.default_rng(1))
         assert {each.name for each in run.diagnosis.effects} <= {"linear_damping"}
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_stretches_and_blocks_of_4_s_end_with_their_flight(flown, every):
+    """Logs of 100 and of 50 Hz, in which a row is a sample."""
+    recordings = [
+        replace(
+            each,
+            **{
+                name: getattr(each, name)[:end:every]
+                for name in ("time", "body_rate", "attitude", "velocity", "position", "rotor_speed")
+            },
+        )
+        for each, end in zip(recorded(flown["small"], TRUE.vehicle, setpoints=False), (3000, 1500, 2300), strict=False)
+    ]
+    windows = common_windows(recordings, FEW)
+    flights = tuple(weak_flight(each, windows, None, force=True) for each in recordings)
+    found = fitted(flights, [], best_floor(system(flights)), FEW)
+    products = _Sampled(found, flights, None, np.ones(6, dtype=bool)).products([])
+    # Less the past of 64 rows, and 20 ahead of a row.
+    stretches = [round((end / every - 86) / 40) for end in (3000, 1500, 2300)]
+    assert len(products.each) == sum(stretches)
+    assert {0, *np.cumsum(stretches)[:-1]} <= set(products.starts)
+    seconds = np.diff([*products.starts, len(products.each)]) * 40 * every / 100
+    assert np.all(np.abs(seconds - 4.0) < 1.0)
+
+
+def test_products_are_made_in_little_memory(flown, monkeypatch):
+    asked = []
+    monkeypatch.setattr("cpfls_cli.gap.diagnose.small_effects", lambda *given: asked.append(given) or [])
+    recordings = recorded(flown["small"], TRUE.vehicle, setpoints=False)
+    diagnose(recordings[:5], recordings[5:], FEW, np.random.default_rng(1))
+    tracemalloc.start()
+    small_effects(*asked[-1])
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 300e6 * 5 * 30 / 1000
 
 
 def test_a_copy_of_an_effect_is_no_second_one(flown, monkeypatch):
