@@ -151,7 +151,8 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
                 doubt = f"{name} rises by 1 from row to row, so it may count rows: is import.time_unit right?"
             return name, unit, doubt
         if ranks[name] < 2:
-            refused += [f"{name} rises by {step:.3g} between most rows, as no clock of a flight does: log finer stamps"]
+            how = "log finer stamps" + (", or write one row for each stamp" if step == 0 else "")
+            refused += [f"{name} rises by {step:.3g} between most rows, as no clock of a flight does: {how}"]
     clock = nameless_clock(fields)
     if clock is not None:
         return clock, "s", ""
