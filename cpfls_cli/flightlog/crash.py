@@ -167,7 +167,10 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     turned = averaged(signs.rate, signs.period, _REST_S)
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
     calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
-    off, pulled = _off_its_feet(signs, flies)
+    off, pulled, lifts = _off_its_feet(signs, flies)
+    for first, after in runs(active):
+        # What is lifted later has flown on its back, with rotors that turn the other way.
+        pulled[first : first + np.flatnonzero(np.append(True, lifts[first:after]))[-1]] = False
     lies = pulled | (calm & off)
     rests = lies | (calm & active & _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)
@@ -203,8 +206,8 @@ def turns_over(signs: Signs, active: BoolArray) -> bool:
     return long > _OVER * int(on.sum())
 
 
-def _off_its_feet(signs: Signs, flies: BoolArray) -> tuple[BoolArray, BoolArray]:
-    """Mark where something else than rotors carries the weight if it is calm, and where it does so in any case."""
+def _off_its_feet(signs: Signs, flies: BoolArray) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Mark where something else than rotors carries the weight if calm, where in any case, and where rotors lift."""
     if signs.felt is not None:
         felt = averaged(signs.felt, signs.period, _REST_S)
         size = np.linalg.norm(felt, axis=1)
@@ -219,9 +222,10 @@ def _off_its_feet(signs: Signs, flies: BoolArray) -> tuple[BoolArray, BoolArray]
         along = felt @ thrust / np.maximum(size * float(np.linalg.norm(thrust)), 1e-12)
         weight = (size > _WEIGHT[0]) & (size < _WEIGHT[1])
         # No rotor pulls: what feels its weight from the side of its rotors lies on its back, however it rocks.
-        return weight & (along < _OFF_THRUST), weight & (along < -_OFF_THRUST)
+        return weight & (along < _OFF_THRUST), weight & (along < -_OFF_THRUST), lifts & (along > _OFF_THRUST)
     up = np.zeros(len(flies)) if signs.upright is None else _turned_up(signs.upright, flies)
-    return np.asarray(averaged(up, signs.period, _REST_S) < 0), np.zeros(len(flies), dtype=bool)
+    nowhere = np.zeros(len(flies), dtype=bool)
+    return np.asarray(averaged(up, signs.period, _REST_S) < 0), nowhere, nowhere
 
 
 def _turned_up(upright: Array, flies: BoolArray | slice) -> Array:

@@ -4,11 +4,12 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog import crash
-from cpfls_cli.flightlog.crash import ALIVE, LIVELY_RAD_S, SLOW_S, Resting, Signs, averaged, smoothed
+from cpfls_cli.flightlog.crash import ALIVE, HARD, LIVELY_RAD_S, SLOW_S, Resting, Signs, averaged, smoothed
 from cpfls_cli.flightlog.names import BY_HAND
 from cpfls_cli.flightlog.repair import SignalTable, fill, increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings
@@ -149,7 +150,10 @@ def find_flown(signs: Signs) -> FlownPart:
     if not active.any():
         return _no_flight(f"{how} throughout")
     if held := _held(signs, active):
-        return _no_flight(f"{held}, as on a test stand")
+        flies = _before_hits(signs, active)
+        if not flies.any():
+            return _no_flight(f"{held}, as on a test stand")
+        active, rests = flies, rests._replace(carried=rests.carried | (active & ~flies))
     if _still(signs, active):
         return _no_flight("the vehicle neither turns nor moves")
     return _longest(signs, active, rests, how)
@@ -190,7 +194,7 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
 
 def _carried(signs: Signs, largest: float) -> BoolArray:
     """Mark where the rotors carry the vehicle, or idle in free fall and in flips: then it turns, and not for long."""
-    level, rate = signs.level, signs.turning
+    level = signs.level
     assert level is not None, "asked for"
     # Thrust goes as the square of the level, or with it: who mostly climbs hovers at less than his usual level.
     felt, of_hover = None, level
@@ -200,9 +204,10 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         of_hover = level / np.sqrt(np.maximum(np.linalg.norm(averaged(signs.felt, signs.period, _TURN_S), axis=1), 1.0))
     hover = float(np.median(of_hover[level > _OF_LARGEST * largest]))
     carrying = np.asarray(level > _OF_HOVER * hover, dtype=bool)
-    if rate is not None and carrying.any():
-        turns = np.sqrt(averaged(rate**2, signs.period, _SHORT_S))
-        lively = turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[carrying])))
+    if signs.rate is not None and carrying.any():
+        # Idling rotors shake what stands on the ground, and do not turn it.
+        slow = np.linalg.norm(averaged(signs.rate, signs.period, _TURN_S), axis=1)
+        lively = _lively(slow, carrying, signs.period)
         if felt is not None:
             lively |= felt < _FALLS
         # A throttle that is cut, and not a vehicle that is carried back to where it takes off.
@@ -215,6 +220,12 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
             flight &= level > _ABOVE_IDLE * (np.quantile(level[flight], 0.05) if flight.any() else np.inf)
             carrying[first:] |= level[first:] > _OF_HOVER * (np.median(level[flight]) if flight.any() else hover)
     return smoothed(carrying, signs.period, _SHORT_S)
+
+
+def _lively(turning: Array, flies: BoolArray, period: float) -> BoolArray:
+    """Mark where it turns, shape (time,), rad/s, at least by itself and against what it does in flight."""
+    turns = np.sqrt(averaged(turning**2, period, _SHORT_S))
+    return np.asarray(turns > max(_TURNS_RAD_S, _OF_TURNING * float(np.median(turns[flies]))), dtype=bool)
 
 
 def _lifted(signs: Signs, active: BoolArray) -> BoolArray:
@@ -287,9 +298,12 @@ def _climbs(signs: Signs, active: BoolArray) -> bool:
     second, edge = (max(1, round(seconds / signs.period)) for seconds in (1.0, SLOW_S))
     if signs.height is None or len(active) <= 2 * (second + edge):
         return False
+    # A height in steps is known where it changes.
+    known = np.flatnonzero(np.diff(signs.height, prepend=np.nan) != 0)
+    height = np.interp(signs.time, signs.time[known], signs.height[known])
     # Means at the ends of a log would bend a steady climb.
-    span, height = second * signs.period, averaged(signs.height, signs.period, SLOW_S)[edge:-edge]
-    there = active[edge:-edge]
+    span, height = second * signs.period, averaged(height, signs.period, SLOW_S)[edge:-edge]
+    there = (active & (signs.time <= signs.time[known[-1]]))[edge:-edge]
     rates = np.where(there[second:] & there[:-second], height[second:] - height[:-second], np.nan) / span
     needed = np.nanmax(np.abs(rates[second:] - rates[:-second]), initial=0.0) / span / STANDARD_GRAVITY
     pushed = np.inf
@@ -333,12 +347,41 @@ def _held(signs: Signs, active: BoolArray) -> str:
     return "the weight turns through it as it turns"
 
 
+def _before_hits(signs: Signs, active: BoolArray) -> BoolArray:
+    """Mark what feels its thrust, of the parts between hits: what stands or lies since a hit has flown before."""
+    flies = np.zeros_like(active)
+    if signs.felt is None or signs.level is None:
+        return flies
+    hits = np.linalg.norm(signs.felt, axis=1) > HARD
+    step = max(1, round(SLOW_S / signs.period))
+    squares, felt = (averaged(each, signs.period, SLOW_S) for each in (signs.level**2, signs.felt))
+    # Means reach into what is before and after.
+    for first, after in runs(~binary_dilation(hits | ~active, np.ones(2 * step + 1, dtype=np.bool_))):
+        now, before = slice(first + step, max(first + step, after)), slice(first, max(first, after - step))
+        thrust = np.median(felt[first:after], axis=0)
+        # Over half a second neither a battery nor the air changes.
+        works, feels = squares[now] - squares[before], (felt[now] - felt[before]) @ thrust
+        both, power = float(works @ feels), float(works @ works)
+        alike = both / np.sqrt(power * float(feels @ feels) + 1e-12)
+        share = _UNFELT * float(thrust @ thrust) / float(squares[first:after].mean())
+        flies[max(0, first - step) : after + step] = alike > _AS_HELD and both > share * power
+    return smoothed(flies & active, signs.period, _SHORT_S)
+
+
 def _unfelt(signs: Signs, active: BoolArray) -> bool:
     """Tell whether a vehicle feels no more where its rotors work much more."""
     climbs = signs.height is not None and float(np.ptp(signs.height[active])) > _CLIMBS_M
     if signs.level is None or signs.felt is None or climbs:
         return False
-    squares, felt = (averaged(each, signs.period, SLOW_S)[active] for each in (signs.level**2, signs.felt))
+    judged = active.copy()
+    if signs.turning is not None:
+        # What is held feels the same where it idles, and mostly shakes then too.
+        first, last = np.flatnonzero(active)[[0, -1]]
+        shakes = _lively(signs.turning, active, signs.period) & smoothed(
+            signs.level > ALIVE, signs.period, _LONGEST_CUT_S
+        )
+        judged[first:last] |= shakes[first:last]
+    squares, felt = (averaged(each, signs.period, SLOW_S)[judged] for each in (signs.level**2, signs.felt))
     thrust = np.median(felt, axis=0)
     ranges = (np.ptp(np.quantile(each, [0.05, 0.95])) for each in (squares / squares.mean(), felt @ thrust))
     works, feels = map(float, ranges)

@@ -17,7 +17,7 @@ from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
 from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, nameless_clock
-from cpfls_cli.flightlog.repair import increasing_rows
+from cpfls_cli.flightlog.repair import increasing_rows, stays_behind
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
 from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
@@ -118,45 +118,62 @@ class LogTable:
 def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[str, str, str]:
     """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
     ranks: dict[str, int] = {}
-    refused = ""
+    refused: list[str] = []
     groups = Counter(name.rpartition("/")[0] for name in fields)
     for name, values in fields.items():
         # In a struct of MATLAB, or a group of HDF5, what comes last says what it is; alone it is a unit, as in deg/sec.
         (group, _, last), known = name.rpartition("/"), np.asarray(values, dtype=float)
         lower = (last if groups[group] > 1 else name).lower().strip()
-        rows = np.flatnonzero(np.isfinite(known))
-        known = known[rows]
+        known = known[np.isfinite(known)]
         usual = _TIME_NAMES.fullmatch(lower)
         changes = len(known) > max(2, 0.5 * len(values)) and np.ptp(known) > 0
-        falls = np.flatnonzero(np.diff(known) < 0)
         named = usual or "time" in lower or "stamp" in lower
-        if changes and usual and len(falls):
-            refused = f"{name} falls at row {rows[falls[0] + 1] + 1} of {len(values)}: keep the rows of one flight"
-        if changes and not len(falls) and (named or units.get(name) == "s"):
+        # Rows that come late one by one are left out.
+        back = _steps_back(name, values)
+        falling = back and (not usual or stays_behind(known))
+        if changes and usual and falling:
+            refused += [f"{back}, and stays behind: keep the rows of one flight, or leave out stamps that are wrong"]
+        if changes and not falling and (named or units.get(name) == "s"):
             ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2 if named else 3
     for name in sorted(ranks, key=ranks.__getitem__):
-        step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
+        known = fields[name][np.isfinite(fields[name])]
+        step, back = float(np.median(np.diff(known))), _steps_back(name, fields[name])
+        late = f"{back}: rows out of order are left out" if back else ""
         if name in units:
-            return name, "s", ""
+            return name, "s", late
         ending = re.search(r"(?:[_ \[(]|time)([num]?s)[\])]?$", name.lower())
         fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
         if ending or fitting:
-            unit, doubt = ending[1] if ending else fitting[0], ""
+            unit, doubt = ending[1] if ending else fitting[0], late
             if fitting and unit not in fitting:
                 doubt = f"{name} is said to be in {unit}, but steps of {step:.3g} are those of a flight in {fitting[0]}"
             elif step == 1:
                 doubt = f"{name} rises by 1 from row to row, so it may count rows: is import.time_unit right?"
             return name, unit, doubt
         if ranks[name] < 2:
-            refused = f"{name} rises by {step:.3g} between most rows, as no clock of a flight does: log finer stamps"
+            how = "log finer stamps" + (", or write one row for each stamp" if step == 0 else "")
+            refused += [f"{name} rises by {step:.3g} between most rows, as no clock of a flight does: {how}"]
     clock = nameless_clock(fields)
     if clock is not None:
         return clock, "s", ""
-    raise InputError(
-        refused
-        or "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
-        " rename it, or write the config by hand (`cpfls config` prints every key)"
+    unknown = (
+        "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp"
     )
+    how = f"rename {'another one' if refused else 'it'}, or write the config by hand (`cpfls config` prints every key)"
+    raise InputError("; ".join([*(refused or [unknown]), how]))
+
+
+def _steps_back(name: str, values: Array) -> str:
+    """Say how often stamps, shape (row,), fall, and where they do first; empty where they never do."""
+    rows = np.flatnonzero(np.isfinite(values))
+    known = np.asarray(values, dtype=float)[rows]
+    falls = np.flatnonzero(np.diff(known) < 0)
+    if not len(falls):
+        return ""
+    first = falls[0]
+    times = "once, at" if len(falls) == 1 else f"{len(falls)} times, first at"
+    at = f"row {rows[first + 1] + 1} of {len(values)}, from {known[first]:.9g} to {known[first + 1]:.9g}"
+    return f"{name} falls {times} {at}"
 
 
 def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalName, list[Named]]:

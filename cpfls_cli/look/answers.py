@@ -249,9 +249,13 @@ def _gains(found: Found) -> tuple[str, str, str, str]:
     return "roughly" if known else "no", why, "", ""
 
 
+def _gyroscope_hz(flight: LogFlight) -> float:
+    return max(each.rate_hz for each in (flight.gyroscope, flight.gyroscope_unfiltered) if each is not None)
+
+
 def _spectra(found: Found) -> tuple[str, str, str, str]:
     flight, wanted = found.flight, "the gyroscope"
-    rate = max(each.rate_hz for each in (flight.gyroscope, flight.gyroscope_unfiltered) if each is not None)
+    rate = _gyroscope_hz(flight)
     if rate < _SOME_SPECTRUM_HZ:
         return "no", f"the gyroscope is logged {rate:.0f} times a second", wanted, ""
     if found.vibration is None or not found.vibration.spectra:
@@ -297,7 +301,7 @@ def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:
     ranked = sorted(wanted.items(), key=lambda own: (own[0] != cause, -len(own[1])))
     flights = [NextStep(what=text, why=", ".join(questions)) for text, questions in ranked]
     slow = [each for each in open_ if each.log and not each.log.startswith("also ")]
-    how = "faster" if found.settings else f"at {_LEAST_HZ:g} Hz or more"
+    how = "faster" if found.settings or _gyroscope_hz(found.flight) >= _LEAST_HZ else f"at {_LEAST_HZ:g} Hz or more"
     logged = [
         NextStep(
             what=f"log {joined(signal for each in slow for signal in each.log.split(', '))} {how}",

@@ -427,6 +427,49 @@ def tumbles(known):
     return made
 
 
+def gentle(*known, noise=0.15):
+    """Two flights that hardly turn, between which its rotors idle and shake for 30 s."""
+
+    def made(time):
+        flies = inside(time, 3, 38, 1) + inside(time, 70, 105, 1) > 0
+        felt = np.where(flies, 1 + 0.03 * np.sin(0.8 * time), 1.0)
+        level = np.where(flies, 0.5 * np.sqrt(felt), inside(time, 1, 107, 0.06))
+        signs = {"rotors": level, "rate": 0.1 * flies, "noise": noise}
+        return signs | ({"force": np.outer(felt, UP), "shakes": 0.02} if known else {})
+
+    return made
+
+
+def stands_after_a_hit(time):
+    """It hovers, sinks, hits the ground, and stands there with rotors that its controller winds up."""
+    flies = inside(time, 3, 20, 1) > 0
+    felt = np.where(flies, 1 + 0.03 * np.sin(0.8 * time) - inside(time, 18.5, 20, 0.2), 1.0)
+    felt = inside(time, 20, 20.04, 6.0, felt)
+    wound = (0.3 + 0.2 * np.sin(0.7 * time))[:, None] * [1.5, 0.2, 1.5, 0.3]
+    rotors = np.where((time < 20)[:, None], (0.4 * np.sqrt(felt) * flies)[:, None], wound)
+    rocks = inside(time, 20, 60, 0.4, 0.2 * flies)
+    return {"rotors": rotors, "rate": rocks, "force": np.outer(felt, UP), "shakes": 0.02}
+
+
+def on_its_back(recovers):
+    """It turns over at 20 s, and flies there with rotors that turn the other way, or rocks on the ground."""
+
+    def made(time):
+        over = inside(time, 20, 30 if recovers else 60, 1) > 0
+        felt = np.where(over, -1.0, inside(time, 36, 39, 1.6, 1 + 0.1 * np.sin(2 * time)))
+        turns = inside(time, 19.5, 20, 2 * np.pi) + recovers * inside(time, 29.5, 30, 2 * np.pi)
+        return {"rotors": inside(time, 3, 57, 0.5), "rate": inside(time, 3, 57, 0.8), "rolls": turns} | {
+            "force": np.outer(felt, UP)
+        }
+
+    return made
+
+
+def works_by_turns(time):
+    """A bench whose rotors work and idle, and shake it."""
+    return bench(time, 0.3, rotors=np.where(time % 20 < 10, 0.5, 0.06), rate=0.1)
+
+
 ALL, APART = ((0, np.inf),), ((3, 30), (50, 77))
 RESTS = ("rests with its rotors on",)
 READ = {
@@ -444,6 +487,11 @@ READ = {
         )
         for speed in (2, 5)
     },
+    "a steady climb, its height in steps of 1 m": (
+        60,
+        lambda t: {"rate": 0, "noise": 0.003, "height": np.round(0.5 * t)} | calm(1 + 0 * t),
+        ALL,
+    ),
     "a dead gyroscope that climbs": (40, lambda t: {"rate": 0, "noise": 0.001, "height": 0.2 * t}, ALL),
     "likewise, at one force": (40, lambda t: {"rate": 0, "noise": 0.001, "height": 0.2 * t} | calm(1 + 0 * t), ALL),
     "likewise, that leans": (
@@ -459,6 +507,14 @@ READ = {
         for noise in (0.15, 0.25, 0.4)
         for known in ((), ("force",), ("force", "height"))
     },
+    **{
+        f"gentle flights, idling that shakes, {known}": (110, gentle(*known), ((3, 38), (70, 105)))
+        for known in ((), ("force",))
+    },
+    "a flight that hits, and stands with its rotors on": (60, stands_after_a_hit, ((3.5, 20),), ("impact",)),
+    "a flight on its back": (60, on_its_back(recovers=True), ((3, 57),)),
+    "on its back on the ground": (60, on_its_back(recovers=False), ((3, 20),), ("loss of control",)),
+    "a bench whose rotors work by turns": (100, works_by_turns, ()),
     "idling that is moved by hand": (80, acrobatics(hand=0.3), APART),
     "carried by hand between two flights": (80, acrobatics("force", idle=0.0, hand=2.0), APART),
     "moved with idling rotors, then a calm hover": (

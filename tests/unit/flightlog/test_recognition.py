@@ -291,8 +291,14 @@ def test_time_on_the_ground_and_idling_is_cut(own):
     [
         ({"speed": named(np.zeros((2000, 4)), "cmd1", "cmd2", "cmd3", "cmd4")}, "the rotors (cmd*) never change"),
         ({"t": None}, "no column of time stamps is recognised"),
-        ({"t": {"t": np.arange(2000) % 1500 * 0.015}}, "t falls at row 1501 of 2000: keep the rows of one flight"),
-        ({"t": {"t": np.arange(2000) // 60 * 1.0}}, "t rises by 0 between most rows, as no clock of a flight does"),
+        (
+            {"t": {"t": np.arange(2000) % 1500 * 0.015}},
+            "t falls once, at row 1501 of 2000, from 22.485 to 0, and stays behind: keep the rows of one flight",
+        ),
+        (
+            {"t": {"t": np.arange(2000) // 60 * 1.0}},
+            "as no clock of a flight does: log finer stamps, or write one row for each stamp",
+        ),
     ],
 )
 def test_what_is_no_flight_is_refused(own, changed, message):
@@ -304,6 +310,22 @@ def test_what_shows_no_flight_is_said_with_what_it_holds(own):
     bare = flat_log(own, **dict.fromkeys(("speed", "rate", "position", "velocity")))
     with pytest.raises(InputError, match=r"^holds attitude and acceleration alone: no rotors, no height and no rates"):
         seen(bare)
+
+
+def test_every_column_of_stamps_that_is_refused_is_said_with_what_else_helps(own):
+    stamps = {"t": np.arange(2000) % 1500 * 0.015, "time": np.arange(2000) // 60 * 1.0}
+    with pytest.raises(InputError, match=r"^t falls once.*; time rises by 0.*write the config by hand"):
+        seen(flat_log(own, t=stamps))
+
+
+def test_single_stamps_that_step_back_are_left_out(own):
+    late = own.time.copy()
+    late[[500, 900]] -= 0.5
+    recognition = seen(flat_log(own, t={"t": late}))
+    assert recognition.time_column == "t"
+    before, after = late[499:501]
+    said = f"t falls 2 times, first at row 501 of 2000, from {before:.9g} to {after:.9g}"
+    assert f"{said}: rows out of order are left out" in recognition.warnings
 
 
 def test_milliseconds_of_a_counter_are_a_clock(own):

@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import LogContents
-from cpfls_cli.look.columns import on_clock
+from cpfls_cli.look.columns import LookedLog, on_clock
 from cpfls_cli.look.flight import Samples
 from cpfls_cli.look.hover import hover_of
 from cpfls_cli.look.reading import read_flight
@@ -304,3 +304,11 @@ def test_cubic_keeps_what_lines_weaken():
     actual = np.sin(2 * np.pi * 8 * clock)
     lines, cubic = (on_clock(slow, clock, 1, cubic=each)[:, 0] for each in (False, True))
     assert np.std(cubic - actual) < 0.02 < 0.06 < np.std(lines - actual)
+
+
+@pytest.mark.parametrize(("other", "factors"), [("speed", []), ("gyroADC[0]", [0.01])])
+def test_a_plain_word_has_the_unit_of_a_kind_of_log_among_its_own_names_alone(other, factors):
+    time = 0.01 * np.arange(500)
+    fields = {"t": time, "baroAlt": 3 + np.sin(time), other: np.cos(time)}
+    heights = [own.values[:, 0] for own in LookedLog({"": fields}, {}, "").found("height")]
+    assert [own.tolist() for own in heights] == [(factor * fields["baroAlt"]).tolist() for factor in factors]
