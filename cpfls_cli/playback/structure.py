@@ -343,7 +343,9 @@ def _grow(bench: _Bench, blocks: tuple[str, ...]) -> Judged:
     open_ = bench.vehicle.unknown
     guessed = replace(bench.vehicle, unknown=tuple(name for name in open_ if name != INERTIA))
     kinds = ((), *((block,) for block in bench.responses if block in blocks))
-    starts = [bench.judge(Structure(kind), {}, first=guessed if INERTIA in open_ else None) for kind in kinds]
+    stated, *others = (bench.judge(Structure(kind), {}, first=guessed if INERTIA in open_ else None) for kind in kinds)
+    # A response that gains nothing alone leads to no minimum of its own; it is judged again with the best.
+    starts = [stated, *(each for each in others if _visibly_better(bench, each, stated))]
     grown = [_explore(bench, each, named) for each in starts]
     for present in ascending(grown, lambda each: each.error)[:_FITTED]:
         while True:
