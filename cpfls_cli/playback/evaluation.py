@@ -215,13 +215,18 @@ class VehicleAt:
         pushed : bool
             Whether something pushes on top.
         """
-        function = traced_step(self.free, translates, pushed)((period, *self.values.tolist()))
+        function = traced_step(self.free, self._nothing, translates, pushed)((period, *self.values.tolist()))
         return Flown(Vehicle(self.free.vehicle, ()), self._body, traced=function)
 
     def slopes(self, pushes: int = 0) -> Slopes:
         """Differentiate its accelerations by all numbers, or by those of what pushes on top."""
-        numbers, places, function = traced_slopes(self.free, pushes)
+        numbers, places, function = traced_slopes(self.free, self._nothing, pushes)
         return Slopes(numbers, places, function(tuple(self.values.tolist())))
+
+    @property
+    def _nothing(self) -> tuple[bool, ...]:
+        """Which numbers are 0: what they are factors of is not evaluated, only their derivatives are."""
+        return tuple((self.values == 0).tolist())
 
     @cached_property
     def polynomial(self) -> Flown:
@@ -298,10 +303,11 @@ def acting_at(free: FreeNumbers, number: Callable[[str], Value]) -> tuple[tuple[
 class _Traced:
     """A vehicle of symbols, and its numbers."""
 
-    def __init__(self, free: FreeNumbers, *, differentiated: bool = False) -> None:
+    def __init__(self, free: FreeNumbers, nothing: tuple[bool, ...], *, differentiated: bool = False) -> None:
         vehicle, self.free, self.graph = free.vehicle, free, Graph()
         self.values = self.graph.inputs("number", len(free.numbers))
-        symbols = dict(zip(free.index, self.values, strict=True))
+        known = [0.0 if none else symbol for none, symbol in zip(nothing, self.values, strict=True)]
+        symbols = dict(zip(free.index, known, strict=True))
 
         def number(name: str) -> Value:
             return Tangent(symbols[name], {STATES + free.index[name]: 1.0}) if differentiated else symbols[name]
@@ -322,10 +328,13 @@ class _Traced:
 
 @lru_cache(maxsize=256)
 def traced_step(
-    free: FreeNumbers, translates: bool, pushed: bool
+    free: FreeNumbers, nothing: tuple[bool, ...], translates: bool, pushed: bool
 ) -> Callable[..., Callable[..., tuple[Vector, Vector]]]:
-    """Make a function of a period and of numbers that gives one of a step of the vehicle; see `Flown.traced`."""
-    own = _Traced(free)
+    """Make a function of a period and of numbers that gives one of a step of the vehicle; see `Flown.traced`.
+
+    `nothing` says which of the numbers are 0.
+    """
+    own = _Traced(free, nothing)
     period, state, rotors = *own.graph.inputs("period", 1), own.graph.inputs("state", 18), own.inputs("rotors", 3)
     push = own.graph.inputs("push", 6 if pushed else 0)
     step = own.flown.stepped(state, Rotors(rotors[0], rotors[1], rotors[2], push or None), period, translates)
@@ -335,13 +344,14 @@ def traced_step(
 
 @lru_cache(maxsize=256)
 def traced_slopes(
-    free: FreeNumbers, pushes: int
+    free: FreeNumbers, nothing: tuple[bool, ...], pushes: int
 ) -> tuple[int, tuple[tuple[int, int], ...], Callable[..., Callable[..., Vector]]]:
     """Make a function of the numbers that gives derivatives of the accelerations; see `Slopes`.
 
-    With so many `pushes` on top it is differentiated by those, and not by the numbers of the vehicle.
+    `nothing` says which of the numbers are 0. With so many `pushes` on top it is differentiated by those, and not by
+    the numbers of the vehicle.
     """
-    own = _Traced(free, differentiated=not pushes)
+    own = _Traced(free, nothing, differentiated=not pushes)
     motion, rotors = own.graph.inputs("motion", 15), own.inputs("rotors", 3)
     times_of = [free.index[name] for name in TIMES if name in free.index and not pushes]
     by = own.inputs("by", 3 * len(times_of))

@@ -276,8 +276,9 @@ def fit(
     return fit_parts(free, together, np.zeros(len(windows), dtype=np.int64), [known], steps, tolerance)[0]
 
 
-Fits = tuple[Fitted, list[tuple[FittedNumbers, list[Array]]]]
-"""A fit to all windows, and those without each part with the errors of its windows, flight by flight."""
+Fits = tuple[Fitted, list[tuple[FittedNumbers, list[Array]]], "WindowSums"]
+"""A fit to all windows, those without each part with the errors of its windows, flight by flight, and the sums of the
+first."""
 
 
 def fit_parts(
@@ -321,7 +322,7 @@ def fit_parts(
         errors = at(tuple(point.values.tolist())).errors
         aside = [own for own, other in zip(errors, kept, strict=True) if not other]
         held.append((FittedNumbers(free, point.values, point.loss), aside))
-    return Fitted(free, whole.values, whole.loss, whole.hessian), held
+    return Fitted(free, whole.values, whole.loss, whole.hessian), held, sums
 
 
 @dataclass(frozen=True)
@@ -423,6 +424,16 @@ class WindowSet:
         """Runs of each flight."""
         return np.array([len(each.starts) for each in self.windows])
 
+    @cached_property
+    def pieces(self) -> list[IntArray]:
+        """Say of each flight which block of `block_errors` each run is in."""
+        return _blocks(self.counts.tolist())
+
+    @cached_property
+    def owner(self) -> IntArray:
+        """Flight of each piece."""
+        return np.repeat(np.arange(len(self.pieces)), [int(own[-1]) + 1 for own in self.pieces])
+
     def _of_group(self, free: JointNumbers, values: Array, each: SideBySide) -> tuple[VehicleAt, IntArray]:
         own, places = free.of_flight(each.windows[0].flight)
         return VehicleAt(own, values[places]), places
@@ -464,9 +475,10 @@ class WindowSums:
     values: Array
 
     @cached_property
-    def _by_flight(self) -> tuple[Array, Array]:
-        none = [np.zeros(count, dtype=np.int64) for count in self.windows.counts]
-        gradient, hessian = zip(*self.windows.derivatives(self.free, self.values, none), strict=True)
+    def by_piece(self) -> tuple[Array, Array]:
+        """Gradient and Hessian of the sums over the pieces of all flights."""
+        sums = self.windows.derivatives(self.free, self.values, self.windows.pieces)
+        gradient, hessian = zip(*sums, strict=True)
         return np.concatenate(gradient), np.concatenate(hessian)
 
     @cached_property
@@ -474,12 +486,13 @@ class WindowSums:
         """Errors of each run, flight by flight, shapes (run,)."""
         return self.windows.errors(self.free, self.values)
 
-    def mean(self, kept: BoolArray | slice = slice(None)) -> FitPoint:
+    def mean(self, kept: BoolArray) -> FitPoint:
         """Take the means over the runs of some of the flights."""
         count = self.windows.counts[kept].sum()
 
         def derivatives() -> tuple[Array, Array]:
-            gradient, hessian = (each[kept].sum(axis=0) / count for each in self._by_flight)
+            pieces = kept[self.windows.owner]
+            gradient, hessian = (each[pieces].sum(axis=0) / count for each in self.by_piece)
             return gradient, hessian
 
         loss = float(np.array([each.sum() for each in self.errors])[kept].sum() / count)
@@ -614,75 +627,68 @@ class Outlook:
     (score test); Lawless and Singhal 1978 (subsets from one fit by its Hessian).
     """
 
-    free: JointNumbers
-    values: Array
-    loss: Array
-    gradient: Array
-    hessian: Array
-    count: IntArray
+    sums: WindowSums
     part: IntArray
 
-    @classmethod
-    def of(cls, free: JointNumbers, values: Array, windows: WindowSet, part: IntArray) -> Outlook:
-        """Evaluate runs and their derivatives once; pieces are the blocks of `block_errors`."""
-        pieces, scale = _blocks(windows.counts.tolist()), free.scales
-        errors = zip(pieces, windows.errors(free, values), strict=True)
-        loss = [np.bincount(own, each) for own, each in errors]
-        gradient, hessian = zip(*windows.derivatives(free, values, pieces), strict=True)
-        return cls(
-            free,
-            values,
-            np.concatenate(loss),
-            np.concatenate(gradient) * scale,
-            np.concatenate(hessian) * scale[:, None] * scale,
-            np.concatenate([np.bincount(own) for own in pieces]),
-            np.repeat(part, [len(own) for own in loss]),
-        )
-
     @property
+    def free(self) -> JointNumbers:
+        """Numbers of the models that are predicted."""
+        return self.sums.free
+
+    @cached_property
     def blocks(self) -> set[str]:
         """Blocks of the models that are predicted."""
         return {number.block for number in self.free.numbers}
 
     def errors(self, blocks: Collection[str]) -> Array:
         """Predict the mean errors of a model of some of the blocks, on each piece, shape (piece,)."""
-        own, errors = self._own(blocks), np.empty(len(self.loss))
-        for part, mean in enumerate(self._without):
-            step, aside = self._step(mean, own), self.part == part
-            slope = self.gradient[aside] + 0.5 * self.hessian[aside] @ step
-            errors[aside] = (self.loss[aside] + slope @ step) / self.count[aside]
+        loss, gradient, hessian, pieces = self._by_piece
+        own, errors = self._own(blocks), np.empty(len(loss))
+        for part, without in enumerate(self._without):
+            step, aside = self._step(without, own), pieces == part
+            errors[aside] = loss[aside] + (gradient[aside] + 0.5 * hessian[aside] @ step) @ step
         return errors
 
     def start(self, blocks: Collection[str]) -> dict[str, float]:
         """Predict the values of the fit of a model of some of the blocks to all parts, by name."""
-        step = self._step(self._mean(self.part >= 0), self._own(blocks))
-        return self.free.named(self.values + self.free.scales * step)
+        step = self._step(self.sums.mean(self.part >= 0), self._own(blocks))
+        return self.free.named(self.sums.values + self.free.scales * step)
 
     @cached_property
-    def _without(self) -> list[tuple[Array, Array]]:
-        """Gradient and Hessian of the mean objective without each part."""
-        return [self._mean(self.part != part) for part in range(int(self.part.max()) + 1)]
+    def _by_piece(self) -> tuple[Array, Array, Array, IntArray]:
+        """Mean loss of each piece, gradient and Hessian of it in scales, and the part that it is of."""
+        sums, scale = self.sums, self.free.scales
+        pieces = sums.windows.pieces
+        count = np.concatenate([np.bincount(own) for own in pieces])
+        loss = np.concatenate([np.bincount(own, each) for own, each in zip(pieces, sums.errors, strict=True)])
+        gradient, hessian = sums.by_piece
+        return (
+            loss / count,
+            gradient * scale / count[:, None],
+            hessian * scale[:, None] * scale / count[:, None, None],
+            self.part[sums.windows.owner],
+        )
 
-    def _mean(self, kept: BoolArray) -> tuple[Array, Array]:
-        prior, count = self.free.prior, self.count[kept].sum()
-        gradient = self.gradient[kept].sum(axis=0) / count - prior.pull(self.values / self.free.scales)
-        return gradient, self.hessian[kept].sum(axis=0) / count + np.diag(prior.precision)
+    @cached_property
+    def _without(self) -> list[FitPoint]:
+        """The means without each part."""
+        return [self.sums.mean(self.part != part) for part in range(int(self.part.max()) + 1)]
 
     @cached_property
     def _room(self) -> tuple[Array, Array, Array]:
         """How far numbers are from where they are absent, and from their bounds, in scales."""
-        free, scale = self.free, self.free.scales
+        free, values = self.free, self.sums.values
         # Without shares of slow actuation its time constant says nothing.
-        absent = [value if n.name == SLOW else n.absent for n, value in zip(free.numbers, self.values, strict=True)]
-        gone, low, high = ((each - self.values) / scale for each in (np.array(absent), free.lows, free.highs))
+        absent = [value if n.name == SLOW else n.absent for n, value in zip(free.numbers, values, strict=True)]
+        gone, low, high = ((each - values) / free.scales for each in (np.array(absent), free.lows, free.highs))
         return gone, np.minimum(low, 0.0), np.maximum(high, 0.0)
 
-    def _step(self, mean: tuple[Array, Array], own: BoolArray) -> Array:
+    def _step(self, mean: FitPoint, own: BoolArray) -> Array:
         """Step to the fit of some of the numbers, the others absent, in scales, shape (number,)."""
-        (gradient, hessian), (gone, low, high) = mean, self._room
+        gone, low, high = self._room
         step = np.where(own, 0.0, gone)
-        moved = (gradient + hessian @ step)[own]
-        step[own] = damped_step(hessian[np.ix_(own, own)], moved, _DAMPING, low[own], high[own])
+        moved = (mean.gradient + mean.hessian @ step)[own]
+        step[own] = damped_step(mean.hessian[np.ix_(own, own)], moved, _DAMPING, low[own], high[own])
         return step
 
     def _own(self, blocks: Collection[str]) -> BoolArray:

@@ -21,6 +21,7 @@ from cpfls_cli.playback.fit import (
     FitWindows,
     Outlook,
     WindowSet,
+    WindowSums,
     block_errors,
     fit,
     fit_parts,
@@ -237,7 +238,9 @@ class _Bench:
         """
         if structure not in self.known:
             kept = self.kept.get(structure)
-            whole, held = self._fits(structure, starts, first) if kept is None else self._rebuilt(structure, kept)
+            fits = self._fits(structure, starts, first) if kept is None else self._rebuilt(structure, kept)
+            whole, held, sums = fits
+            self._outlooks[structure] = Outlook(sums, self.part)
             errors = [each for _, aside in held for each in aside]
             self.known[structure] = Judged(
                 structure,
@@ -266,7 +269,8 @@ class _Bench:
         whole, *without = (FittedNumbers(free, *each) for each in zip(kept.values, kept.losses, strict=True))
         sets = (WindowSet(tuple(part)) for part in self.parts)
         held = [(each, own.errors(free, each.values)) for each, own in zip(without, sets, strict=True)]
-        return Fitted(free, whole.values, whole.loss, kept.hessian), held
+        sums = WindowSums(free, self.windows, whole.values)
+        return Fitted(free, whole.values, whole.loss, kept.hessian), held, sums
 
     def _nearest(self, structure: Structure) -> Start:
         """Give the values of the known structure that differs in the fewest blocks; the better one of two."""
@@ -281,16 +285,15 @@ class _Bench:
         return min(known, key=away).start(structure) if known else {}
 
     def outlook(self, near: Judged, blocks: Iterable[str]) -> Outlook:
-        """Evaluate what predicts the errors of structures of some blocks and its own, from the fit of one."""
+        """Give what predicts the errors of structures of some blocks and its own, from the fit of one."""
         own = near.structure
         asked = tuple(dict.fromkeys((*own.blocks, *blocks)))
-        found = self._outlooks.get(own)
-        if found is None or not found.blocks.issuperset(asked):
+        if not self._outlooks[own].blocks.issuperset(asked):
             union = Structure(asked, own.rules).free(self.vehicle)
             absent = {number.name: number.absent for number in union.numbers}
             values = union.values(absent | near.fit.free.named(near.fit.values))
-            self._outlooks[own] = found = Outlook.of(union, values, self.windows, self.part)
-        return found
+            self._outlooks[own] = Outlook(WindowSums(union, self.windows, values), self.part)
+        return self._outlooks[own]
 
 
 def tried_blocks(
@@ -340,7 +343,9 @@ def _grow(bench: _Bench, blocks: tuple[str, ...]) -> Judged:
     open_ = bench.vehicle.unknown
     guessed = replace(bench.vehicle, unknown=tuple(name for name in open_ if name != INERTIA))
     kinds = ((), *((block,) for block in bench.responses if block in blocks))
-    starts = [bench.judge(Structure(kind), {}, first=guessed if INERTIA in open_ else None) for kind in kinds]
+    stated, *others = (bench.judge(Structure(kind), {}, first=guessed if INERTIA in open_ else None) for kind in kinds)
+    # A response that gains nothing alone leads to no minimum of its own; it is judged again with the best.
+    starts = [stated, *(each for each in others if _visibly_better(bench, each, stated))]
     grown = [_explore(bench, each, named) for each in starts]
     for present in ascending(grown, lambda each: each.error)[:_FITTED]:
         while True:

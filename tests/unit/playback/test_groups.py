@@ -92,9 +92,10 @@ def test_gradient_by_a_number_of_a_group_is_that_of_its_flights(flights, blocks)
     windows = windows_of([flights[0], flights[-1]], 0.2, 2.0)
     free = replace(JOINT, base=FreeNumbers(STATED, blocks, NO_REMAINDER))
     windows, values = WindowSet(tuple(windows)), free.starts + 0.1 * free.scales
-    gradient = WindowSums(free, windows, values).mean().gradient
+    both = np.ones(2, dtype=bool)
+    gradient = WindowSums(free, windows, values).mean(both).gradient
     for place, scale in enumerate(free.scales):
         step = np.zeros(len(values))
         step[place] = 1e-6 * scale
-        ahead, behind = (WindowSums(free, windows, values + sign * step).mean().objective for sign in (1, -1))
+        ahead, behind = (WindowSums(free, windows, values + sign * step).mean(both).objective for sign in (1, -1))
         assert gradient[place] == pytest.approx((ahead - behind) / 2e-6, rel=2e-4, abs=2e-7)

@@ -48,6 +48,20 @@ def test_the_gradient_is_the_difference_quotient_for_every_number(flight, rules,
         assert gradient[place] == pytest.approx((ahead - behind) / (2 * step), rel=1e-4, abs=1e-6), number.name
 
 
+def test_what_acts_by_a_number_of_0_is_left_out_and_its_derivative_is_not(flight):
+    free = numbers(STATED, blocks_of(STATED), RULES["one rule"])
+    starts = flight.starts(20, 40)
+    windows = WindowSet((FitWindows(flight, starts, loss_of(flight, rate_stays(flight, starts, 20))),))
+    found, places = [], []
+    for values in (free.starts, np.where(free.starts == 0, 1e-9 * free.scales, free.starts)):
+        sums = windows.derivatives(free, values, [np.zeros(len(starts), dtype=np.int64)])
+        found.append([windows.errors(free, values)[0], *(each * free.scales for each in sums[0])])
+        places.append(len(free.at(values).slopes().places))
+    assert places[0] < 0.8 * places[1]
+    for left_out, whole in zip(*found, strict=True):
+        assert left_out == pytest.approx(whole, rel=1e-5, abs=1e-5 * np.abs(whole).max())
+
+
 def test_the_sum_of_the_loss_is_that_of_the_windows(flight):
     free = numbers(STATED, ("inertia", "linear_damping"), RULES["one rule"])
     (windows,) = windows_of([flight], 0.2, 0.3)

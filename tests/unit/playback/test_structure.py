@@ -148,6 +148,14 @@ def test_errors_are_predicted_near_a_fit(flights):
         assert values == pytest.approx(fitted.fit.values, rel=0.1, abs=0.1 * fitted.fit.free.scales.max())
 
 
+def test_a_fit_predicts_structures_of_fewer_blocks_by_its_own_derivatives(flights, monkeypatch):
+    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {}, structure._ACTUATION)
+    judged = bench.judge(Structure(("thrust_factor", "linear_damping", "rotor_drag")))
+    monkeypatch.setattr(WindowSet, "derivatives", None)
+    monkeypatch.setattr(WindowSet, "errors", None)
+    assert bench.outlook(judged, ()).errors(judged.structure.blocks).mean() == pytest.approx(judged.error, rel=0.05)
+
+
 class Bench:
     """Knows the error of each structure, its blocks one letter each, with noise that no comparison sees through."""
 
