@@ -168,9 +168,11 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     calm = averaged(signs.slow, signs.period, _REST_S) < _CALM_RAD_S
     calm &= np.linalg.norm(turned, axis=1) < _TURNED_RAD_S
     off, pulled, lifts = _off_its_feet(signs, flies)
+    hits = np.zeros(len(flies), dtype=bool) if signs.felt is None else np.linalg.norm(signs.felt, axis=1) > HARD
     for first, after in runs(active):
-        # What is lifted later has flown on its back, with rotors that turn the other way.
-        pulled[first : first + np.flatnonzero(np.append(True, lifts[first:after]))[-1]] = False
+        # What is lifted later, and hits nothing before, has flown on its back, with rotors that turn the other way.
+        unhit = first + int(np.argmax(np.append(hits[first:after], True)))
+        pulled[first : first + np.flatnonzero(np.append(True, lifts[first:unhit]))[-1]] = False
     lies = pulled | (calm & off)
     rests = lies | (calm & active & _stuck(signs, flies))
     window = np.ones(max(1, round(_REST_S / signs.period)), dtype=bool)

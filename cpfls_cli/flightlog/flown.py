@@ -353,6 +353,8 @@ def _before_hits(signs: Signs, active: BoolArray) -> BoolArray:
     if signs.felt is None or signs.level is None:
         return flies
     hits = np.linalg.norm(signs.felt, axis=1) > HARD
+    if not hits.any():
+        return flies
     step = max(1, round(SLOW_S / signs.period))
     squares, felt = (averaged(each, signs.period, SLOW_S) for each in (signs.level**2, signs.felt))
     # Means reach into what is before and after.

@@ -17,7 +17,7 @@ from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
 from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, nameless_clock
-from cpfls_cli.flightlog.repair import increasing_rows, stays_behind
+from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
 from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 _TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?|millis|micros")
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_REFUSED = 3  # Columns of stamps that a message names.
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
 _SLOWEST_HZ = 0.5  # Below which a signal shows nothing of a flight.
@@ -128,23 +129,19 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
         usual = _TIME_NAMES.fullmatch(lower)
         changes = len(known) > max(2, 0.5 * len(values)) and np.ptp(known) > 0
         named = usual or "time" in lower or "stamp" in lower
-        # Rows that come late one by one are left out.
         back = _steps_back(name, values)
-        falling = back and (not usual or stays_behind(known))
-        if changes and usual and falling:
-            refused += [f"{back}, and stays behind: keep the rows of one flight, or leave out stamps that are wrong"]
-        if changes and not falling and (named or units.get(name) == "s"):
+        if changes and usual and back:
+            refused += [f"{back}: keep the rows of one flight, and leave out rows whose stamps are wrong"]
+        if changes and not back and (named or units.get(name) == "s"):
             ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2 if named else 3
     for name in sorted(ranks, key=ranks.__getitem__):
-        known = fields[name][np.isfinite(fields[name])]
-        step, back = float(np.median(np.diff(known))), _steps_back(name, fields[name])
-        late = f"{back}: rows out of order are left out" if back else ""
+        step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
         if name in units:
-            return name, "s", late
+            return name, "s", ""
         ending = re.search(r"(?:[_ \[(]|time)([num]?s)[\])]?$", name.lower())
         fitting = [unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]]
         if ending or fitting:
-            unit, doubt = ending[1] if ending else fitting[0], late
+            unit, doubt = ending[1] if ending else fitting[0], ""
             if fitting and unit not in fitting:
                 doubt = f"{name} is said to be in {unit}, but steps of {step:.3g} are those of a flight in {fitting[0]}"
             elif step == 1:
@@ -160,20 +157,21 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
         "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp"
     )
     how = f"rename {'another one' if refused else 'it'}, or write the config by hand (`cpfls config` prints every key)"
-    raise InputError("; ".join([*(refused or [unknown]), how]))
+    raise InputError("; ".join([*(refused[:_REFUSED] or [unknown]), how]))
 
 
 def _steps_back(name: str, values: Array) -> str:
     """Say how often stamps, shape (row,), fall, and where they do first; empty where they never do."""
-    rows = np.flatnonzero(np.isfinite(values))
-    known = np.asarray(values, dtype=float)[rows]
+    stamps = np.asarray(values, dtype=float)
+    rows = np.flatnonzero(np.isfinite(stamps))
+    known = stamps[rows]
     falls = np.flatnonzero(np.diff(known) < 0)
     if not len(falls):
         return ""
     first = falls[0]
+    before, after = (str(each).removesuffix(".0") for each in known[first : first + 2].tolist())
     times = "once, at" if len(falls) == 1 else f"{len(falls)} times, first at"
-    at = f"row {rows[first + 1] + 1} of {len(values)}, from {known[first]:.9g} to {known[first + 1]:.9g}"
-    return f"{name} falls {times} {at}"
+    return f"{name} falls {times} row {rows[first + 1] + 1} of {len(values)}, from {before} to {after}"
 
 
 def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalName, list[Named]]:

@@ -101,14 +101,14 @@ def refuse_restart(time: Array, rows: IntArray) -> None:
     """
     finite = np.isfinite(time)
     time, rows = time[finite], rows[finite]
-    if not stays_behind(time):
+    if not _too_many(_behind(time)):
         return
     first, after = max(runs(_behind(time)), key=lambda run: run[1] - run[0])
     kept = {}
     for begin, end in _crops(time):
         own = time[(time >= begin) & (time <= end)]
         # A crop within which the clock goes back keeps nothing.
-        if len(own) > SMALLEST_SHARE_KEPT * len(time) and not stays_behind(own):
+        if len(own) > SMALLEST_SHARE_KEPT * len(time) and not _too_many(_behind(own)):
             kept[(begin, end)] = len(own)
     remedy = "split the log (import.crop_s cannot tell the parts apart: their time stamps overlap)"
     if kept:
@@ -131,9 +131,8 @@ def _crops(time: Array) -> set[tuple[float, float]]:
     return {(float(f"{begin:g}"), float(f"{end:g}")) for begin, end in stretches if begin < end}
 
 
-def stays_behind(time: Array) -> bool:
-    """Tell whether more rows are behind than come late one by one, of finite stamps, shape (sample,)."""
-    behind = _behind(time)
+def _too_many(behind: BoolArray) -> bool:
+    """Tell whether more rows are behind than come late one by one."""
     return sum(end - begin for begin, end in runs(behind) if end - begin > 1) > _LARGEST_SHARE_BEHIND * len(behind)
 
 

@@ -241,9 +241,9 @@ def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
         return None
     if not first:
         return "an empty file: nothing was logged, or the copy failed"
-    found = _by_bytes(first, path.suffix.lower())
-    if zeros and found is None:
+    if zeros:
         return "a file that begins with zeros, and no log: its writing was cut short; take it from the device again"
+    found = _by_bytes(first, path.suffix.lower())
     return None if found is None else f"{found[0]}, and no log that can be read: {found[1]}"
 
 
@@ -365,8 +365,7 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
         return known
     stamped = _STAMPS_US[0] < int.from_bytes(first[:_STAMP_BYTES], "big") < _STAMPS_US[1]
     frame = first[_STAMP_BYTES : _STAMP_BYTES + 1] if stamped else first[:1] if suffix in _TELEMETRY else b""
-    # Telemetry may begin with zeros, where its first part was never written.
-    if frame and frame in _MAVLINK + bytes(suffix in _TELEMETRY):
+    if frame and frame in _MAVLINK:
         return "telemetry of MAVLink", _CONVERT_TLOG
     text = first.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
     return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)

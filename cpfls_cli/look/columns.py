@@ -52,16 +52,17 @@ class LookedLog:
         # On its card a Crazyflie puts the name of an event before that of a variable.
         events = ("", *(f"{topic}." for topic in self.table.topics if self.system.startswith(CRAZYFLIE)))
         for row in KNOWN:
-            written = is_of(self.system, row.system) if self.system else self._names_of(row.system)
-            if row.signal in signals and written:
+            if row.signal in signals and self._writes(row.system):
                 named = (self.samples([event + column for column in row.columns]) for event in events)
                 for samples in filter(None, named):
                     factor = row.scale * (known_unit(row.unit).factor if row.unit else 1.0)
                     signs = np.array(row.sign or (1.0,)) * (FRD if row.frame == "FLU" else 1.0)
                     yield samples._replace(values=factor * signs * samples.values)
 
-    def _names_of(self, system: str) -> bool:
-        """Tell whether names are there that one kind of log alone writes; a plain word says nothing of its unit."""
+    def _writes(self, system: str) -> bool:
+        """Tell whether one kind of log wrote this, by its own names where nothing says so: plain words say no unit."""
+        if self.system:
+            return is_of(self.system, system)
         names = (name for row in KNOWN if row.system == system for name in row.columns)
         own = tuple(name.partition("*")[0] for name in names if {".", "["} & set(name))
         return bool(own) and any(name.startswith(own) for name in self.names)

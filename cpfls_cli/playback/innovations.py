@@ -344,9 +344,12 @@ def predicted(motion: Sequence[Array], columns: Sequence[Array], white: Sequence
         for own, values in zip(instruments(number), np.array_split(each, parts), strict=True)
     ]
     gram, moment = (np.array(each) for each in zip(*sums, strict=True))
-    size = np.sqrt(np.diagonal(gram.sum(axis=0), axis1=1, axis2=2))
-    size = np.where(size > 0, size, 1.0)
-    fit = fits_of_others(gram / (size[:, :, None] * size[:, None, :]), (moment / size)[..., None], RIDGE)[..., 0] / size
+    own = np.diagonal(gram, axis1=2, axis2=3)
+    whole = np.where(own.any(axis=0), own.sum(axis=0), 1.0)
+    size, others = np.sqrt(whole), (whole - own) / whole
+    # Of what is fitted: a fierce run is no measure of gentle ones. What no other run has is not fitted.
+    ridge = RIDGE * np.where(others > RIDGE, others, 1.0)[..., None]
+    fit = fits_of_others(gram / (size[:, :, None] * size[:, None, :]), (moment / size)[..., None], ridge)[..., 0] / size
     return [
         about_mean(np.concatenate([_weighted(*each) for each in zip(instruments(number), weights, strict=True)]))
         for number, weights in enumerate(fit.reshape(len(white), parts, *fit.shape[1:]))

@@ -19,7 +19,6 @@ from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull
 from cpfls_cli.vehicle.values import Vector, add, apply, dot, plus, scaled, subtract, transposed
 from cpfls_cli.vehicle.values import cross as across
 
-_LENGTHS_M = tuple(float(length) for length in np.geomspace(0.3, 4.0, 24).round(2))
 _STEP_S = 0.04  # A cable of 0.3 m swings once in 1.1 s, 27 steps, which leave an error of a ten-thousandth.
 _SMOOTHING_S = 0.1  # Half width of the parabolas: a tenth of the shortest swing, over which it hardly bends.
 # Of the cable across, 30 degrees: a larger free swing at the start is a fit to something else.
@@ -188,13 +187,10 @@ def _felt(signals: Signals) -> tuple[Array, Array]:
     """Differentiate the motion of a hook at the centre of mass, and what each metre of depth adds."""
     assert signals.velocity is not None, "declared among the needs"
     below = np.einsum("tij,tj->ti", signals.rotation, cross(signals.body_rate, np.array([0.0, 0.0, -1.0])))
-    level = _smooth(signals, signals.velocity, 1)
-    if signals.acceleration is not None:
-        felt = _smooth(signals, signals.acceleration)
-        # A swing sums up what is noise at its own frequency, where velocity has it times the frequency.
-        fastest = np.sqrt(signals.vehicle.gravity_m_s2 / _LENGTHS_M[0])
-        noise = fastest * (signals.velocity - _smooth(signals, signals.velocity)), signals.acceleration - felt
-        level = felt if noise[1].std() < noise[0].std() else level
+    if signals.acceleration is None:
+        level = _smooth(signals, signals.velocity, 1)
+    else:
+        level = _smooth(signals, signals.acceleration)
     return level + np.array([0.0, 0.0, signals.vehicle.gravity_m_s2]), _smooth(signals, below, 1)
 
 
@@ -381,7 +377,7 @@ EFFECT = Effect(
         Shape(
             "length_m",
             "m",
-            _LENGTHS_M,
+            tuple(float(length) for length in np.geomspace(0.3, 4.0, 24).round(2)),
             "length of the cable",
             # A light damping lets it swing all flight long, and a few per cent make it one swing late.
             valley=0.02,

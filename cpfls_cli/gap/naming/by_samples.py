@@ -136,7 +136,7 @@ class _Sampled:
             stretches = [zip(*(np.array_split(own, count) for own in both), strict=True) for count, *both in flights]
             place = np.array(there)[:, 1]
             products[:, place[:, None], [*place, -1]] += [z.T @ x for z, x in chain(*stretches)]
-        in_block = BLOCK_S / (STRETCH * self._length * self.flights[0].windows.period)
+        in_block = round(BLOCK_S / (STRETCH * self._length * self.flights[0].windows.period), 6)
         block = [np.diff(contiguous(count, max(1, round(count / in_block))), prepend=-1) for count in counts]
         places = tuple(np.arange(*pair) for pair in pairwise(ends))
         return _Products(products, np.flatnonzero(np.concatenate(block)), ends[0], places, self.hypothesis.vehicle)
@@ -272,7 +272,8 @@ def small_effects(
     """
     here = _Sampled(found, found.hypothesis.flights, None, gusty)
     there = _Sampled(found, tuple(held), here.white, gusty)
-    if not all(any(map(len, each.white_residual)) for each in (here, there)):
+    # A flight that is shorter predicts nothing, and is not predicted.
+    if min((len(own) for each in (here, there) for own in each.white_residual), default=0) < STRETCH:
         return []
     learned, named = here.products(candidates), list[tuple[_Tried, tuple[Alternative, ...]]]()
     while True:

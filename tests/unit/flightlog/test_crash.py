@@ -78,6 +78,13 @@ def test_a_vehicle_on_its_back_does_not_fly_whatever_its_rotors_do(own, known):
     assert found.ended
 
 
+def test_a_wreck_that_flies_again_later_has_lain_on_its_back(own):
+    again = ended.joined(ended.rocks_on_its_back(own), flight(20.0, seed=4))
+    found = flown(again, ("force",))
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.3))
+    assert "impact at " in found.ended
+
+
 @pytest.mark.parametrize("bias", [-0.6, -1.0])
 def test_an_accelerometer_that_reads_too_little_does_not_turn_a_flight_over(own, bias):
     log = ended.rocks_on_its_back(own, 15.0)

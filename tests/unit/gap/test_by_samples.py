@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from itertools import permutations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming import by_samples
 from cpfls_cli.gap.naming.by_samples import _surest, _Test, _Tried
 
 NAMES = "linear_damping", "rotor_drag", "torque_bias"
@@ -36,6 +38,14 @@ def tried(chances, shapes=()):
 def chosen(unneeded, tried):
     best, rivals = _surest(Learned(unneeded), tried, [], 0.01)
     return best and best.candidate.effect.name, [each.name for each in rivals]
+
+
+@pytest.mark.parametrize("lengths", [(), (0, 900), (4,), (39, 900)])
+def test_a_flight_that_is_shorter_than_a_stretch_shows_no_small_effects(monkeypatch, lengths):
+    sampled = SimpleNamespace(white=None, white_residual=[np.zeros((own, 6)) for own in lengths])
+    monkeypatch.setattr(by_samples, "_Sampled", lambda *_: sampled)
+    found = SimpleNamespace(hypothesis=SimpleNamespace(flights=()))
+    assert by_samples.small_effects(found, (), (), np.ones(6, dtype=bool)) == []
 
 
 @pytest.mark.parametrize("rounded", [*permutations(ROUNDED)])

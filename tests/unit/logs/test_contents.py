@@ -573,7 +573,6 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.bag", b"#ROSBAG V2.0\n" + bytes(99), "a bag of ROS 1", "rosbags-convert"),
         ("a.bin", bytes(999), "a file that begins with zeros", "take it from the device again"),
         ("a.tlog", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
-        ("a.tlog", bytes(999) + TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
         ("a.bin", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
         ("a.rlog", TELEMETRY[8:], "telemetry of MAVLink", "the log that the autopilot writes itself"),
         ("a.zip", archive(a="x"), "a zip archive", "unpack it first"),

@@ -72,6 +72,15 @@ def test_columns_are_predicted_by_the_other_runs():
     assert np.allclose(alone, about_mean(values[0]), atol=1e-3)
 
 
+def test_a_fierce_run_is_predicted_by_gentle_ones():
+    rng = np.random.default_rng(8)
+    sizes, motion = (1.0, 1e-3, 1e-3), rng.standard_normal((3, 600, 1))
+    columns = [size * rng.standard_normal((600, 1)) for size in sizes]
+    values = [before(own).sum(axis=2) for own in columns]
+    fierce, *_ = predicted(list(motion), columns, values)
+    assert np.allclose(fierce, about_mean(values[0]), atol=1e-3)
+
+
 def test_no_part_of_a_single_run_is_predicted_by_itself():
     rng = np.random.default_rng(7)
     motion, columns = rng.standard_normal((2, 1085, 2))
