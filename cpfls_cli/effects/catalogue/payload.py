@@ -341,6 +341,11 @@ def _pull(see: Instant, p: Numbers, state: Vector, carrier: Carrier) -> Pull:
     return Pull(scaled(tension, pulled), scaled(tension, turned), (*rate, *swing))
 
 
+def _hook(known: Mapping[str, float]) -> float:
+    """Say by the torque of the load how deep its hook is: a deeper one swings more, as a heavier load pulls more."""
+    return known["mass_times_depth"] / known["mass"] if known["mass"] > 0 else np.nan
+
+
 def _accounts(number: str, _values: Mapping[str, float]) -> float:
     """Account for any error of the thrust: the load is carried."""
     return np.inf if number == "thrust_scale" else 0.05
@@ -383,7 +388,14 @@ EFFECT = Effect(
             valley=0.02,
         ),
         Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing", first=0.2),
-        Shape("depth_m", "m", (0.0, 0.1, 0.3), "depth of the hook below the centre of mass", first=0.0),
+        Shape(
+            "depth_m",
+            "m",
+            (0.0, 0.1, 0.3),
+            "depth of the hook below the centre of mass",
+            first=0.0,
+            follows=_hook,
+        ),
     ),
     carried=Body(_pull, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)),
     accounts=_accounts,

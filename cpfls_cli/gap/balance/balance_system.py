@@ -120,6 +120,17 @@ class System:
             self.flights, [each.at({s.name: next(following) for s in each.effect.shapes}) for each in self.chosen]
         )
 
+    def following(self, linear: Array) -> Array:
+        """Give what coefficients, shape (column,), say of the shapes, within their bounds; NaN for nothing."""
+        places, values = {each.effect.name: place for each, place in self.places}, list[float]()
+        for each in self.chosen:
+            own = linear[places[each.effect.name]] if is_free(each) else ()
+            known = dict(zip((number.name for number in each.effect.coefficients), own, strict=False))
+            said = (np.nan if shape.follows is None else shape.follows(known) for shape in each.effect.shapes)
+            bounds = (shape.bounds(self.vehicle) for shape in each.effect.shapes)
+            values += [float(np.clip(value, *ends)) for value, ends in zip(said, bounds, strict=True)]
+        return np.array(values)
+
     @property
     def closely(self) -> System:
         """Average over windows so close that what they see can be followed in time."""

@@ -43,7 +43,7 @@ def refined(flights: Sequence[WeakFlight], chosen: Sequence[Candidate], floor: A
             best[-1] = _in_deepest_valley(flights, best, shape, floor)
     # What took the place of a linear effect has no place on a grid.
     indices = [index for index, candidate in enumerate(best) if candidate.effect is chosen[-1].effect]
-    newest = [(index, shape) for index in indices for shape in best[index].effect.shapes]
+    newest = [(index, shape) for index in indices for shape in best[index].effect.shapes if shape.follows is None]
     # A second round where there are several: the best length of a cable depends on its damping.
     rounds = 2 if len(newest) > 1 else 1
     for index, shape in rounds * newest:
@@ -251,18 +251,24 @@ def refitted(hypothesis: System, weight: Array) -> System:
         return float(((there.residual_at(linear) / own) ** 2).sum()), (own, linear, held)
 
     error, (own, linear, held) = fitted(hypothesis)
+    said = hypothesis.following(linear)
+    if not (free := np.isnan(said)).all():
+        hypothesis = hypothesis.with_shapes(np.where(free, hypothesis.shape_values, said))
+        error, (own, linear, held) = fitted(hypothesis)
     while True:
         # The change of the shapes jointly with the coefficients that no bound holds, and what it takes off the squares
         # where the residual is linear in them.
-        moving = shape_columns(hypothesis, linear, rotor_wrench)
+        moving = shape_columns(hypothesis, linear, rotor_wrench)[..., free]
         rows = equations(hypothesis, own).around(linear, ~held, moving / own[..., None])
-        step, (columns, right) = rows.solve(), rows.root
-        step, gain = step[-moving.shape[2] :], float(right @ columns @ step)
+        solved, (columns, right) = rows.solve(), rows.root
+        step, gain = np.zeros(len(free)), float(right @ columns @ solved)
+        step[free] = solved[len(solved) - moving.shape[2] :]
         # Half of a step that goes too far. Where a hundredth of what the linear system asks for is too far yet, it
         # holds for no step: a filter and a lag that nothing separates would creep along with no end in sight.
         least = max(_SETTLED, _SETTLED * gain)
         while gain >= least:
-            ahead = hypothesis.with_shapes(np.clip(hypothesis.shape_values + step, low, high))
+            moved = np.clip(hypothesis.shape_values + step, low, high)
+            ahead = hypothesis.with_shapes(np.where(free, moved, hypothesis.following(linear)))
             left, there = fitted(ahead)
             if error - left >= _SETTLED:
                 break

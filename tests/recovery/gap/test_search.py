@@ -8,7 +8,7 @@ from scipy.stats import gumbel_r
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.refine import refined
+from cpfls_cli.gap.balance.refine import fit, refined
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.search import acceptable, forward_selection, grown_elsewhere
 from cpfls_cli.gap.settings import GapSettings
@@ -145,6 +145,22 @@ def test_a_load_that_swings_all_flight_long_is_found_in_its_narrow_valley():
     (found,) = refined(known, [start], np.ones(6)).chosen
     assert found.shape["length_m"] == pytest.approx(hidden["length_m"], rel=0.01)
     assert found.shape["damping_1_s"] == pytest.approx(hidden["damping_1_s"], abs=0.01)
+
+
+def test_noise_deepens_no_hook_whose_torque_says_where_it_is():
+    hidden = {"length_m": 0.52, "damping_1_s": 0.1, "depth_m": 0.02}
+    effect, known = (candidate("payload", **hidden), [0.012, 0.0, 0.0, 0.6]), []
+    for seed in (1, 2, 3):
+        flown = fly(seed, [effect], gyro=0.02, rotor=1.0, seconds=30.0, speed=1.0)
+        noise = 0.05 * np.random.default_rng(seed).standard_normal(flown.velocity.shape)
+        known.append(weak(replace(flown, velocity=flown.velocity + noise), force=True))
+    start = candidate("payload", length_m=0.53, damping_1_s=0.2, depth_m=0.0)
+    found = refined(known, [start], np.ones(6))
+    ((_, place),) = found.places[1:]
+    depth, *_, mass = fit(found, np.ones(6))[place]
+    assert mass == pytest.approx(0.6, rel=0.05)
+    assert found.chosen[0].shape["depth_m"] == pytest.approx(depth / mass, rel=0.02)
+    assert found.chosen[0].shape["length_m"] == pytest.approx(hidden["length_m"], rel=0.01)
 
 
 def test_where_numbers_of_the_vehicle_alone_are_named_there_is_nothing_to_refine():

@@ -18,6 +18,9 @@ class Ridge:
     def __init__(self, value, squares, tried):
         self.shape_values, self.squares, self.tried = np.array([value]), squares, tried
 
+    def following(self, _linear):
+        return np.array([np.nan])
+
     def with_shapes(self, values):
         self.tried.append(float(values[0]))
         assert len(self.tried) < 100
