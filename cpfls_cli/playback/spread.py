@@ -124,7 +124,8 @@ def drawn(model: VehicleModel, found: FoundVehicle, count: int, rng: np.random.G
         if len(kept) < _FEWEST * tried:
             first, often = rejected.most_common(1)[0]
             raise ComputationError(
-                f"of {tried} vehicles drawn only {len(kept)} are possible; of {often} no vehicle has {first}"
+                f"of {tried} vehicles drawn only {len(kept)} are possible; of {often} no vehicle has {first}; state "
+                "what the flights do not identify in the config, or fly what identifies it (`cpfls info` names both)"
             )
     made = [each for _, each in kept]
     # What is seen of gusts is acceleration, so that their torque goes with the inertia.

@@ -88,9 +88,9 @@ def planned(run: Run, diagnosis: Path | None = None) -> PlannedPath | None:
 
 
 def _effects(study: Study) -> list[Effect]:
-    key = "trajectory.next_flight.to_tell"
+    key = "trajectory.next_flight.separate"
     with about(key, InputError):
-        effects = [find(name) for name in dict.fromkeys(study.trajectory.next_flight.to_tell)]
+        effects = [find(name) for name in dict.fromkeys(study.trajectory.next_flight.separate)]
     require_visible(effects, key, study.vehicle)
     return effects
 
@@ -102,8 +102,8 @@ def _between(study: Study) -> tuple[Question, ...]:
     if not questions:
         names = ", ".join(each.name for each in effects)
         raise InputError(
-            f"trajectory.next_flight.to_tell = [{names}]: nothing to separate; name effects with --to-tell A,B (`cpfls "
-            "effects` lists them), or give a diagnosis with --for DIAGNOSIS"
+            f"trajectory.next_flight.separate = [{names}]: nothing to separate; name effects with --separate A,B "
+            "(`cpfls effects` lists them), or give a diagnosis with --for DIAGNOSIS"
         )
     return questions
 
@@ -183,7 +183,7 @@ def _open_effects(
     if found.verdict not in _OPEN or not unseen:
         raise InputError(
             f"{path}: its verdict is {found.verdict}, and it leaves nothing to separate; to plan a flight all the "
-            "same name effects with --to-tell A,B"
+            "same name effects with --separate A,B"
         )
     return [], unseen
 

@@ -64,9 +64,14 @@ WaypointsOption = Annotated[
         "pause_s.",
     ),
 ]
-ToTellOption = Annotated[
+SeparateOption = Annotated[
     str | None,
-    typer.Option("--to-tell", metavar="A,B", help="Plan the flight that tells these effects apart (`cpfls effects`)."),
+    typer.Option(
+        "--separate",
+        "--to-tell",
+        metavar="A,B",
+        help="Plan the flight that distinguishes these effects (`cpfls effects`).",
+    ),
 ]
 ForOption = Annotated[
     Path | None,
@@ -133,7 +138,7 @@ PlotOption = Annotated[
 
 def option_overrides(
     waypoints: Path | None,
-    to_tell: str | None,
+    separate: str | None,
     diagnosis: Path | None,
     box: str | None,
     height: float | None,
@@ -147,12 +152,12 @@ def option_overrides(
     **_: Any,
 ) -> list[str]:
     """Write the options as overrides of the config, ``section.key=value`` each, so that the file's config has them."""
-    settles = to_tell is not None or diagnosis is not None
+    settles = separate is not None or diagnosis is not None
     if settles and waypoints is not None:
-        raise InputError(f"--waypoints {waypoints}: --to-tell and --for choose the path themselves; leave it out")
+        raise InputError(f"--waypoints {waypoints}: --separate and --for choose the path themselves; leave it out")
     others = {
         f"--waypoints {waypoints}": waypoints is not None,
-        "--to-tell and --for": settles,
+        "--separate and --for": settles,
         f"--duration {duration or 0:g}": duration is not None,
     }
     for other, given in others.items():
@@ -160,7 +165,7 @@ def option_overrides(
             raise InputError(f"--hover {hover:g}: stays at one place for so long; leave out {other}")
     length = duration if hover is None else hover
     paths = {"next-flight": settles, "waypoints": waypoints is not None, "hover": hover is not None}
-    lists = {"next_flight.to_tell": to_tell, "next_flight.box_m": box, "excite.axes": excite, "excite.band_hz": band}
+    lists = {"next_flight.separate": separate, "next_flight.box_m": box, "excite.axes": excite, "excite.band_hz": band}
     values = {
         "path": next((path for path, asked in paths.items() if asked), None),
         **{key: None if text is None else f"[{text}]" for key, text in lists.items()},
@@ -178,7 +183,7 @@ def require_no_room(box: str | None, height: float | None) -> None:
     for option, value in (("--box", box), ("--height", height)):
         if value is not None:
             raise InputError(
-                f"{option} {value}: is room for the flight that --to-tell or --for plans, and this path is planned "
+                f"{option} {value}: is room for the flight that --separate or --for plans, and this path is planned "
                 "without; give one of them, or set trajectory.displacement_m and trajectory.direction"
             )
 
@@ -235,7 +240,7 @@ FIGURES = {
 def trajectory(
     run: Run,
     waypoints: WaypointsOption = None,
-    to_tell: ToTellOption = None,  # noqa: ARG001  # the config has it
+    separate: SeparateOption = None,  # noqa: ARG001  # the config has it
     diagnosis: ForOption = None,
     box: BoxOption = None,
     height: HeightOption = None,

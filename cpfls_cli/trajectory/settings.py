@@ -240,7 +240,7 @@ class RotationSettings(Settings):
 class NextFlightSettings(Settings):
     """Describe the flight that distinguishes rivals: which, and the space that it may use."""
 
-    to_tell: Annotated[
+    separate: Annotated[
         tuple[str, ...],
         Doc("effects to distinguish (`cpfls effects`); one alone: to show; none: those that the diagnosis leaves open"),
     ] = ()

@@ -49,7 +49,7 @@ LEARN = "--validate flight2.h5 --choose-on flight3.h5 --workers 1 --set identifi
 LINES = (
     "look rotors.csv -o look",
     "trajectory study.yaml -o 1.h5 --waypoints points.csv --plot --format px4 --home 47.4,8.5,1",
-    "trajectory study.yaml -o 2.h5 --to-tell com_offset,motor_lag --box 6,6,4 --height 3 --duration 10",
+    "trajectory study.yaml -o 2.h5 --separate com_offset,motor_lag --box 6,6,4 --height 3 --duration 10",
     "trajectory study.yaml -o 3.h5 --hover 4 --repeat 2 --excite roll --signal multisine --band 0.5,4 --size 5",
     "simulate study.yaml path.h5 -o 4.h5 --mode closed-loop --effect com_offset=0.01,0 --gusts --model vehicle.h5",
     "simulate study.yaml 3.h5 -o 16.h5 --autopilot px4",

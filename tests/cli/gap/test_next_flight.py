@@ -61,7 +61,7 @@ def test_the_next_flight_settles_what_the_first_left_open(cpfls, folder):
 
 
 def test_named_effects_come_before_what_the_diagnosis_leaves(cpfls, folder):
-    options = ("--for", folder / "open.h5", "--to-tell", "rotor_drag,linear_damping", *searched(1, 1))
+    options = ("--for", folder / "open.h5", "--separate", "rotor_drag,linear_damping", *searched(1, 1))
     planned = run(cpfls, folder, "trajectory", *options, "-o", folder / "other.h5")
     assert [(row["true"], row["rival"]) for row in planned["questions"]] == [
         ("rotor_drag", "linear_damping"),

@@ -91,7 +91,7 @@ def test_files_for_autopilots_stand_beside_the_path(cpfls, config, tmp_path):
 
 def test_a_next_flight_is_repeated_too(cpfls, config, tmp_path):
     few = ("--set", "trajectory.next_flight.starts=2", "--set", "trajectory.next_flight.iterations=1")
-    words = ("--to-tell", "com_offset,torque_bias", "--duration", "10", "--box", "5,4,3", "--height", "3", *few)
+    words = ("--separate", "com_offset,torque_bias", "--duration", "10", "--box", "5,4,3", "--height", "3", *few)
     cpfls.done("trajectory", config, *words, "--repeat", "2", "-o", tmp_path / "n.h5")
     record = read(tmp_path / "n.h5", PlannedPath)[0]
     np.testing.assert_allclose([run.begin for run in record.runs], [0.0, 14.0])
@@ -124,7 +124,7 @@ def test_what_flights_that_show_the_loop_advise_is_planned_for_numbers_that_nobo
         (("--band", "1,2"), "--band 1,2: describes an excitation; say which axes with --excite AXES"),
         (("--signal", "multisine"), "--signal multisine: describes an excitation"),
         (("--hover", "9", "--duration", "8"), "--hover 9: stays at one place for so long; leave out --duration 8"),
-        (("--hover", "9", "--to-tell", "inflow"), "leave out --to-tell and --for"),
+        (("--hover", "9", "--separate", "inflow"), "leave out --separate and --for"),
         (("--format", "px4"), "add --home LAT,LON,HEIGHT"),
         (("--format", "px4", "--home", "91,0,1"), "--home 91,0,1: give latitude and longitude"),
         (("--format", "px4", "--home", "a,b,c"), "--home a,b,c: give latitude and longitude"),
@@ -133,14 +133,14 @@ def test_what_flights_that_show_the_loop_advise_is_planned_for_numbers_that_nobo
         ((*HOVER, "--format", "px4", "--home", "1,2,3"), "a mission of waypoints holds no excitation"),
         (("--format", "csv", "--set", "trajectory.path=full-rotation"), "turns a held vehicle; no autopilot flies it"),
         (("--excite", "roll", "--set", "trajectory.yaw_turn_rad=1"), "trajectory.yaw_turn_rad = 1.0: turns the path"),
-        (("--to-tell", "inflow", "--format", "px4", "--home", "1,2,3"), "only a CSV holds it"),
+        (("--separate", "inflow", "--format", "px4", "--home", "1,2,3"), "only a CSV holds it"),
     ],
 )
 def test_what_makes_no_sense_is_refused(refuse, config, tmp_path, words, complaint):
     assert complaint in "\n".join(refuse("trajectory", config, *words, "-o", tmp_path / "x.h5"))
 
 
-@pytest.mark.parametrize("words", [("--set", "trajectory.path=full-rotation"), ("--to-tell", "inflow,linear_damping")])
+@pytest.mark.parametrize("words", [("--set", "trajectory.path=full-rotation"), ("--separate", "inflow,linear_damping")])
 def test_guesses_choose_no_path(refuse, tmp_path, words):
     vehicle = parse_yaml(VEHICLE, "vehicle")
     vehicle["vehicle"]["inertia_kg_m2"] = None
@@ -151,7 +151,7 @@ def test_guesses_choose_no_path(refuse, tmp_path, words):
 
 SMALL = ("--duration", "10", "--box", "5,4,3", "--height", "3")
 FEW = ("--set", "trajectory.next_flight.starts=2", "--set", "trajectory.next_flight.iterations=3")
-PAIR = ("--to-tell", "com_offset,torque_bias")
+PAIR = ("--separate", "com_offset,torque_bias")
 
 
 @pytest.fixture(scope="module")
@@ -222,26 +222,26 @@ def test_it_flies_like_any_other_and_its_page_says_what_it_tells(cpfls, next_con
 
 
 def test_a_single_effect_is_shown(cpfls, next_config, tmp_path):
-    (row,) = cpfls.summary("trajectory", next_config, "--to-tell", "rotor_drag", *SMALL, *FEW, "-o", tmp_path / "n.h5")[
-        "questions"
-    ]
+    (row,) = cpfls.summary(
+        "trajectory", next_config, "--separate", "rotor_drag", *SMALL, *FEW, "-o", tmp_path / "n.h5"
+    )["questions"]
     assert (row["true"], row["rival"]) == ("rotor_drag", "")
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--to-tell", "com_ofset,torque_bias"), "did you mean com_offset?"),
-        (("--to-tell", "com_offset,gyro_bias"), "gyro_bias is a sensor fault"),
-        (("--to-tell", "motor_lag,channel_delay"), "no single flight separates them"),
-        (("--to-tell", "parameter_error"), "to_tell = [parameter_error]: nothing to separate"),
-        (("--to-tell", ""), "nothing to separate; name effects with --to-tell A,B"),
+        (("--separate", "com_ofset,torque_bias"), "did you mean com_offset?"),
+        (("--separate", "com_offset,gyro_bias"), "gyro_bias is a sensor fault"),
+        (("--separate", "motor_lag,channel_delay"), "no single flight separates them"),
+        (("--separate", "parameter_error"), "separate = [parameter_error]: nothing to separate"),
+        (("--separate", ""), "nothing to separate; name effects with --separate A,B"),
         ((*PAIR, "--box", "0.4,4,3"), "trajectory.next_flight.box_m = [0.4, 4.0, 3.0]"),
         ((*PAIR, "--box", "4,4,9"), "would reach into the ground; raise it to 4.5"),
         ((*PAIR, "--box", "4,4"), "trajectory.next_flight.box_m"),
         ((*PAIR, "--set", "vehicle.rotor_speed_max_rad_s=350"), "leaves the rotors no room"),
         ((*PAIR, "--set", "trajectory.duration_s=null"), "path next-flight needs a duration"),
-        ((*PAIR, "--waypoints", "points.csv"), "--to-tell and --for choose the path themselves"),
+        ((*PAIR, "--waypoints", "points.csv"), "--separate and --for choose the path themselves"),
         (("--for", "nowhere.h5"), "nowhere.h5: no such file"),
     ],
 )

@@ -236,7 +236,7 @@ def test_plot_draws_both_figures(cpfls, refuse, tmp_path, config):
 def test_room_for_a_path_that_is_not_planned_for_it_is_refused(refuse, tmp_path, config, option):
     (line,) = refuse("trajectory", config, "-o", tmp_path / "path.h5", *option)
     assert line.startswith(f"{option[0]} {option[1]}")
-    assert "is room for the flight that --to-tell or --for plans" in line
+    assert "is room for the flight that --separate or --for plans" in line
 
 
 HELD = """\

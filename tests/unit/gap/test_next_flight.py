@@ -313,14 +313,14 @@ def test_a_special_case_is_not_told_from_what_holds_it():
 @pytest.mark.parametrize("names", [("gyro_bias",), ("motor_lag", "channel_delay")])
 def test_what_no_flight_tells_is_refused(names):
     with pytest.raises(InputError, match=names[0]):
-        require_visible([CATALOGUE[name] for name in names], "--to-tell", VEHICLE)
+        require_visible([CATALOGUE[name] for name in names], "--separate", VEHICLE)
 
 
 def test_an_effect_of_the_propellers_asks_for_their_size():
     bare = replace(VEHICLE, rotors=tuple(replace(rotor, radius_m=None) for rotor in VEHICLE.rotors))
-    require_visible([CATALOGUE["ground_effect"]], "--to-tell", VEHICLE)
+    require_visible([CATALOGUE["ground_effect"]], "--separate", VEHICLE)
     with pytest.raises(InputError, match=r"ground_effect needs vehicle\.rotors\.radius_m"):
-        require_visible([CATALOGUE["ground_effect"]], "--to-tell", bare)
+        require_visible([CATALOGUE["ground_effect"]], "--separate", bare)
 
 
 def test_the_plan_counts_on_nothing_that_is_not_logged():
