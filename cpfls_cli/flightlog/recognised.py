@@ -62,7 +62,7 @@ class LogTable:
     def require_long_enough(self, span_s: float) -> None:
         """Refuse a log, or what of it holds a flight, that is too short to be one."""
         if span_s < SHORTEST_FLIGHT_S:
-            raise InputError(f"holds {too_short(span_s)}")
+            raise InputError("; ".join(["holds " + too_short(span_s), *([self.time_doubt] if self.time_doubt else [])]))
 
     def parts(self, column: str) -> tuple[str, str]:
         """Split a column into topic and field."""
@@ -145,7 +145,7 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
             if fitting and unit not in fitting:
                 doubt = f"{name} is said to be in {unit}, but steps of {step:.3g} are those of a flight in {fitting[0]}"
             elif step == 1:
-                doubt = f"{name} rises by 1 from row to row, so it may count rows: is import.time_unit right?"
+                doubt = f"{name} rises by 1 from row to row, so it may count rows, or be s: is import.time_unit right?"
             return name, unit, doubt
         if ranks[name] < 2:
             how = "log finer stamps" + (", or write one row for each stamp" if step == 0 else "")

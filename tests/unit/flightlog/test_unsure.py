@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import airframe_from_motion
 from cpfls_cli.flightlog.attitude_columns import _angle_unit, doubt_reading
 from cpfls_cli.flightlog.names import column_groups, named_signals
@@ -256,6 +257,12 @@ def test_three_of_four_rotors_are_a_guess():
 )
 def test_stamps_that_count_something_else_are_doubted(stamps, said):
     assert any(said in warning for warning in proposed(LONGER, t={"t": stamps}).warnings)
+
+
+def test_a_log_that_is_short_if_its_stamps_count_nothing_else_says_so():
+    short = flight(seconds=15.0)
+    with pytest.raises(InputError, match="holds only 1.5 s; .* at least ten; t rises by 1 from row to row"):
+        proposed(short, t={"t": np.arange(len(short.time)) * 1.0})
 
 
 def test_a_layout_in_which_single_rotors_push_the_wrong_way_is_no_known_one():
