@@ -261,7 +261,7 @@ def test_stamps_that_count_something_else_are_doubted(stamps, said):
 
 def test_a_log_that_is_short_if_its_stamps_count_nothing_else_says_so():
     short = flight(seconds=15.0)
-    with pytest.raises(InputError, match="holds only 1.5 s; .* at least ten; t rises by 1 from row to row"):
+    with pytest.raises(InputError, match=r"holds only 1.5 s; .* at least ten; t rises by 1 from row to row"):
         proposed(short, t={"t": np.arange(len(short.time)) * 1.0})
 
 
