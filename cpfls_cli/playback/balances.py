@@ -484,7 +484,7 @@ class PastBalances(Balances):
             (
                 number,
                 part,
-                band.average(_seen(part), part.stretches),
+                band.average(_seen(part, self.translates), part.stretches),
                 windowed(band, part, form, signals[number]),
             )
             for number in self.path
@@ -514,10 +514,10 @@ class PastBalances(Balances):
                 yield Rows(number, flat, known, middles[len(middles) - len(own) :])
 
 
-def _seen(flight: PlaybackFlight) -> Array:
+def _seen(flight: PlaybackFlight, translates: bool) -> Array:
     """Give what is measured and moves with torque and force, shape (time, signal)."""
     columns = [flight.motion.rate, flight.speed**2]
-    return np.hstack([*columns, flight.motion.velocity] if flight.translates else columns)
+    return np.hstack([*columns, flight.motion.velocity] if translates else columns)
 
 
 def _mean_of_last(values: Array, count: int) -> Array:

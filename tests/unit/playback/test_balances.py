@@ -83,6 +83,14 @@ def test_a_stretch_shorter_than_a_window_adds_nothing(flights, kind):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-11 * np.abs(other).max())
 
 
+@pytest.mark.parametrize("kind", [Balances, PastBalances])
+def test_flights_of_which_one_has_no_velocity_are_balanced_in_rotation(flights, kind):
+    none = [replace(each, has_velocity=False) for each in flights]
+    mixed = (balances_of(each, kind) for each in ([none[0], *flights[1:]], none))
+    for one, other in zip(*(each.sums(NAMED, somewhere(free=NAMED)) for each in mixed), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-11 * np.abs(other).max())
+
+
 def test_the_residual_is_what_the_model_leaves_of_the_motion(flights):
     """By the model of the numbers, flight by flight and window by window."""
     balances, values = balances_of(flights[2:]), somewhere(3)
