@@ -13,7 +13,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import BLOCK_S, contiguous, mean_error
-from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.estimation.first_stage import RIDGE
 from cpfls_cli.gap.balance.balance_system import System, is_free, residual_along, system
@@ -101,11 +100,10 @@ class _Sampled:
         Result: those that are not 0, by channel and column, which few are; and how many columns there are.
         """
         vehicle, signals = nuisance(), self.hypothesis.signals[number]
-        stated = np.isin([each.name for each in vehicle.effect.coefficients], list(NUMBERS))
         chosen = [each for each in self.hypothesis.chosen if is_free(each)]
         of_vehicle, *own = (self._rows(columns_of(each, signals), number) for each in (vehicle, *chosen, *candidates))
         slopes = [each[number] for each in self._slopes]
-        every = np.concatenate([of_vehicle[..., stated], *own[: len(chosen)], *slopes, *own[len(chosen) :]], axis=2)
+        every = np.concatenate([of_vehicle, *own[: len(chosen)], *slopes, *own[len(chosen) :]], axis=2)
         there = np.argwhere(np.isfinite(self.white.scale)[:, None] & every.any(axis=0)).tolist()
         return {(channel, at): every[:, channel, at].copy() for channel, at in there}, every.shape[2]
 

@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.weak_flight import weak_flight
+from cpfls_cli.gap.balance.weak_flight import Candidate, weak_flight
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.extended import extend, plain
 from cpfls_cli.gap.naming import by_instruments as by_instruments_module
@@ -364,6 +365,19 @@ def test_stretches_and_blocks_of_4_s_end_with_their_flight(flown, every):
     assert {0, *np.cumsum(stretches)[:-1]} <= set(products.starts)
     seconds = np.diff([*products.starts, len(products.each)]) * 40 * every / 100
     assert np.all(np.abs(seconds - 4.0) < 1.0)
+
+
+def test_a_place_of_the_sensors_that_windows_miss_is_no_small_effect(flown):
+    """In gusts a fit gives it what the loop does; as free as the inertia it leaves nothing to a weak rotor."""
+    recordings = recorded(flown["noisy"][:3], TRUE.vehicle, setpoints=False)
+    windows, gusty = common_windows(recordings, FEW), np.ones(6, dtype=bool)
+    flights = tuple(weak_flight(each, windows, None, force=True) for each in recordings)
+    found = fitted(flights, [], best_floor(system(flights)), FEW)
+    linear = found.estimates.linear + np.repeat([0.0, 0.1, 0.0], [7, 2, 1])
+    apart = found._replace(estimates=replace(found.estimates, linear=linear))
+    weak_rotor = Candidate(CATALOGUE["rotor_mismatch"], {})
+    products = _Sampled(apart, flights, _Sampled(found, flights, None, gusty).white, gusty).products([weak_rotor])
+    assert products.tested(weak_rotor.effect, products.places[0], []).chance > 0.05
 
 
 def test_products_are_made_in_little_memory(flown, monkeypatch):
