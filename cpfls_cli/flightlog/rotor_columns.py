@@ -41,6 +41,7 @@ _FEWEST_SAMPLES = 20  # For medians and rates.
 _MIXED = ("controller.cmd_thrust", "controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw")
 # Of M1 to M4 the factors of these columns: power_distribution_quadrotor.c of the firmware.
 _CRAZYFLIE_MIXER = ((1.0, -0.5, 0.5, 1.0), (1.0, -0.5, -0.5, -1.0), (1.0, 0.5, -0.5, 1.0), (1.0, 0.5, 0.5, -1.0))
+_ORTHOGONAL = 1e-2  # Median by which products of the rows of a rotation matrix are off those of the unit matrix.
 _SAME = 0.02  # Part of the largest one's spread below which an output is not connected to a motor.
 # Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller.
 _SELDOM = 0.1
@@ -204,9 +205,19 @@ class _Connected(NamedTuple):
     doubtful: tuple[str, ...] = ()  # Outputs of `others` that may be motors all the same.
 
 
+def _is_rotation(values: Array) -> bool:
+    """Tell the nine numbers of a rotation matrix, whose rows have length 1 at right angles, by row or by column."""
+    if values.shape[1] != np.size(np.eye(3)):
+        return False
+    matrices = values.reshape(-1, 3, 3)
+    return bool(np.median(np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3))) < _ORTHOGONAL)
+
+
 def _connected(found: Found, parameters: Parameters) -> _Connected:
     """Find the motors among outputs: by their functions, by the frame's number, or because they move together."""
     named, time, values = found
+    if _is_rotation(values):
+        return _Connected([], False, {})
     spread = values.std(axis=0)
     moving = [index for index, own in enumerate(spread) if own > _SAME * float(spread.max()) > 0]
 

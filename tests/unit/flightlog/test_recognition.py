@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.attitude_columns import Reading
 from cpfls_cli.flightlog.conversion import to_program_frames
+from cpfls_cli.flightlog.names import nameless_clock
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.units import known_unit
@@ -382,6 +383,15 @@ def test_a_matrix_without_names_is_recognised_by_how_its_columns_move_together(o
     }
     assert recognition.choice("quaternion_order") == "xyzw"
     assert "columns data[14] to data[16]: a velocity in body axes" in recognition.left_out[0]
+
+
+def test_a_matrix_keeps_its_clock_over_a_pause_of_the_recording():
+    time = 0.018 * np.arange(4000.0)
+    time[2000:] += 80.0
+    noise = np.random.default_rng(5).normal(size=(len(time), 11))
+    log = {f"data[{column}]": values for column, values in enumerate(np.column_stack([time, noise]).T)}
+    assert nameless_clock(log) == "data[0]"
+    assert nameless_clock(log | {"data[0]": np.cumsum(np.random.default_rng(6).exponential(0.018, len(time)))}) is None
 
 
 def test_a_flight_that_is_never_near_hover_shows_what_carries_it():
