@@ -264,6 +264,21 @@ def test_commands_of_a_crazyflie_are_what_its_motors_get_unless_it_logs_these_to
     assert choice.value == meant
 
 
+@pytest.mark.parametrize(
+    ("power", "meant", "sure"), [(1.0, "speed", True), (0.6, "thrust", True), (0.73, "speed", False)]
+)
+def test_measured_speeds_say_what_commands_are_shares_of(power, meant, sure):
+    own = flight(seconds=20.0, climb=4.0, highest_hz=0.8)
+    commands = 1000 + 1000 * (own.speed / 1500) ** (1 / power)
+    columns = named(own.speed, *(f"rotor_speed_{motor}" for motor in range(1, 5)))
+    columns |= named(commands, *(f"motor{motor}_pwm" for motor in range(1, 5)))
+    recognition = seen(flat_log(own, speed=columns))
+    assert recognition.signal("rotor_speed").columns.columns[0] == "rotor_speed_1"
+    (choice,) = [each for each in recognition.choices if each.key == "rotor_command_is"]
+    assert (choice.value, choice.sure == "data") == (meant, sure)
+    assert f"to the power of {power:.2g}:" in choice.reason
+
+
 def test_commands_that_blow_up_are_said_with_the_moment(own):
     commands = 65.536 * own.speed
     commands[1500:, 1] = 1.25e6
