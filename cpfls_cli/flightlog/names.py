@@ -287,7 +287,9 @@ def nameless_clock(columns: Mapping[str, Array]) -> str | None:
         if len(steps) < 2 or steps.min() <= 0:
             continue
         step = float(np.median(steps))
-        if _STEPS_S[0] <= step <= _STEPS_S[1] and float(np.abs(steps - step).mean()) < _EVEN * step:
+        # A pause of the recording counts as one step.
+        uneven = float(np.minimum(np.abs(steps - step), step).mean())
+        if _STEPS_S[0] <= step <= _STEPS_S[1] and uneven < _EVEN * step:
             return name
     return None
 

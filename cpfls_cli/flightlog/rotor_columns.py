@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, runs
+from cpfls_cli.arrays import Array, IntArray, runs
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, LogTable, Rival, Sure
@@ -41,6 +41,10 @@ _FEWEST_SAMPLES = 20  # For medians and rates.
 _MIXED = ("controller.cmd_thrust", "controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw")
 # Of M1 to M4 the factors of these columns: power_distribution_quadrotor.c of the firmware.
 _CRAZYFLIE_MIXER = ((1.0, -0.5, 0.5, 1.0), (1.0, -0.5, -0.5, -1.0), (1.0, 0.5, -0.5, 1.0), (1.0, 0.5, 0.5, -1.0))
+# Means of so long, s; least command that counts, and least spread of their logarithms; the power between that of a
+# thrust and of a speed, and how far from it, as a logarithm, one of them is clear.
+_MEAN_S, _IDLE, _LEAST_SPREAD, _BETWEEN, _CLEAR = 0.5, 0.05, 0.05, float(np.sqrt(0.5)), 0.1
+_ORTHOGONAL = 1e-2  # Median by which products of the rows of a rotation matrix are off those of the unit matrix.
 _SAME = 0.02  # Part of the largest one's spread below which an output is not connected to a motor.
 # Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller.
 _SELDOM = 0.1
@@ -106,7 +110,8 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
         warnings += [warning for own in found["rotor_command"] for warning in _beyond_commands(own, parameters)][:1]
     shares = None if command is None or command.columns.unit != "1" else command
     beside = {name for named, *_ in found["rotor_command"] for name in named.group.columns}
-    command_is = None if shares is None else _meaning(shares, beside, parameters, system)
+    power = None if shares is None or speed is None else _power(found, speed, shares)
+    command_is = None if shares is None else _meaning(shares, beside, parameters, system, power)
     return RotorColumns(speed, command, command_is, tuple(left_out), tuple(warnings))
 
 
@@ -204,9 +209,19 @@ class _Connected(NamedTuple):
     doubtful: tuple[str, ...] = ()  # Outputs of `others` that may be motors all the same.
 
 
+def _is_rotation(values: Array) -> bool:
+    """Tell the nine numbers of a rotation matrix, whose rows have length 1 at right angles, by row or by column."""
+    if values.shape[1] != np.size(np.eye(3)):
+        return False
+    matrices = values.reshape(-1, 3, 3)
+    return bool(np.median(np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3))) < _ORTHOGONAL)
+
+
 def _connected(found: Found, parameters: Parameters) -> _Connected:
     """Find the motors among outputs: by their functions, by the frame's number, or because they move together."""
     named, time, values = found
+    if _is_rotation(values):
+        return _Connected([], False, {})
     spread = values.std(axis=0)
     moving = [index for index, own in enumerate(spread) if own > _SAME * float(spread.max()) > 0]
 
@@ -424,7 +439,29 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
     return None
 
 
-def _meaning(command: Guess, beside: Collection[str], parameters: Parameters, system: str) -> KeyChoice:
+def _power(found: Mapping[str, Sequence[Found]], speed: Guess, command: Guess) -> float | None:
+    """Find the power of commands that measured speeds grow with, by means over what is longer than a rotor's lag."""
+
+    def means(guess: Guess) -> tuple[IntArray, Array]:
+        own = next(each for each in found[guess.signal] if {*guess.columns.columns} <= {*each[0].group.columns})
+        columns = [own[0].group.columns.index(column) for column in guess.columns.columns]
+        window, counts = np.unique((own[1] // _MEAN_S).astype(int), return_counts=True)
+        begins = np.cumsum(counts) - counts
+        values = np.abs(own[2][:, columns] * guess.columns.scale + guess.columns.offset)
+        return window, np.add.reduceat(values, begins, axis=0) / counts[:, None]
+
+    (turned, speeds), (asked, commands) = means(speed), means(command)
+    _, first, second = np.intersect1d(turned, asked, return_indices=True)
+    running = (commands[second].min(axis=1) > _IDLE) & (speeds[first].min(axis=1) > 0)
+    x, y = np.log(commands[second][running]), np.log(speeds[first][running])
+    if len(x) < _FEWEST_SAMPLES or float((x - x.mean(axis=0)).std()) < _LEAST_SPREAD:
+        return None
+    return float(np.polyfit((x - x.mean(axis=0)).ravel(), (y - y.mean(axis=0)).ravel(), 1)[0])
+
+
+def _meaning(
+    command: Guess, beside: Collection[str], parameters: Parameters, system: str, power: float | None
+) -> KeyChoice:
     """Tell whether a command is a share of thrust or of speed, by what other columns of commands there are too."""
 
     def choose(value: str, reason: str, *rivals: Rival, sure: Sure = "named") -> KeyChoice:
@@ -450,6 +487,12 @@ def _meaning(command: Guess, beside: Collection[str], parameters: Parameters, sy
         return choose("speed", f"{said}, between speed (0) and thrust (1)", rival, sure="guess")
     if "MOT_THST_EXPO" in parameters or system.startswith("Ardu"):
         return choose("speed", "RCOU is what the motors get, after the autopilot's own thrust curve")
+    if power is not None:
+        meant, other = ("thrust", "speed") if power < _BETWEEN else ("speed", "thrust")
+        said = f"measured speeds grow with the commands to the power of {power:.2g}: 1 for a speed, 0.5 for a thrust"
+        clear = abs(np.log(power / _BETWEEN)) > _CLEAR if power > 0 else False
+        rivals = () if clear else (Rival(f"rotor_command_is: {other}", "the power is between the two"),)
+        return choose(meant, said, *rivals, sure="data" if clear else "guess")
     rival = Rival("rotor_command_is: thrust", "the log does not say which")
     reason = f"as with most motor controllers{f' ({system})' if system else ''}"
     return choose("speed", reason, rival, sure="guess")

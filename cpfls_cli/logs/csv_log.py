@@ -1,4 +1,4 @@
-"""Reader of CSV: plain or gzip-compressed; comma, semicolon, tab or spaces; every field a number or a time."""
+"""Reader of CSV: plain or gzip-compressed; comma, semicolon, tab or spaces; fields of numbers, lists or times."""
 
 import csv
 import gzip
@@ -25,6 +25,7 @@ from cpfls_cli.words import some
 
 # Characters of a line, which may hold thousands of columns; compressed, a longer one may fill the memory.
 _LONGEST_LINE = 1 << 20
+_LONGEST_ROW = 64  # Lines of the first row.
 _REMARKS: Final = ("#", "%", "//")  # With which a remark before the column names begins.
 # A number as it is written in much of Europe, where semicolons separate columns.
 _DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
@@ -127,21 +128,45 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
             f"{path}: has no line of column names, line {line} holds {many}: put a line above it that names each"
             " column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
         )
-    begun = []
+    begun, quotes = [], 0
     for text in lines:
         begun.append(text)
-        if text.strip():
+        quotes += text.count('"')
+        # An array in quotes may go over several lines.
+        if text.strip() and (quotes % 2 == 0 or len(begun) > _LONGEST_ROW):
             break
     # A field in quotes may hold another separator than what parts the names.
-    for delimiter in (_delimiter(begun[-1] if begun else header), _delimiter(header)):
-        first = next(_rows(iter(begun[-1:]), delimiter), [])
+    for delimiter in (_delimiter("".join(begun).strip() or header), _delimiter(header)):
+        first = next(filter(None, _rows(iter(begun), delimiter)), [])
         if len(names) in (1, len(first)):
             break
     rows = _rows(chain(begun, lines), delimiter)
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
         rows = ([field.replace(",", ".") for field in fields] for fields in rows)
         first = [field.replace(",", ".") for field in first]
+    widths = [len(_listed(field)) for field in first]
+    if len(names) == len(widths) < sum(widths):
+        rows = (_spread(fields, widths) for fields in rows)
+        names = [own for name, width in zip(names, widths, strict=True) for own in _numbered(name, width)]
+        first = _spread(first, widths)
     return _Table(names, first, rows, line + 1)
+
+
+def _listed(field: str) -> list[str]:
+    """Part a field that holds a list or a matrix of numbers, as Python writes arrays into a table; others are one."""
+    return re.findall(r"[^][,\s]+", field) if field.lstrip().startswith("[") else [field]
+
+
+def _spread(fields: list[str], widths: list[int]) -> list[str]:
+    """Give each number of a list a field of its own, and as many to a list that is absent."""
+    if len(fields) != len(widths):
+        return fields
+    parts = zip(map(_listed, fields), widths, strict=True)
+    return [own for part, width in parts for own in (part if any(part) else [""] * width)]
+
+
+def _numbered(name: str, width: int) -> list[str]:
+    return [name] if width == 1 else [f"{name}[{index}]" for index in range(width)]
 
 
 def _delimiter(line: str) -> str:

@@ -76,7 +76,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     elif text is not None:
         kinds, tables, lost = _read_lines(content[text.start() :])
     else:
-        raise InputError(f"{path}: not a DataFlash log: it does not start like one (encrypted, or of another kind?)")
+        raise InputError(
+            f"{path}: not a DataFlash log: it does not start like one (encrypted, or of another kind?);"
+            " a table with a line of column names has to end in .csv"
+        )
     stated = _stated_units(tables, kinds)
     stamps = _all_stamps(kinds, tables)
     topics = {

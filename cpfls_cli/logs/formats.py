@@ -337,6 +337,7 @@ _FOREIGN: Final = (
 )
 _TRACK: Final = "a track of positions holds no motion of the body; give the log of the autopilot"
 _AS_CSV: Final = "write its numbers as CSV, with a line of column names"
+_AS_BAG: Final = "record a bag (`ros2 bag record`), which has the stamps of its messages"
 _TEXTS: Final = (
     # What the first letters of a text hold, of markup anywhere.
     (rb"(?s:<.*)?<gpx\b", "a GPX track", _TRACK),
@@ -346,6 +347,7 @@ _TEXTS: Final = (
     (rb"\[\d{4}-\d\d-\d\d[ t]", "text with a stamp in brackets before each line", _AS_CSV),
     (rb"[{\[]", "JSON", _AS_CSV),
     (rb"\d+\.\d+ \d+ [a-z_0-9]+ ", "a log of Paparazzi", _AS_CSV),
+    (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*$)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )

@@ -64,9 +64,9 @@ class Look:
 
     @property
     def warned(self) -> list[Event]:
-        """Events that want a look, but for what the autopilot said; what ended a flight first."""
+        """Events that want a look, but for the autopilot's own; first what ended a flight, last what a log lacks."""
         found = [event for event in self.events if event.severity == "warning" and event.kind != "message"]
-        return sorted(found, key=lambda event: event.kind not in MOMENTS)
+        return sorted(found, key=lambda event: (event.kind not in MOMENTS, event.kind in ("gap", "restart")))
 
     @property
     def uneven(self) -> tuple[int, ...]:

@@ -235,3 +235,10 @@ def test_a_headline_says_when_before_what():
     text = "the accelerometer reads 0.79 g at rest: calibrate it"
     found = (Event(time_s=0.0, kind="calibration", text=text, severity="warning"),)
     assert words_of(events=found).startswith(f"# Flies; at 0.0 s: {text}")
+
+
+def test_what_the_vehicle_did_comes_before_what_the_log_lacks():
+    gap = Event(time_s=2.7, until_s=2.8, kind="gap", text="no samples for 0.11 s", severity="warning")
+    limit = Event(time_s=21.0, until_s=36.0, kind="limit", text="M3 at its upper limit 6 times", severity="warning")
+    said = words_of(events=(gap, limit))
+    assert said.startswith("# Flies; from 21.0 s on: M3 at its upper limit 6 times; and 1 more warning")

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.attitude_columns import Reading
 from cpfls_cli.flightlog.conversion import to_program_frames
+from cpfls_cli.flightlog.names import nameless_clock
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.units import known_unit
@@ -263,6 +264,21 @@ def test_commands_of_a_crazyflie_are_what_its_motors_get_unless_it_logs_these_to
     assert choice.value == meant
 
 
+@pytest.mark.parametrize(
+    ("power", "meant", "sure"), [(1.0, "speed", True), (0.6, "thrust", True), (0.73, "speed", False)]
+)
+def test_measured_speeds_say_what_commands_are_shares_of(power, meant, sure):
+    own = flight(seconds=20.0, climb=4.0, highest_hz=0.8)
+    commands = 1000 + 1000 * (own.speed / 1500) ** (1 / power)
+    columns = named(own.speed, *(f"rotor_speed_{motor}" for motor in range(1, 5)))
+    columns |= named(commands, *(f"motor{motor}_pwm" for motor in range(1, 5)))
+    recognition = seen(flat_log(own, speed=columns))
+    assert recognition.signal("rotor_speed").columns.columns[0] == "rotor_speed_1"
+    (choice,) = [each for each in recognition.choices if each.key == "rotor_command_is"]
+    assert (choice.value, choice.sure == "data") == (meant, sure)
+    assert f"to the power of {power:.2g}:" in choice.reason
+
+
 def test_commands_that_blow_up_are_said_with_the_moment(own):
     commands = 65.536 * own.speed
     commands[1500:, 1] = 1.25e6
@@ -382,6 +398,15 @@ def test_a_matrix_without_names_is_recognised_by_how_its_columns_move_together(o
     }
     assert recognition.choice("quaternion_order") == "xyzw"
     assert "columns data[14] to data[16]: a velocity in body axes" in recognition.left_out[0]
+
+
+def test_a_matrix_keeps_its_clock_over_a_pause_of_the_recording():
+    time = 0.018 * np.arange(4000.0)
+    time[2000:] += 80.0
+    noise = np.random.default_rng(5).normal(size=(len(time), 11))
+    log = {f"data[{column}]": values for column, values in enumerate(np.column_stack([time, noise]).T)}
+    assert nameless_clock(log) == "data[0]"
+    assert nameless_clock(log | {"data[0]": np.cumsum(np.random.default_rng(6).exponential(0.018, len(time)))}) is None
 
 
 def test_a_flight_that_is_never_near_hover_shows_what_carries_it():

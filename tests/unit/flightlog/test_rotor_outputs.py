@@ -92,6 +92,14 @@ def test_outputs_that_stand_in_their_middle_before_take_off_are_no_rotors(own):
     assert recognition.signal("rotor_command").columns.columns == PWM
 
 
+def test_a_rotation_matrix_is_no_nine_rotors(own):
+    matrix = own.rotation.as_matrix().reshape(-1, 9)
+    flat = {"time": own.time} | named(matrix, *(f"R[{index}]" for index in range(9)))
+    flat |= named(pulses(own), *PWM) | named(own.rate, *(f"w[{axis}]" for axis in range(3)))
+    flat |= named(own.rotation.as_quat(), *(f"q[{index}]" for index in range(4)))
+    assert maps(proposed({"": flat}, ""))["rotor_command"].columns == PWM
+
+
 def test_outputs_that_begin_in_a_hover_are_no_surfaces(own):
     rising, falling = np.minimum(0.5, 0.1 * (own.time - 3)), np.maximum(-0.45, -0.1 * (own.time - 3))
     swings = [0.2 * np.sin(rate * (own.time - 3)) for rate in (1.0, 0.7)]

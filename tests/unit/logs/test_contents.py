@@ -291,6 +291,21 @@ def test_a_last_line_that_was_cut_is_left_out_and_no_other_one(tmp_path: Path) -
         contents(_written(tmp_path / "log.csv", "time,p,q\n0,1,2\n1,2\n2,3,4\n"))
 
 
+def test_lists_of_numbers_in_fields_are_columns(tmp_path: Path) -> None:
+    # As pandas writes arrays: Python's lists, NumPy's arrays over two lines, one that is absent, and a matrix.
+    rows = '0,"[1.0, -2e-3]","[1. 2.\n 3. ]","[[1, 0], [0, 1]]",hover\n1,,"[4. 5. 6.]","[[0, 1], [1, 0]]",climb\n'
+    own = contents(_written(tmp_path / "log.csv", "t,p,w,R,mode\n" + rows))
+    assert list(own.topics[""]) == [
+        "t",
+        *(f"{n}[{i}]" for n, size in (("p", 2), ("w", 3), ("R", 4)) for i in range(size)),
+    ]
+    values = np.column_stack(list(own.topics[""].values()))
+    np.testing.assert_array_equal(values[0], [0, 1, -2e-3, 1, 2, 3, 1, 0, 0, 1])
+    np.testing.assert_array_equal(values[1], [1, np.nan, np.nan, 4, 5, 6, 0, 1, 1, 0])
+    with pytest.raises(InputError, match=r"log\.csv:3: 3 fields, but 4 column names"):
+        contents(_written(tmp_path / "log.csv", 't,p\n0,"[1, 2, 3]"\n1,"[1, 2]"\n2,"[1, 2, 3]"\n'))
+
+
 def test_fields_in_quotes_may_hold_another_separator(tmp_path: Path) -> None:
     own = contents(_written(tmp_path / "log.csv", 'time,places,p\n0,"[1;2]",3\n1,"[2;3]",4\n'))
     np.testing.assert_array_equal(own.topics[""]["p"], [3.0, 4.0])
@@ -598,6 +613,13 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ),
         ("a.log", b"#DroneDeploy\t2.7\n", "a log of an app", "the log that the autopilot writes"),
         ("a.txt", b'[{"t": 1}]', "JSON", "write its numbers as CSV"),
+        (
+            "a.csv",
+            b"layout:\n  dim: []\ndata:\n- 0.5\n- 0.25\n---\nlayout:\n",
+            "YAML, as `ros2 topic echo`",
+            "ros2 bag record",
+        ),
+        ("a.yaml", b"time: 1.5\r\nroll: 0.1\r\n---\r\ntime: 1.6\r\n", "YAML, as `ros2 topic echo`", "ros2 bag record"),
         ("a.data", b"0.5 12 IMU_GYRO 0.1 0.2 0.3\n", "a log of Paparazzi", "write its numbers as CSV"),
         ("a.bin", b"", "an empty file", "the copy failed"),
         ("a.log", b"", "an empty file", "the copy failed"),

@@ -99,7 +99,11 @@ def test_bytes_that_are_lost_or_strange_are_warned_of_and_cost_the_message_befor
     ("content", "message"),
     [
         (b"", "an empty file: nothing was logged, or the copy failed"),
-        (bytes(range(256)), "not a DataFlash log: it does not start like one (encrypted, or of another kind?)"),
+        (
+            bytes(range(256)),
+            "not a DataFlash log: it does not start like one (encrypted, or of another kind?); a table with a line of"
+            " column names has to end in .csv",
+        ),
         (b"t,roll\n0,1\n", "seems to hold CSV, unlike the ending of its name; rename it to end in .csv"),
         (log()[:60], "holds no messages with time stamps (TimeUS)"),
         (dataflash({}, []), "holds no messages with time stamps (TimeUS)"),

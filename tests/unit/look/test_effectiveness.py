@@ -141,6 +141,9 @@ def test_reasons_name_what_is_missing(flight):
     silent = np.full_like(flight.command, np.nan)
     assert axis_effectiveness(replace(flight, rate_hz=20.0), 0).reason == reasons.TOO_SLOW
     assert axis_effectiveness(replace(flight, command=silent), 0).reason == reasons.NO_COMMAND
+    # A stick that rests all along is not listed among the signals of a log, as if it had none.
+    found = axis_effectiveness(replace(flight, stick=np.full_like(flight.stick, np.nan)), 0)
+    assert found.reason.startswith("no stick is logged that moves,")
     short = axis_effectiveness(replace(flight, usable=flight.time < 7), 0).reason
     assert short == "7 s are usable in pieces of at least 1 s; 10 s are needed"
 
