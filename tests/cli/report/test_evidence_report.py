@@ -315,8 +315,7 @@ def test_an_extended_model_alone_brings_its_figures(tmp_path):
 
 
 def test_a_fault_of_a_sensor_stands_under_sensors(tmp_path):
-    finding = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
-    page = shown(tmp_path, made.diagnosis(named=({"name": "gyro_bias", "kind": "sensor"},), **made.audit([finding])))
+    page = shown(tmp_path, made.diagnosis(named=("gyro_bias",), audit=made.audit_with_fault()))
     assert "SENSOR FAULT" in page.text
     assert "The gyroscope shows 0.01 rad/s at rest. The diagnosis repairs it" in page.text
     assert "Not tested for gyro scale and misaligned IMU: no attitude." in page.text
