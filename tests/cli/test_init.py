@@ -36,20 +36,27 @@ def proposed(cpfls, tmp_path):
     return call
 
 
-def test_the_next_commands_take_what_it_wrote(cpfls, proposed, log, tmp_path):
-    proposed(log, "--mass", MASS, "--arm", ARM)
-    study, made = tmp_path / "study.yaml", tmp_path / "flight.h5"
-    imported = cpfls("import", study, log, "-o", made, "--json")
-    assert imported.exit_code == 0, imported.stderr
-    summary = json.loads(imported.stdout)
+@pytest.fixture(scope="module")
+def usual(cpfls, own, tmp_path_factory):
+    """A log, the config that `init` writes for it with mass and arm, and what it says."""
+    folder = tmp_path_factory.mktemp("usual")
+    log, study = write_csv(folder / "log.csv", flat_log(own)), folder / "study.yaml"
+    return log, study, cpfls.done("init", log, "--mass", MASS, "--arm", ARM, "-o", study).stdout
+
+
+def test_the_next_commands_take_what_it_wrote(cpfls, usual, tmp_path):
+    (log, study, _), made = usual, tmp_path / "flight.h5"
+    summary = cpfls.summary("import", study, log, "-o", made)
     assert {"attitude", "body_rate", "specific_force", "position", "velocity", "rotor_speed"} <= set(summary["signals"])
     assert summary["samples"] == 2000
     found = cpfls("vehicle", study, made, "-o", tmp_path / "vehicle.h5", "--dry-run")
     assert found.exit_code == 0, found.stderr
 
 
-def test_every_guess_has_its_reason_in_the_file_and_in_the_answer(proposed, log):
-    result, text, data = proposed(log, "--mass", MASS, "--arm", ARM)
+def test_every_guess_has_its_reason_in_the_file_and_in_the_answer(usual):
+    _, study, said = usual
+    text = study.read_text()
+    data = yaml.safe_load(text)
     signals = data["import"]["signals"]
     assert signals["body_rate"] == {"columns": ["gyro_x", "gyro_y", "gyro_z"], "unit": "rad/s"}
     assert signals["rotor_speed"]["unit"] == "rpm"
@@ -57,7 +64,7 @@ def test_every_guess_has_its_reason_in_the_file_and_in_the_answer(proposed, log)
     for name in (*signals, *(key for key in ("body_frame", "world_frame", "acceleration_frame") if key in text)):
         place = next(index for index, line in enumerate(lines) if line.strip().startswith(f"{name}:"))
         assert lines[place - 1].strip().startswith("#"), name
-        assert name in result.stdout
+        assert name in said
     assert max(len(line) for line in lines if line.lstrip().startswith("#")) <= 110
     assert [rotor["spin"] for rotor in data["vehicle"]["rotors"]] == [spin for _, _, spin in HUBS]
     assert [rotor["position_m"][:2] for rotor in data["vehicle"]["rotors"]] == [
@@ -102,12 +109,11 @@ def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls
     assert cpfls("config", study, "--set", "vehicle.mass_kg=0.8").exit_code == 0
 
 
-def test_the_same_log_gives_the_same_file_and_never_over_another(proposed, refuse, log, tmp_path):
-    _, text, _ = proposed(log, "--mass", MASS)
-    assert refuse("init", log, "-o", tmp_path / "study.yaml") == [
-        f"{tmp_path / 'study.yaml'}: exists already; --force replaces it"
-    ]
-    assert proposed(log, "--mass", MASS, "--force")[1] == text
+def test_the_same_log_gives_the_same_file_and_never_over_another(proposed, refuse, usual, tmp_path):
+    log, study, _ = usual
+    assert refuse("init", log, "-o", study) == [f"{study}: exists already; --force replaces it"]
+    (tmp_path / "study.yaml").write_text("seed: 1\n")
+    assert proposed(log, "--mass", MASS, "--arm", ARM, "--force")[1] == study.read_text()
 
 
 def test_the_answer_for_machines(proposed, log):
@@ -407,7 +413,7 @@ def test_two_masses_in_one_config_are_said_by_how_much(proposed, tmp_path, own, 
     size = 0.6 / own.speed.mean() if by == "command" else 1.0
     logs = []
     for number, (seed, ratio) in enumerate([(3, 1.0), (5, (mass / 37.0) ** 0.5)]):
-        other = flight(seconds=20.0, seed=seed)
+        other = flight(seconds=12.0, seed=seed)
         values = {"speed": named(size * ratio * other.speed, *columns)}
         values |= {} if by == "accelerometer" else {"force": None}
         logs.append(write_csv(tmp_path / f"{number}.csv", flat_log(other, **values)))
@@ -432,7 +438,7 @@ def test_how_two_pilots_fly_is_no_mass(proposed, tmp_path, own):
     """Squared commands of punches and dives are larger on average, and the vehicle is the same."""
     logs = []
     for number in range(2):
-        other = flight(seconds=20.0, seed=3 + number)
+        other = flight(seconds=12.0, seed=3 + number)
         punches = 1 + number * (0.3 + 0.5 * np.sign(np.sin(1.5 * other.time)))
         values = 0.4 / own.speed.mean() * np.sqrt(punches)[:, None] * other.speed
         commands = named(values, *(f"cmd{motor}" for motor in range(1, 5)))
@@ -449,7 +455,7 @@ def test_an_emptier_battery_is_no_mass(proposed, tmp_path, own, volts, heavier):
     """A fifth more of command at a tenth less of voltage is the same thrust."""
     logs = []
     for number, battery in enumerate((16.0, volts)):
-        other = flight(seconds=20.0, seed=3 + number)
+        other = flight(seconds=12.0, seed=3 + number)
         values = 0.6 / own.speed.mean() * (1.19 if number else 1.0) ** 0.5 * other.speed
         commands = named(values, *(f"cmd{motor}" for motor in range(1, 5)))
         more = {"voltage": {"battery_voltage": battery - 0.001 * other.time}}
