@@ -34,8 +34,7 @@ FIGURES = [
 def report(cpfls, study, tmp_path_factory):
     def write(*artifacts, form="html"):
         output = tmp_path_factory.mktemp("report") / f"report.{form}"
-        result = cpfls("report", study, *artifacts, "-o", output, "--json")
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("report", study, *artifacts, "-o", output, "--json")
         text = output.read_text(encoding="utf-8")
         return SimpleNamespace(text=text, words=words(text), **json.loads(result.stdout))
 
@@ -237,8 +236,7 @@ def shown(folder, *artifacts, options=()):
     config, output = folder / "study.yaml", folder / "report.html"
     config.write_text("seed: 1\n" + VEHICLE)
     paths = [written(folder / f"{number}.h5", each) for number, each in enumerate(artifacts)]
-    result = run("report", config, *paths, "-o", output, "--json", "--force", *options)
-    assert result.exit_code == 0, result.output
+    result = run.done("report", config, *paths, "-o", output, "--json", "--force", *options)
     html = output.read_text(encoding="utf-8")
     body = re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", html, flags=re.DOTALL)
     text = re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", body)))
