@@ -58,7 +58,6 @@ def test_extended_model_leaves_the_gap_that_was_promised(answer):
     again = answer.folder.parent / "again.h5"
     flights = answer.held[1::2]
     model = answer.folder / "extended.h5"
-    result = run.done("compare", answer.logs / "study.yaml", *flights, "--model", model, "-o", again, "--json")
-    gap = json.loads(result.stdout)["gap"]
+    gap = run.summary("compare", answer.logs / "study.yaml", *flights, "--model", model, "-o", again)["gap"]
     assert gap["torque_n_m"] == pytest.approx(answer.summary["gap_after"]["torque_n_m"], rel=1e-6)
     assert max(gap["floors"]) < 1.5

@@ -86,8 +86,7 @@ def test_what_an_export_cannot_hold_is_named_on_the_screen_and_in_the_file(cpfls
     beside = ModelEffect("ground_effect", {"G": 1.2}, none), ModelEffect("battery_sag", {"exponent": 1.5}, none)
     model = replace(whole(effects=beside, remainder=None), wind=(3.0, 0.5, 0.0))
     write_vehicle(path, vehicle_of(model))
-    result = cpfls.done("export", path, "-o", output, "--json")
-    titles = [each["title"] for each in json.loads(result.stdout)["missing"]]
+    titles = [each["title"] for each in cpfls.summary("export", path, "-o", output)["missing"]]
     # Nothing of this vehicle meets the air, so that the wind does nothing.
     assert [title.partition(" (")[0] for title in titles] == ["battery sag", "ground effect"]
     assert titles[0].endswith("; exponent = 1.5)")

@@ -24,8 +24,7 @@ def replayed(cpfls, gap_config, tmp_path_factory):
 
     def call(model, *flights, options=FAST, config=gap_config):
         output = tmp_path_factory.mktemp("replay") / "replay.h5"
-        result = cpfls.done("replay", config, model, *flights, "-o", output, "--json", *options)
-        return json.loads(result.stdout), output
+        return cpfls.summary("replay", config, model, *flights, "-o", output, *options), output
 
     return call
 
