@@ -168,7 +168,7 @@ def diagnosis(verdict="NAMED", named=("com_offset",), force=True, **changed):
     """Make a diagnosis that names effects."""
     time, gap = np.arange(200) * 0.01, gap_change(force=force)
     waves = np.sin(3 * time)[:, None] * np.ones(3)
-    before = np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, gap.before_floors)
+    before = np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, gap.before)
     given = {
         "share": 0.973,
         "share_by_kind": ByKind(torque=np.nan, force=np.nan),
