@@ -23,8 +23,7 @@ def answer(tmp_path_factory):
     flights = [*sorted(logs.glob("train_*.csv")), *sorted(logs.glob("held_out_*.csv"))]
     folder = place / "gap"
     held = [word for path in flights[3:] for word in ("--held-out", path)]
-    result = run("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.shifts=39")
-    assert result.exit_code == 0, result.stderr
+    result = run.done("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.shifts=39")
     return SimpleNamespace(folder=folder, summary=json.loads(result.stdout), hidden=case.hidden, logs=logs, held=held)
 
 
@@ -52,15 +51,13 @@ def test_every_artifact_is_good(answer):
     names = {"disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json"}
     assert {path.name for path in answer.folder.iterdir()} == names
     for name in ("disagreement", "diagnosis", "extended"):
-        assert run("check", answer.folder / f"{name}.h5").exit_code == 0
+        run.done("check", answer.folder / f"{name}.h5")
 
 
 def test_extended_model_leaves_the_gap_that_was_promised(answer):
     again = answer.folder.parent / "again.h5"
     flights = answer.held[1::2]
     model = answer.folder / "extended.h5"
-    result = run("compare", answer.logs / "study.yaml", *flights, "--model", model, "-o", again, "--json")
-    assert result.exit_code == 0, result.stderr
-    gap = json.loads(result.stdout)["gap"]
+    gap = run.summary("compare", answer.logs / "study.yaml", *flights, "--model", model, "-o", again)["gap"]
     assert gap["torque_n_m"] == pytest.approx(answer.summary["gap_after"]["torque_n_m"], rel=1e-6)
     assert max(gap["floors"]) < 1.5

@@ -1,4 +1,4 @@
-"""Artifacts of the gap workflow with numbers made up, quick to write and sound by their formats."""
+"""Results of the gap workflow with numbers made up, sound by their formats."""
 
 from dataclasses import replace
 
@@ -9,18 +9,10 @@ from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement, Extended
 from cpfls_cli.consistency.check import Audit
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber
 from cpfls_cli.effects.signals import RecordedFlight
+from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import ChannelGaps, ResidualWindows
-from cpfls_cli.gap.naming.results import (
-    Alternative,
-    ByKind,
-    Estimate,
-    GapChange,
-    LikelySet,
-    NamedEffect,
-    NotExcited,
-    Unexplained,
-)
+from cpfls_cli.gap.naming.results import Alternative, ByKind, Estimate, GapChange, NamedEffect, NotExcited
 from cpfls_cli.gap.residual.dependence import Dependence
 from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.gap.residual.views import GapStretch, HeatMap
@@ -31,49 +23,27 @@ from cpfls_cli.stage import loaded
 from cpfls_cli.store import Origin
 from cpfls_cli.vehicle.settings import VehicleSettings
 
-CHANNELS = np.array([f"{kind} {axis}" for kind in ("torque", "force") for axis in "xyz"])
 WINDOWS, HORIZON = 60, 50
 SENTENCE = "The centre of mass is not where the model has it."
-EFFECT = {
-    "name": "com_offset",
-    "kind": "wrench",
-    "named": 1,
-    "p_value": 1e-9,
-    "share": 0.93,
-    "sentence": SENTENCE,
-}
-
-OFFSET = ("c_x", "m", 0.01, 0.009, 0.0111, -0.06, 0.06)
-NUMBERS = {"parameter": ("inertia_z", "1", 0.24, 0.2, 0.281, -0.9, 3.0)}
-"""A coefficient of an effect, by the kind of the effect."""
-
-
-def texts(*values):
-    return np.array(values) if values else np.array([], dtype="U1")
+RIVAL = Alternative("torque_bias", "com_offset", 0.98, "change the thrust")
+NUMBERS = {"parameter_error": Estimate("inertia_z", "1", 0.24, 0.2, 0.281, (-0.9, 3.0))}
+C_X = Estimate("c_x", "m", 0.01, 0.009, 0.0111, (-0.06, 0.06))
+AUDIT = Audit(
+    findings=(),
+    untested=dict.fromkeys(("gyro_scale", "imu_misalignment"), "no attitude"),
+    warnings=(),
+    notes=("The motion follows the rotors by 12 ms.",),
+)
+UNSEEN = (NotExcited("ground_effect", "fly near the ground"),)
+VEHICLE_NUMBERS = (Estimate("inertia_x", "1", 0.021, 0.01, 0.03, (np.nan, np.nan)),)
 
 
-def table(group, fields, rows):
-    """Arrange rows as datasets; a field that starts with a quote holds text."""
-    columns = {}
-    for place, field in enumerate(fields):
-        values = [row[place] for row in rows]
-        words = field.startswith("'")
-        columns[f"{group}/{field.lstrip(chr(39))}"] = texts(*values) if words else np.array(values, dtype=float)
-    return columns
-
-
-def audit(findings=()):
-    return {
-        **table("audit", ("'finding", "named", "p_value", "'sentence"), findings),
-        **table(
-            "audit_coefficient",
-            ("'finding", "'name", "'unit", "value", "low", "high", "named"),
-            [(finding[0], "x", "rad/s", 0.01, 0.008, 0.012, finding[1]) for finding in findings],
-        ),
-        "audit/untested": texts("gyro_scale: no attitude", "imu_misalignment: no attitude"),
-        "audit/warning": texts(),
-        "audit/note": texts("The motion follows the rotors by 12 ms."),
-    }
+def audit_with_fault(**changed):
+    """Make an audit that found the error of a gyroscope."""
+    number = FaultNumber(name="x", value=0.01, unit="rad/s", low=0.008, high=0.012, named=True)
+    sentence = "The gyroscope shows 0.01 rad/s at rest."
+    fault = AuditFinding(name="gyro_bias", coefficients=(number,), p_value=1e-9, named=True, sentence=sentence)
+    return replace(AUDIT, findings=(fault,), **changed)
 
 
 def flights(roles=("training", "held-out")):
@@ -84,107 +54,6 @@ def flights(roles=("training", "held-out")):
         f"flight-{number}": RecordedFlight(name=name, role=role, commanded=False, begins=np.nan, **still)
         for number, (name, role) in enumerate(pairs, start=1)
     }
-
-
-def rows(data, group, *names):
-    """List the rows of a table that is given as datasets."""
-    return list(zip(*(data[f"{group}/{name}"].tolist() for name in names), strict=True))
-
-
-def part(kind, data, group):
-    """Make a result of the datasets of a group; None where there are none."""
-    held = {path.removeprefix(f"{group}/"): each for path, each in data.items() if path.startswith(f"{group}/")}
-    return kind(**held) if held else None
-
-
-def audited(data):
-    """Make an audit of its datasets."""
-    numbers = rows(data, "audit_coefficient", "finding", "name", "unit", "value", "low", "high", "named")
-    return Audit(
-        findings=tuple(
-            AuditFinding(
-                name=name,
-                coefficients=tuple(
-                    FaultNumber(name=of, value=value, unit=unit, low=low, high=high, named=bool(sure))
-                    for owner, of, unit, value, low, high, sure in numbers
-                    if owner == name
-                ),
-                p_value=p_value,
-                named=bool(named),
-                sentence=sentence,
-            )
-            for name, named, p_value, sentence in rows(data, "audit", "finding", "named", "p_value", "sentence")
-        ),
-        untested=dict(each.split(": ", 1) for each in data["audit/untested"].tolist()),
-        warnings=tuple(data["audit/warning"].tolist()),
-        notes=tuple(data["audit/note"].tolist()),
-        contradictions=tuple(data["audit/contradiction"].tolist()) if "audit/contradiction" in data else (),
-    )
-
-
-def along(kind, data):
-    """Make a playback of its datasets."""
-    names, signals = data["playback/prediction"].tolist(), ("body_rate", "attitude", "velocity", "position")
-    return kind(
-        horizon_s=data["playback/horizon_s"],
-        models={
-            name: Prediction(
-                diverged=0,
-                **{
-                    signal: Errors(
-                        mae=data[f"playback/{signal}/mae"][row], rms_by_axis=data[f"playback/{signal}/rms"][row]
-                    )
-                    for signal in signals
-                    if f"playback/{signal}/mae" in data
-                },
-            )
-            for row, name in enumerate(names)
-        },
-        flights=tuple(data["playback/flight"].tolist()),
-        windows=60,
-    )
-
-
-def stretches(data):
-    """Make stretches of their datasets."""
-    found = rows(data, "stretch", "flight", "start", "end", "channel", "floors")
-    return tuple(GapStretch(int(flight), *others) for flight, *others in found)
-
-
-def unseen(data):
-    """Make effects that were not excited of their datasets."""
-    return tuple(NotExcited(*row) for row in rows(data, "not_excited", "name", "reason"))
-
-
-def effects_of(data, named):
-    """Make effects of their datasets: those that are named, or those that are the closest."""
-    numbers = rows(
-        data, "coefficient", "effect", "name", "unit", "value", "low", "high", "plausible_low", "plausible_high"
-    )
-    columns = ("name", "named", "p_value", "share", "sentence")
-    return tuple(
-        named_effect(
-            name,
-            linear=[value for owner, value in rows(data, "linear", "effect", "value") if owner == name],
-            numbers=tuple(
-                Estimate(*own, tuple(ends))
-                for owner, *own, low, high in numbers
-                if owner == name
-                for ends in [(low, high)]
-            ),
-            p_value=p_value,
-            share=share,
-            sentence=sentence,
-        )
-        for name, is_named, p_value, share, sentence in rows(data, "effect", *columns)
-        if bool(is_named) is named
-    )
-
-
-def numbers_of(data):
-    """Make numbers of the vehicle of their datasets."""
-    columns = ("name", "unit", "value", "low", "high")
-    return tuple(Estimate(*row, (np.nan, np.nan)) for row in rows(data, "parameter", *columns))
 
 
 def named_effect(name, shape=None, linear=(), numbers=(), p_value=0.001, share=1.0, sentence=""):
@@ -198,6 +67,12 @@ def named_effect(name, shape=None, linear=(), numbers=(), p_value=0.001, share=1
         share=share,
         sentence=sentence,
     )
+
+
+def effect(name="com_offset"):
+    """Make an effect that explains most of a gap."""
+    linear = [0.01] if name == "com_offset" else []
+    return named_effect(name, None, linear, [NUMBERS.get(name, C_X)], 1e-9, 0.93, SENTENCE)
 
 
 def source_of(given, stage, config="seed: 1\n", cautions=()):
@@ -216,60 +91,43 @@ def text_of(given, stage, **origin):
     return loaded(stage).text(given, about=source_of(given, stage, **origin))
 
 
-def playback(*predictions, **sizes):
+def along(kind, *predictions, **sizes):
     """Errors that grow with the horizon; by signal those of the predictions after the last sample."""
     given = {"body_rate": (0.1, 1.0, 1.0, 2.0), "attitude": (0.01, 0.2, 0.1, 0.3)} | sizes
-    data = {
-        "playback/flight": texts("two.csv"),
-        "playback/windows": 60,
-        "playback/prediction": texts(*predictions),
-        "playback/horizon_s": np.arange(1, HORIZON + 1) * 0.01,
-        "playback/diverged": np.zeros(len(predictions), dtype=int),
-    }
     growth = np.arange(1, HORIZON + 1) / HORIZON
-    for signal, ends in given.items():
-        mae = np.outer(ends[: len(predictions)], growth)
-        data |= {f"playback/{signal}/mae": mae, f"playback/{signal}/rms": np.repeat(mae[:, :, None], 3, axis=2)}
-    return data
+
+    def errors(end):
+        return Errors(mae=end * growth, rms_by_axis=np.repeat(end * growth[:, None], 3, axis=1))
+
+    models = {
+        name: Prediction(diverged=0, **{signal: errors(ends[place]) for signal, ends in given.items()})
+        for place, name in enumerate(predictions)
+    }
+    return kind(horizon_s=np.arange(1, HORIZON + 1) * 0.01, models=models, flights=("two.csv",), windows=60)
 
 
 def played_pair(**sizes):
-    return playback("after", "nothing-moves", "rate-stays", "before", **sizes)
+    return along(PlaybackChange, "after", "nothing-moves", "rate-stays", "before", **sizes)
 
 
-def disagreement(force=True, **changed):
-    floors = np.array([12.0, 3.0, 0.8, *([5.0, 4.0, 70.0] if force else [np.nan] * 3)])
-    rng = np.random.default_rng(1)
+def by_channel(torque, force):
+    """Six values; those of force only where there are some."""
+    return np.array([*torque, *(force or [np.nan] * 3)])
+
+
+def disagreement(force=True, floors=None, **changed):
+    if floors is None:
+        floors = by_channel([12.0, 3.0, 0.8], force and [5.0, 4.0, 70.0])
     cells = np.outer(np.linspace(-1, 1, 12), np.ones(12)) * 0.01
     cells[0, :5] = np.nan
-    known = CHANNELS[: 6 if force else 3]
-    pairs = [(channel, "thrust", 0.9, 0.004) for channel in known] + [(channel, "yaw", 0.6, 0.3) for channel in known]
-    data = {
-        "gap/channel": CHANNELS,
-        "gap/rms": floors * 0.01,
-        "gap/floor": np.where(np.isfinite(floors), 0.01, np.nan),
-        "gap/floors": floors,
-        "gap/share": floors / 100,
-        "residual/time": np.tile(np.arange(WINDOWS // 2) * 0.2, 2),
-        "residual/flight": np.repeat([0, 1], WINDOWS // 2),
-        "residual/value": rng.standard_normal((WINDOWS, 6)) * floors * 0.01,
-        **table(
-            "stretch",
-            ("flight", "start", "end", "'channel", "floors"),
-            [(1, 1.0, 2.0, "torque x", 33.3), (0, 3.0, 4.0, "torque y", 9.9)],
+    pairs = [(of, "thrust", 0.9, 0.004) for of in CHANNELS] + [(of, "yaw", 0.6, 0.3) for of in CHANNELS]
+    given = {
+        "sizes": ChannelGaps(
+            rms=floors * 0.01, floor=np.where(np.isfinite(floors), 0.01, np.nan), floors=floors, share=floors / 100
         ),
-        **table("dependence", ("'channel", "'signal", "r2", "p_value"), pairs),
-        **playback("model", "nothing-moves", "rate-stays"),
-        **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
-        **audit(),
-        "warning": texts("one.csv: rotor 2 looks saturated"),
-    } | changed
-    return Disagreement(
-        sizes=part(ChannelGaps, {path: each for path, each in data.items() if path != "gap/channel"}, "gap"),
-        repeatability=None,
-        worst=stretches(data),
-        dependence=tuple(Dependence(*row) for row in rows(data, "dependence", "channel", "signal", "r2", "p_value")),
-        heat_map=HeatMap(
+        "worst": (GapStretch(1, 1.0, 2.0, "torque x", 33.3), GapStretch(0, 3.0, 4.0, "torque y", 9.9)),
+        "dependence": tuple(Dependence(*row) for row in pairs if force or row[0].startswith("torque")),
+        "heat_map": HeatMap(
             channel="torque x",
             signals=("thrust", "yaw"),
             first_edge=np.linspace(50, 70, 13),
@@ -277,143 +135,90 @@ def disagreement(force=True, **changed):
             mean=cells,
             count=np.ones((12, 12)),
         ),
-        not_excited=unseen(data),
-        audit=audited(data),
-        residual=part(ResidualWindows, data, "residual"),
-        playback=along(AlongFlights, data),
-        warnings=tuple(data["warning"].tolist()),
-        base=VehicleModel(vehicle=VehicleSettings()),
-        recorded=flights(("given", "given")),
+        "not_excited": UNSEEN,
+        "audit": AUDIT,
+        "residual": ResidualWindows(
+            time=np.tile(np.arange(WINDOWS // 2) * 0.2, 2),
+            flight=np.repeat([0, 1], WINDOWS // 2),
+            value=np.random.default_rng(1).standard_normal((WINDOWS, 6)) * floors * 0.01,
+        ),
+        "playback": along(AlongFlights, "model", "nothing-moves", "rate-stays"),
+        "warnings": ("one.csv: rotor 2 looks saturated",),
+    }
+    return Disagreement(
+        base=VehicleModel(vehicle=VehicleSettings()), recorded=flights(("given",) * 2), **given | changed
     )
 
 
-def effects(*rows):
-    rows = [{**EFFECT, **row} for row in rows]
-    order = ("name", "kind", "named", "p_value", "share", "sentence")
-    coefficients = [(row["name"], *NUMBERS.get(row["kind"], OFFSET)) for row in rows]
-    return {
-        **table(
-            "effect",
-            ("'name", "'kind", "named", "p_value", "share", "'sentence"),
-            [[row[key] for key in order] for row in rows],
-        ),
-        **table(
-            "coefficient",
-            ("'effect", "'name", "'unit", "value", "low", "high", "plausible_low", "plausible_high"),
-            coefficients,
-        ),
-        **table("linear", ("'effect", "value"), [("com_offset", 0.01)]),
-        **table("shape", ("'effect", "'name", "value"), []),
-        **table("parameter", ("'name", "'unit", "value", "low", "high"), [("inertia_x", "1", 0.021, 0.01, 0.03)]),
-    }
+def gap_change(before=None, after=None, force=True):
+    """Make the gap before and after of what they are in noise floors."""
+    before = by_channel([40.0, 3.0, 0.9], force and [5.0, 4.0, 70.0]) if before is None else before
+    after = by_channel([1.1, 0.01, 0.9], force and [0.9, 0.8, 1.2]) if after is None else after
+    floor = 0.01234
+    return GapChange(
+        before=before * floor,
+        after=after * floor,
+        floor=np.where(np.isfinite(before), floor, np.nan),
+        before_floors=before,
+        after_floors=after,
+    )
 
 
-def sizes(force=True):
-    before = np.array([40.0, 3.0, 0.9, *([5.0, 4.0, 70.0] if force else [np.nan] * 3)])
-    after = np.array([1.1, 0.01, 0.9, *([0.9, 0.8, 1.2] if force else [np.nan] * 3)])
-    return {
-        "gap/channel": CHANNELS,
-        "gap/before": before * 0.01234,
-        "gap/after": after * 0.01234,
-        "gap/floor": np.where(np.isfinite(before), 0.01234, np.nan),
-        "gap/before_floors": before,
-        "gap/after_floors": after,
-    }
-
-
-def pictures():
-    time = np.arange(200) * 0.01
+def diagnosis(verdict="NAMED", named=("com_offset",), force=True, **changed):
+    """Make a diagnosis that names effects."""
+    time, gap = np.arange(200) * 0.01, gap_change(force=force)
     waves = np.sin(3 * time)[:, None] * np.ones(3)
-    return {
-        "picture/flight": np.array("two.csv"),
-        "picture/channel": np.array("torque x"),
-        "picture/time": time,
-        "picture/measured": waves[:, 0],
-        "picture/before": waves[:, 0] + 0.2,
-        "picture/after": waves[:, 0],
-        "run/flight": np.array("two.csv"),
-        "run/axis": 1,
-        "run/time": time,
-        "run/restart": np.array([0.0, 1.0]),
-        "run/measured": waves,
-        "run/before": waves + 30 * (time % 1.0)[:, None],
-        "run/after": waves,
-    }
-
-
-def diagnosis(verdict="NAMED", named=({},), alternatives=(), unexplained=(), sets=(), force=True, **changed):
-    data = {
-        "verdict": np.array(verdict),
+    before = np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, gap.before)
+    given = {
         "share": 0.973,
-        "split": np.array("no flight was held out by name"),
-        **effects(*named),
-        **sizes(force),
-        **played_pair(),
-        **table(
-            "stretch",
-            ("flight", "start", "end", "'channel", "floors"),
-            [(0, 5.0, 6.2, "torque x", 90.0), (0, 1.0, 2.5, "force z", 80.0)],
+        "share_by_kind": ByKind(torque=np.nan, force=np.nan),
+        "effects": tuple(map(effect, named)),
+        "not_excited": UNSEEN,
+        "vehicle_numbers": VEHICLE_NUMBERS,
+        "gap": gap,
+        "notes": ("A note that readers need.",),
+        "playback": played_pair(),
+        "worst": (GapStretch(0, 5.0, 6.2, "torque x", 90.0), GapStretch(0, 1.0, 2.5, "force z", 80.0)),
+        "residual": ResidualChange(
+            time=np.arange(WINDOWS) * 0.2,
+            flight=np.zeros(WINDOWS, dtype=int),
+            before=before,
+            parameters=before,
+            after=np.zeros((WINDOWS, 6)),
         ),
-        "residual/time": np.arange(WINDOWS) * 0.2,
-        "residual/flight": np.zeros(WINDOWS, dtype=int),
-        "residual/before": np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, sizes(force)["gap/before"]),
-        "residual/parameters": np.outer(np.arange(WINDOWS) < 0.75 * WINDOWS, sizes(force)["gap/before"]),
-        "residual/after": np.zeros((WINDOWS, 6)),
-        **pictures(),
-        **table("not_excited", ("'name", "'reason"), [("ground_effect", "fly near the ground")]),
-        **audit(),
-        "note": texts("A note that readers need."),
-    } | changed  # fmt: skip
-    kinds, listed = data.get("share_by_kind", [np.nan, np.nan]), {name: tuple(data.get(name, ())) for name in LISTED}
-    chosen = {path: each for path, each in data.items() if path != "gap/channel"}
-    return Diagnosis(
-        verdict=str(data["verdict"]),
-        contradictions=tuple(map(str, listed["impossible"])),
-        share=float(data["share"]),
-        share_by_kind=ByKind(torque=float(kinds[0]), force=float(kinds[1])),
-        differences=tuple(map(str, listed["difference"])),
-        effects=effects_of(data, named=True),
-        closest=effects_of(data, named=False),
-        alternatives=tuple(Alternative(*row) for row in alternatives),
-        sets=tuple(LikelySet(*row) for row in sets),
-        unexplained=tuple(
-            Unexplained(axis, floors, signal or None, part_, None if np.isnan(hz) else hz, energy)
-            for axis, floors, signal, part_, hz, energy in unexplained
+        "picture": WorstWindows(
+            flight="two.csv",
+            channel="torque x",
+            time=time,
+            measured=waves[:, 0],
+            before=waves[:, 0] + 0.2,
+            after=waves[:, 0],
         ),
-        not_excited=unseen(data),
-        vehicle_numbers=numbers_of(data),
-        gap=part(GapChange, chosen, "gap"),
-        notes=tuple(map(str, listed["note"])),
-        playback=along(PlaybackChange, data),
-        worst=stretches(data),
-        residual=part(ResidualChange, data, "residual"),
-        picture=part(
-            WorstWindows,
-            data | {f"picture/{name}": str(data[f"picture/{name}"]) for name in ("flight", "channel")},
-            "picture",
+        "run": FreeRuns(
+            flight="two.csv",
+            axis=1,
+            time=time,
+            restart=np.array([0.0, 1.0]),
+            measured=waves,
+            before=waves + 30 * (time % 1.0)[:, None],
+            after=waves,
         ),
-        run=part(FreeRuns, data | {"run/flight": str(data["run/flight"])}, "run"),
-        audit=audited(data),
-        split=str(data["split"]),
-        warnings=tuple(map(str, listed["warning"])),
-        base=VehicleModel(vehicle=VehicleSettings()),
-        recorded=flights(),
-    )
-
-
-LISTED = ("impossible", "difference", "note", "warning")
+        "audit": AUDIT,
+        "split": "no flight was held out by name",
+        "warnings": (),
+        **dict.fromkeys(("contradictions", "differences", "closest", "alternatives", "sets", "unexplained"), ()),
+    }
+    base = VehicleModel(vehicle=VehicleSettings())
+    return Diagnosis(verdict=verdict, base=base, recorded=flights(), **given | changed)
 
 
 def extended(**changed):
-    data = {**effects({}), **sizes(), **played_pair(), **audit()} | changed
+    given = {"effects": (effect(),), "vehicle_numbers": VEHICLE_NUMBERS, "gap": gap_change(), "playback": played_pair()}
     return Extended(
-        model=replace(VehicleModel(vehicle=VehicleSettings()), repairs=audited(data)),
+        model=replace(VehicleModel(vehicle=VehicleSettings()), repairs=AUDIT),
         inertia=np.array([0.61, 0.6, 1.2, 0.0, 0.0, 0.0]),
         thrust_scale=1.0123,
-        effects=effects_of(data, named=True),
-        vehicle_numbers=numbers_of(data),
-        gap=part(GapChange, {path: each for path, each in data.items() if path != "gap/channel"}, "gap"),
-        playback=along(PlaybackChange, data),
+        **given | changed,
     )
 
 

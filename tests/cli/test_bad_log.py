@@ -23,8 +23,8 @@ def rows():
     return np.column_stack([time, *angles, *torques])
 
 
-def table(delimiter=",", names=NAMES):
-    lines = [delimiter.join(names), *(delimiter.join(f"{value:.9g}" for value in row) for row in rows())]
+def table():
+    lines = [",".join(NAMES), *(",".join(f"{value:.9g}" for value in row) for row in rows())]
     return "\n".join(lines) + "\n"
 
 
@@ -46,31 +46,6 @@ def wrong(refuse, log_study, write, tmp_path):
         return [line.replace(str(log), "LOG") for line in lines]
 
     return call
-
-
-@pytest.mark.parametrize(
-    ("content", "name"),
-    [
-        (table(), "log.csv"),
-        (table(";"), "log.csv"),
-        (table("\t"), "log.csv"),
-        (table().replace("\n", "\r\n"), "log.csv"),
-        ("\ufeff" + table(), "log.csv"),
-        (gzip.compress(table().encode()), "log.csv.gz"),
-    ],
-    ids=["comma", "semicolon", "tab", "crlf", "bom", "gzip"],
-)
-def test_every_dialect_gives_the_same_flight(cpfls, log_study, write, tmp_path, content, name):
-    flight = tmp_path / "flight.h5"
-    summary = cpfls.summary("import", log_study, write(content, name), "-o", flight)
-    assert summary["samples"] == 200
-    assert not any(summary["dropped"].values())
-    assert summary["rate_hz"] == pytest.approx(50.0)
-    with h5py.File(flight) as file:
-        np.testing.assert_allclose(file["attitude"], rows()[:, 1:4], atol=1e-8)
-        np.testing.assert_allclose(file["body_torque"], rows()[:, 4:], atol=1e-8)
-        assert file["inputs/log"].attrs["name"] == name
-        assert file["inputs/log"].attrs["format"] == name.rsplit(".", 1)[-1]
 
 
 def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):

@@ -140,9 +140,7 @@ def asked(wrong):
 
 
 def output(command, config, *words):
-    result = run(command, config, *words, "--json")
-    assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout)
+    return run.summary(command, config, *words)
 
 
 @pytest.mark.parametrize("name", ["gyroscope mirrored about x", "spins swapped"])
@@ -167,8 +165,7 @@ def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
     wrong = WRONG[name]
     config, (first, second) = logs(wrong.sign)
     words = (first, "--held-out", second, "-o", tmp_path / "vehicle.h5", "--anyway", *asked(wrong))
-    result = run("vehicle", config, *words)
-    assert result.exit_code == 0, result.stderr
+    result = run.done("vehicle", config, *words)
     label, sentence = result.stdout.splitlines()[:2]
     assert label.startswith("DO NOT USE: ")
     assert sentence.startswith(f"  Do not use it. {begins(wrong)}{first.name}: ")
@@ -195,8 +192,9 @@ def test_vehicle_says_it_and_does_not_search(logs, options, tmp_path):
 def test_vehicle_searches_anyway_and_says_it_first(logs, option, says, tmp_path):
     wrong = WRONG[next(iter(WRONG))]
     config, (first, _) = logs(wrong.sign)
-    result = run("vehicle", config, first, "-o", tmp_path / "v.h5", "--dry-run", "--anyway", *option, *asked(wrong))
-    assert result.exit_code == 0
+    result = run.done(
+        "vehicle", config, first, "-o", tmp_path / "v.h5", "--dry-run", "--anyway", *option, *asked(wrong)
+    )
     assert (begins(wrong) in result.stderr) is says
     assert (wrong.words in result.stderr) is says
 
@@ -204,8 +202,7 @@ def test_vehicle_searches_anyway_and_says_it_first(logs, option, says, tmp_path)
 def test_replay_says_it_first(logs, tmp_path):
     wrong = WRONG["ENU declared NED"]
     config, (first, _) = logs(wrong.sign)
-    replayed = run("replay", config, "vehicle", first, "-o", tmp_path / "r.h5", "--every", "50", *asked(wrong))
-    assert replayed.exit_code == 0, replayed.stderr
+    replayed = run.done("replay", config, "vehicle", first, "-o", tmp_path / "r.h5", "--every", "50", *asked(wrong))
     assert replayed.stdout.startswith(f"REPLAY: {begins(wrong)}{first.name}: according to its attitude, {wrong.words}")
 
 
@@ -215,7 +212,7 @@ def test_a_model_identified_in_it_is_not_to_be_used_and_predict_says_it_first(lo
     for name, sign in (("wrong", wrong.sign), ("right", (1.0, 1.0, 1.0))):
         config, (first, _) = logs(sign)
         flight, model = tmp_path / f"{name}.h5", tmp_path / f"{name}-model.h5"
-        assert run("import", config, first, "-o", flight).exit_code == 0
+        run.done("import", config, first, "-o", flight)
         verdict = output("identify", config, flight, "-o", model)["verdict"]
         with warnings.catch_warnings(record=True) as noted:
             warnings.simplefilter("always")

@@ -106,10 +106,10 @@ def folder(cpfls, tmp_path_factory):
     save(folder / "rotors.csv", flight_table(1), "t,wx,wy,wz,ax,ay,az,motor_1,motor_2,motor_3,motor_4,volts")
     (folder / "mine.sdf").write_text(sdf_of(LARGE))
     (folder / "points.csv").write_text("x_m,y_m,z_m\n0,0,1\n1,0,1\n1,1,1\n")
-    assert cpfls("trajectory", study, "-o", path).exit_code == 0
+    cpfls.done("trajectory", study, "-o", path)
     for number in ("", 2, 3):
         flight = folder / f"flight{number}.h5"
-        assert cpfls("simulate", study, path, "-o", flight, "--seed", number or 1).exit_code == 0
+        cpfls.done("simulate", study, path, "-o", flight, "--seed", number or 1)
     return folder
 
 

@@ -51,8 +51,7 @@ def compile_and_test(source, folder):
 @pytest.mark.parametrize("form", ENDINGS)
 def test_the_model_of_a_study_is_exported(cpfls, pipeline, tmp_path, form):
     output = tmp_path / f"quad.{ENDINGS[form]}"
-    result = cpfls("export", pipeline.model, "--format", form, "-o", output, "--json")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("export", pipeline.model, "--format", form, "-o", output, "--json")
     assert result.stderr == ""
     summary = json.loads(result.stdout)
     files = sorted(path.name for path in tmp_path.iterdir())
@@ -80,8 +79,7 @@ def test_an_incomplete_model_is_refused_and_marked_with_force(cpfls, refuse, mod
         f"{model}: the search for this model did not come to its end (time-limit); `cpfls identify ... --resume` goes "
         "on, --anyway exports the model as it is, marked as incomplete"
     )
-    result = cpfls(*words, "--force", "--json")
-    assert result.exit_code == 0
+    result = cpfls.done(*words, "--force", "--json")
     assert json.loads(result.stdout)["complete"] is False
     assert result.stderr == "cpfls: note: the model is incomplete, and marked as such: do not fly with it\n"
     text = output.read_text()
@@ -110,8 +108,7 @@ def test_hostile_text_in_a_model_stays_text(cpfls, model, tmp_path, form):
         file["inputs/flight"].attrs["name"] = HOSTILE
     model.rename(hostile)
     output = tmp_path / f"m.{ENDINGS[form]}"
-    result = cpfls("export", hostile, "--format", form, "-o", output, "--force")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("export", hostile, "--format", form, "-o", output, "--force")
     if form == "json":
         document = json.loads(output.read_text())
         assert document["verdict"]["label"] == document["findings"][0] == HOSTILE
@@ -187,9 +184,9 @@ def test_output_rules(cpfls, refuse, model, tmp_path):
 
 def test_names(cpfls, refuse, pipeline, tmp_path):
     words = ("export", pipeline.model, "--format", "c", "-o", tmp_path / "2-m.c")
-    assert cpfls(*words).exit_code == 0
+    cpfls.done(*words)
     assert "unsigned model_2_m_inertia(" in (tmp_path / "2-m.h").read_text()
-    assert cpfls(*words, "--force", "--name", "Quad_7").exit_code == 0
+    cpfls.done(*words, "--force", "--name", "Quad_7")
     assert "#define QUAD_7_OUTSIDE 1u" in (tmp_path / "2-m.h").read_text()
     (line,) = refuse(*words, "--force", "--name", "x; int y")
     assert line == "--name x; int y: not an identifier; use letters, digits and underscores, a letter first"
@@ -202,7 +199,7 @@ def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):
     for form, ending, whose in (("pyflyt", "urdf", "a model of PyFlyt"), ("webots", "proto", "a PROTO of Webots")):
         (line,) = refuse(*words, tmp_path / f"m.{ending}", "--format", form)
         assert line == f"--name uav: {whose} is named after its file; leave --name out, or rename -o"
-    assert cpfls(*words, tmp_path / "m.json").exit_code == 0
+    cpfls.done(*words, tmp_path / "m.json")
     assert json.loads((tmp_path / "m.json").read_text())["name"] == "uav"
 
 
@@ -213,7 +210,7 @@ def test_the_suffix_tells_the_form(cpfls, pipeline, tmp_path, form):
     assert json.loads(result.stdout)["format"] == form
     answer = tmp_path / "told" / output.name
     answer.parent.mkdir()
-    assert cpfls("export", pipeline.model, "--format", form, "-o", answer).exit_code == 0
+    cpfls.done("export", pipeline.model, "--format", form, "-o", answer)
     assert answer.read_bytes() == output.read_bytes()
 
 
@@ -242,15 +239,14 @@ def test_a_module_that_nobody_could_import(cpfls, refuse, pipeline, tmp_path, st
     (line,) = refuse("export", pipeline.model, "--format", "jax", "-o", output)
     assert line.startswith(f"{output}: Python cannot import a module of this name; use letters, digits and _")
     assert line.endswith(f"such as {instead}.py")
-    assert cpfls("export", pipeline.model, "--format", "jax", "-o", tmp_path / f"{instead}.py").exit_code == 0
+    cpfls.done("export", pipeline.model, "--format", "jax", "-o", tmp_path / f"{instead}.py")
 
 
 @pytest.mark.parametrize("form", ENDINGS)
 def test_a_model_without_verdict_is_told(cpfls, model, tmp_path, form):
     change(model, verdict=None)
     output = tmp_path / f"m.{ENDINGS[form]}"
-    result = cpfls("export", model, "-o", output)
-    assert result.exit_code == 0
+    result = cpfls.done("export", model, "-o", output)
     assert result.stderr.startswith(f"cpfls: note: {model}: holds no verdict (")
     assert len(result.stderr.splitlines()) == 1
     assert "\nVerdict: none; the model holds no validation.\n" in result.stdout
@@ -269,8 +265,7 @@ def test_a_model_that_was_judged_unfit_is_marked(cpfls, refuse, model, tmp_path)
     (line,) = refuse("export", model, "-o", tmp_path / "m.c")
     assert line == f"{model}: its verdict is do-not-use; --anyway exports it, marked as such"
     assert not (tmp_path / "m.c").exists()
-    result = cpfls("export", model, "-o", tmp_path / "m.c", "--force")
-    assert result.exit_code == 0
+    result = cpfls.done("export", model, "-o", tmp_path / "m.c", "--force")
     assert "DO NOT USE: this is the verdict on the model" in (tmp_path / "m.c").read_text()
     assert result.stderr == (
         f"cpfls: note: {model}: its verdict is do-not-use, exported all the same: it explains nothing\n"
@@ -313,7 +308,7 @@ def test_the_controller_of_the_page_compiles_and_asks_for_the_torque_of_the_mode
     if shutil.which("gcc") is None:
         pytest.skip("no gcc on this machine")
     for form, name in (("c", "quad.c"), ("jax", "quad.py")):
-        assert cpfls("export", pipeline.model, "--format", form, "-o", tmp_path / name).exit_code == 0
+        cpfls.done("export", pipeline.model, "--format", form, "-o", tmp_path / name)
     code, _ = blocks("c")
     (tmp_path / "control.c").write_text(code)
     (tmp_path / "main.c").write_text(FLIGHT)
@@ -338,7 +333,7 @@ def test_the_commands_of_the_page_run(cpfls, pipeline, tmp_path, monkeypatch):
     first, self_test, autopilots, _ = blocks("sh")
     for line in [*first.splitlines(), *autopilots.splitlines()]:
         words = line.split("#")[0].split()
-        assert cpfls(*words[1:], "--force").exit_code == 0
+        cpfls.done(*words[1:], "--force")
     assert "uav_torque" in (tmp_path / "quad.h").read_text()
     if shutil.which("cc"):
         assert subprocess.run(self_test, shell=True, check=False, capture_output=True).returncode == 0

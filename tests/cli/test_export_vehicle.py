@@ -48,8 +48,7 @@ def self_test(output):
 def test_a_vehicle_is_exported(cpfls, vehicle, tmp_path, form):
     output = tmp_path / "out" / f"quad.{ENDINGS[form]}"
     output.parent.mkdir()
-    result = cpfls("export", vehicle, "-o", output, "--json")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("export", vehicle, "-o", output, "--json")
     assert result.stderr == ""
     summary = json.loads(result.stdout)
     assert sorted(summary["output"]) == sorted(str(path) for path in output.parent.iterdir())
@@ -87,9 +86,7 @@ def test_what_an_export_cannot_hold_is_named_on_the_screen_and_in_the_file(cpfls
     beside = ModelEffect("ground_effect", {"G": 1.2}, none), ModelEffect("battery_sag", {"exponent": 1.5}, none)
     model = replace(whole(effects=beside, remainder=None), wind=(3.0, 0.5, 0.0))
     write_vehicle(path, vehicle_of(model))
-    result = cpfls("export", path, "-o", output, "--json")
-    assert result.exit_code == 0, result.stderr
-    titles = [each["title"] for each in json.loads(result.stdout)["missing"]]
+    titles = [each["title"] for each in cpfls.summary("export", path, "-o", output)["missing"]]
     # Nothing of this vehicle meets the air, so that the wind does nothing.
     assert [title.partition(" (")[0] for title in titles] == ["battery sag", "ground effect"]
     assert titles[0].endswith("; exponent = 1.5)")
@@ -149,7 +146,7 @@ def test_the_page_predicts_what_the_library_does(cpfls, tmp_path, monkeypatch):
     write_vehicle(tmp_path / "extended.h5", vehicle_of(model))
     (commands,), (code,) = blocks("sh"), blocks("c")
     for line in commands.splitlines():
-        assert cpfls(*line.split("#")[0].split()[1:]).exit_code == 0, line
+        cpfls.done(*line.split("#")[0].split()[1:])
     (tmp_path / "main.c").write_text(FLIGHT)
     (tmp_path / "predict.c").write_text(code)
     program = build(tmp_path, ["main.c", "predict.c", "uav.c"])
@@ -214,9 +211,7 @@ def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form
         file["inputs/flight"].attrs["name"] = HOSTILE
     output = tmp_path / f"uav{FORMS[form].ending}"
     words = ("export", path, "--format", form, "-o", output)
-    result = cpfls(*words, "--json")
-    assert result.exit_code == 0, result.stderr
-    summary = json.loads(result.stdout)
+    summary = cpfls.summary(*words)
     sizes = [Path(written).stat().st_size for written in summary["output"]]
     assert (summary["format"], summary["rotors"], summary["bytes"]) == (form, 4, sum(sizes))
     assert summary["output"][-1] == str(output)
@@ -239,7 +234,7 @@ def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form
 
 def test_links_of_gazebo_are_bodies_and_weigh_what_the_vehicle_does(cpfls, vehicle_file, tmp_path):
     output = tmp_path / "uav.sdf"
-    assert cpfls("export", vehicle_file, "-o", output, "--name", "my_quad").exit_code == 0
+    cpfls.done("export", vehicle_file, "-o", output, "--name", "my_quad")
     model = read("sdf", output).find("model")
     assert model.get("name") == "my_quad"
     links = model.findall("link")
@@ -255,14 +250,14 @@ def test_links_of_gazebo_are_bodies_and_weigh_what_the_vehicle_does(cpfls, vehic
 @pytest.mark.skipif(shutil.which("gz") is None, reason="no gz, which checks SDF, on this machine")
 def test_gazebo_takes_the_file(cpfls, vehicle_file, tmp_path):
     output = tmp_path / "uav.sdf"
-    assert cpfls("export", vehicle_file, "-o", output).exit_code == 0
+    cpfls.done("export", vehicle_file, "-o", output)
     done = subprocess.run(["gz", "sdf", "-k", output], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_px4_gets_its_sensors_and_an_airframe(cpfls, vehicle_file, tmp_path):
     output = tmp_path / "uav.sdf"
-    assert cpfls("export", vehicle_file, "--format", "px4", "-o", output).exit_code == 0
+    cpfls.done("export", vehicle_file, "--format", "px4", "-o", output)
     model = read("px4", output).find("model")
     names = [sensor.get("name") for sensor in model.findall("link[@name='base_link']/sensor")]
     assert names == ["imu_sensor", "air_pressure_sensor", "magnetometer_sensor", "navsat_sensor"]
@@ -287,7 +282,7 @@ def test_px4_gets_its_sensors_and_an_airframe(cpfls, vehicle_file, tmp_path):
 
 def test_a_section_of_toml_has_what_the_dynamics_take(cpfls, vehicle_file, tmp_path):
     output = tmp_path / "uav.toml"
-    assert cpfls("export", vehicle_file, "-o", output).exit_code == 0
+    cpfls.done("export", vehicle_file, "-o", output)
     (name, section), *_ = read("crazyflow", output).items()
     assert name == "uav"
     assert section["mass"] == 0.8
@@ -302,7 +297,7 @@ def test_a_section_of_toml_has_what_the_dynamics_take(cpfls, vehicle_file, tmp_p
 def test_urdf_is_read_by_a_parser_of_others(cpfls, vehicle_file, tmp_path):
     yourdfpy = pytest.importorskip("yourdfpy", reason="needs the package yourdfpy, which reads URDF")
     output = tmp_path / "uav.urdf"
-    assert cpfls("export", vehicle_file, "-o", output).exit_code == 0
+    cpfls.done("export", vehicle_file, "-o", output)
     robot = yourdfpy.URDF.load(str(output), load_meshes=False, build_scene_graph=False).robot
     links = {link.name: link.inertial for link in robot.links}
     assert links["base_link"].mass == 0.8
@@ -315,7 +310,7 @@ def test_urdf_is_read_by_a_parser_of_others(cpfls, vehicle_file, tmp_path):
 
 def test_a_frame_of_ardupilot_has_its_keys_in_its_order(cpfls, vehicle_file, tmp_path):
     output = tmp_path / "uav.json"
-    assert cpfls("export", vehicle_file, "--format", "ardupilot", "-o", output).exit_code == 0
+    cpfls.done("export", vehicle_file, "--format", "ardupilot", "-o", output)
     keys, known = read("ardupilot", output), truth().vehicle
     assert (keys["mass"], keys["num_motors"], keys["propExpo"]) == (0.8, 4, 1.0)
     assert keys["moment_inertia"] == pytest.approx(known.inertia_kg_m2[:3])
@@ -337,15 +332,14 @@ def test_a_frame_of_ardupilot_has_its_keys_in_its_order(cpfls, vehicle_file, tmp
 def test_an_airframe_says_where_a_range_holds_the_hover_thrust(cpfls, tmp_path):
     light = replace(truth(), vehicle=replace(truth().vehicle, rotor_speed_max_rad_s=6000.0))
     write_vehicle(tmp_path / "light.h5", vehicle_of(light))
-    assert cpfls("export", tmp_path / "light.h5", "--format", "px4", "-o", tmp_path / "uav.sdf").exit_code == 0
+    cpfls.done("export", tmp_path / "light.h5", "--format", "px4", "-o", tmp_path / "uav.sdf")
     text = " ".join((tmp_path / "uav.airframe").read_text().replace("#", " ").split())
     assert "param set-default MPC_THR_HOVER 0.1 " in text + " "
     assert "outside PX4's range of 0.1 to 0.8" in text
 
 
 def test_an_identified_model_is_exported_as_a_vehicle(cpfls, pipeline, tmp_path):
-    result = cpfls("export", pipeline.model, "--format", "casadi", "-o", tmp_path / "quad.py", "--force")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("export", pipeline.model, "--format", "casadi", "-o", tmp_path / "quad.py", "--force")
     assert "CasADi holds all of it." in result.stdout
     assert "inertia over attitude" not in result.stdout
 
@@ -373,8 +367,7 @@ def test_a_vehicle_that_should_not_be_used(cpfls, refuse, vehicle_file, tmp_path
     output = tmp_path / f"uav.{ending}"
     (line,) = refuse("export", vehicle_file, "-o", output)
     assert line == f"{vehicle_file}: its verdict is do-not-use; --anyway exports it, marked as such"
-    result = cpfls("export", vehicle_file, "-o", output, "--force")
-    assert result.exit_code == 0
+    result = cpfls.done("export", vehicle_file, "-o", output, "--force")
     mark = "DO NOT USE: this is the verdict on the model"
     assert mark in result.stdout
     assert mark in output.read_text()[:600]

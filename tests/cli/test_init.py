@@ -28,28 +28,33 @@ def proposed(cpfls, tmp_path):
     """Run init, and give what it printed, what it wrote and that as data."""
 
     def call(*words, output="study.yaml"):
-        result = cpfls("init", *words, "-o", tmp_path / output)
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("init", *words, "-o", tmp_path / output)
         text = (tmp_path / output).read_text()
         return result, text, yaml.safe_load(text)
 
     return call
 
 
-def test_the_next_commands_take_what_it_wrote(cpfls, proposed, log, tmp_path):
-    proposed(log, "--mass", MASS, "--arm", ARM)
-    study, made = tmp_path / "study.yaml", tmp_path / "flight.h5"
-    imported = cpfls("import", study, log, "-o", made, "--json")
-    assert imported.exit_code == 0, imported.stderr
-    summary = json.loads(imported.stdout)
+@pytest.fixture(scope="module")
+def usual(cpfls, own, tmp_path_factory):
+    """A log, the config that `init` writes for it with mass and arm, and what it says."""
+    folder = tmp_path_factory.mktemp("usual")
+    log, study = write_csv(folder / "log.csv", flat_log(own)), folder / "study.yaml"
+    return log, study, cpfls.done("init", log, "--mass", MASS, "--arm", ARM, "-o", study).stdout
+
+
+def test_the_next_commands_take_what_it_wrote(cpfls, usual, tmp_path):
+    (log, study, _), made = usual, tmp_path / "flight.h5"
+    summary = cpfls.summary("import", study, log, "-o", made)
     assert {"attitude", "body_rate", "specific_force", "position", "velocity", "rotor_speed"} <= set(summary["signals"])
     assert summary["samples"] == 2000
-    found = cpfls("vehicle", study, made, "-o", tmp_path / "vehicle.h5", "--dry-run")
-    assert found.exit_code == 0, found.stderr
+    cpfls.done("vehicle", study, made, "-o", tmp_path / "vehicle.h5", "--dry-run")
 
 
-def test_every_guess_has_its_reason_in_the_file_and_in_the_answer(proposed, log):
-    result, text, data = proposed(log, "--mass", MASS, "--arm", ARM)
+def test_every_guess_has_its_reason_in_the_file_and_in_the_answer(usual):
+    _, study, said = usual
+    text = study.read_text()
+    data = yaml.safe_load(text)
     signals = data["import"]["signals"]
     assert signals["body_rate"] == {"columns": ["gyro_x", "gyro_y", "gyro_z"], "unit": "rad/s"}
     assert signals["rotor_speed"]["unit"] == "rpm"
@@ -57,7 +62,7 @@ def test_every_guess_has_its_reason_in_the_file_and_in_the_answer(proposed, log)
     for name in (*signals, *(key for key in ("body_frame", "world_frame", "acceleration_frame") if key in text)):
         place = next(index for index, line in enumerate(lines) if line.strip().startswith(f"{name}:"))
         assert lines[place - 1].strip().startswith("#"), name
-        assert name in result.stdout
+        assert name in said
     assert max(len(line) for line in lines if line.lstrip().startswith("#")) <= 110
     assert [rotor["spin"] for rotor in data["vehicle"]["rotors"]] == [spin for _, _, spin in HUBS]
     assert [rotor["position_m"][:2] for rotor in data["vehicle"]["rotors"]] == [
@@ -93,21 +98,20 @@ def test_what_only_a_person_knows_is_asked_for_and_refused_in_one_sentence(cpfls
         assert refuse(*words) == [sentence]
     filled = text.replace("mass_kg: ASK", "mass_kg: 0.8").replace("position_m: ASK", "position_m: [0.1, 0.1, 0.0]")
     study.write_text(filled)
-    assert cpfls("config", study).exit_code == 0
+    cpfls.done("config", study)
     study.write_text(filled.replace("mass_kg: 0.8", "mass_kg: ASK"))
     assert refuse("config", study) == [
         f"{study}: vehicle.mass_kg = ASK: no log says it; write what is true of the vehicle in place of ASK, such as"
         " mass_kg: 0.8 (kg, with battery); cpfls init --mass KG fills it in"
     ]
-    assert cpfls("config", study, "--set", "vehicle.mass_kg=0.8").exit_code == 0
+    cpfls.done("config", study, "--set", "vehicle.mass_kg=0.8")
 
 
-def test_the_same_log_gives_the_same_file_and_never_over_another(proposed, refuse, log, tmp_path):
-    _, text, _ = proposed(log, "--mass", MASS)
-    assert refuse("init", log, "-o", tmp_path / "study.yaml") == [
-        f"{tmp_path / 'study.yaml'}: exists already; --force replaces it"
-    ]
-    assert proposed(log, "--mass", MASS, "--force")[1] == text
+def test_the_same_log_gives_the_same_file_and_never_over_another(proposed, refuse, usual, tmp_path):
+    log, study, _ = usual
+    assert refuse("init", log, "-o", study) == [f"{study}: exists already; --force replaces it"]
+    (tmp_path / "study.yaml").write_text("seed: 1\n")
+    assert proposed(log, "--mass", MASS, "--arm", ARM, "--force")[1] == study.read_text()
 
 
 def test_the_answer_for_machines(proposed, log):
@@ -166,8 +170,7 @@ def test_logs_of_two_versions_share_a_config_by_columns_that_stand_in(cpfls, pro
     stand_in = data["import"]["signals"]["body_rate"]["otherwise"]
     assert stand_in == [{"columns": [f"sensor_combined.gyro_rad[{axis}]" for axis in range(3)], "unit": "rad/s"}]
     for log in (first, second):
-        result = cpfls("import", tmp_path / "study.yaml", log, "-o", tmp_path / f"{log.stem}.h5")
-        assert result.exit_code == 0, result.stderr
+        cpfls.done("import", tmp_path / "study.yaml", log, "-o", tmp_path / f"{log.stem}.h5")
 
 
 def test_logs_with_clocks_of_other_names_are_refused(refuse, tmp_path, own):
@@ -185,9 +188,7 @@ def test_logs_that_are_cut_differently_each_get_their_own_cut(cpfls, proposed, t
     _, text, data = proposed(first, second, "--mass", MASS, "--arm", ARM, "--json")
     assert data["import"]["crop_s"] == "flown"
     begin, end = map(float, re.search(r"two\.csv: \[(15\.\d+), (3\d\.\d+)\]", text).groups())
-    made = cpfls("import", tmp_path / "study.yaml", second, "-o", tmp_path / "two.h5", "--json")
-    assert made.exit_code == 0, made.stderr
-    summary = json.loads(made.stdout)
+    summary = cpfls.summary("import", tmp_path / "study.yaml", second, "-o", tmp_path / "two.h5")
     assert summary["samples"] == pytest.approx(100 * (end - begin), abs=3)
 
 
@@ -267,7 +268,7 @@ def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tm
         for y in (0.1, -0.1)
     ]
     (tmp_path / "study.yaml").write_text(text.replace("rotors: ASK", f"rotors: {json.dumps(stated)}"))
-    assert cpfls("import", tmp_path / "study.yaml", path, "-o", tmp_path / "flight.h5").exit_code == 0
+    cpfls.done("import", tmp_path / "study.yaml", path, "-o", tmp_path / "flight.h5")
     assert "The log has no columns of rotors" in text
 
 
@@ -396,8 +397,7 @@ def test_constants_that_are_known_are_options(cpfls, proposed, log, tmp_path):
     assert data["vehicle"]["inertia_kg_m2"] == [0.004, 0.0044, 0.0075]
     for rotor in data["vehicle"]["rotors"]:
         assert (float(rotor["thrust_factor_n_s2"]), float(rotor["drag_factor_n_m_s2"])) == (6e-6, 1.4e-7)
-    compared = cpfls("compare", tmp_path / "study.yaml", log, "-o", tmp_path / "gap.h5", "--dry-run")
-    assert compared.exit_code == 0, compared.stderr
+    cpfls.done("compare", tmp_path / "study.yaml", log, "-o", tmp_path / "gap.h5", "--dry-run")
 
 
 @pytest.mark.parametrize(("by", "mass"), [("speed", 37.0), ("speed", 44.0), ("command", 44.0), ("accelerometer", 44.0)])
@@ -407,7 +407,7 @@ def test_two_masses_in_one_config_are_said_by_how_much(proposed, tmp_path, own, 
     size = 0.6 / own.speed.mean() if by == "command" else 1.0
     logs = []
     for number, (seed, ratio) in enumerate([(3, 1.0), (5, (mass / 37.0) ** 0.5)]):
-        other = flight(seconds=20.0, seed=seed)
+        other = flight(seconds=12.0, seed=seed)
         values = {"speed": named(size * ratio * other.speed, *columns)}
         values |= {} if by == "accelerometer" else {"force": None}
         logs.append(write_csv(tmp_path / f"{number}.csv", flat_log(other, **values)))
@@ -432,7 +432,7 @@ def test_how_two_pilots_fly_is_no_mass(proposed, tmp_path, own):
     """Squared commands of punches and dives are larger on average, and the vehicle is the same."""
     logs = []
     for number in range(2):
-        other = flight(seconds=20.0, seed=3 + number)
+        other = flight(seconds=12.0, seed=3 + number)
         punches = 1 + number * (0.3 + 0.5 * np.sign(np.sin(1.5 * other.time)))
         values = 0.4 / own.speed.mean() * np.sqrt(punches)[:, None] * other.speed
         commands = named(values, *(f"cmd{motor}" for motor in range(1, 5)))
@@ -449,7 +449,7 @@ def test_an_emptier_battery_is_no_mass(proposed, tmp_path, own, volts, heavier):
     """A fifth more of command at a tenth less of voltage is the same thrust."""
     logs = []
     for number, battery in enumerate((16.0, volts)):
-        other = flight(seconds=20.0, seed=3 + number)
+        other = flight(seconds=12.0, seed=3 + number)
         values = 0.6 / own.speed.mean() * (1.19 if number else 1.0) ** 0.5 * other.speed
         commands = named(values, *(f"cmd{motor}" for motor in range(1, 5)))
         more = {"voltage": {"battery_voltage": battery - 0.001 * other.time}}
@@ -499,7 +499,7 @@ def test_an_arm_beside_places_that_a_log_states_is_asked_for(cpfls, refuse, tmp_
     log.write_bytes(ulog_of_flight(own))
     (line,) = refuse("init", log, "-o", tmp_path / "study.yaml", "--arm", "0.3")
     assert "leave --arm out to take these, or add --scale-to-arm" in line
-    assert cpfls("init", log, "-o", tmp_path / "study.yaml", "--arm", "0.3", "--scale-to-arm").exit_code == 0
+    cpfls.done("init", log, "-o", tmp_path / "study.yaml", "--arm", "0.3", "--scale-to-arm")
 
 
 def test_a_log_of_a_moment_says_how_short_it_is(refuse, tmp_path):

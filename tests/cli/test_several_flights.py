@@ -157,8 +157,7 @@ def log(flown, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def config(log):
-    done = run("init", log, "-o", log.with_name("study.yaml"), "--mass", 1.2)
-    assert done.exit_code == 0, done.output
+    done = run.done("init", log, "-o", log.with_name("study.yaml"), "--mass", 1.2)
     said = "rotor commands are rebuilt from vehicle_torque_setpoint and CA_ROTOR*: 50 Hz instead of 10; they explain"
     assert said in " ".join(done.output.split())
     assert "too slow" not in done.output

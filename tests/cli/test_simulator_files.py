@@ -28,8 +28,7 @@ def folder(tmp_path_factory):
 
 def test_init_writes_the_vehicle_with_its_lines(cpfls, folder, tmp_path):
     output = tmp_path / "study.yaml"
-    result = cpfls("init", "--from", folder / "mine.sdf", "-o", output)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("init", "--from", folder / "mine.sdf", "-o", output)
     assert "mine.sdf, Gazebo: 0.04500 kg" in result.stdout
     text, vehicle = output.read_text(), load_study(output).vehicle
     assert "# mine.sdf line 8: <mass> of link base_link, and 4 more links" in text
@@ -42,8 +41,7 @@ def test_init_writes_the_vehicle_with_its_lines(cpfls, folder, tmp_path):
 
 def test_init_takes_the_log_too(cpfls, folder, tmp_path):
     output = tmp_path / "study.yaml"
-    result = cpfls("init", "--from", folder / "mine.sdf", folder / "log0.csv", "-o", output, "--mass", "0.05")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("init", "--from", folder / "mine.sdf", folder / "log0.csv", "-o", output, "--mass", "0.05")
     study = load_study(output)
     assert study.vehicle.mass_kg == 0.05
     assert "in place of the file's 0.045 kg" in output.read_text()
@@ -53,8 +51,7 @@ def test_init_takes_the_log_too(cpfls, folder, tmp_path):
 def test_rotors_that_turn_the_other_way_in_the_log_are_named(cpfls, folder, tmp_path):
     mine = tmp_path / "turned.sdf"
     mine.write_text(sdf_of(TRUE, spins=(-1, 1, -1, -1)))
-    result = cpfls("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
     assert "rotor_3 turns clockwise in the file and counter-clockwise by the log" in result.stderr
     assert [rotor.spin for rotor in load_study(tmp_path / "study.yaml").vehicle.rotors] == [-1, 1, -1, 1]
 
@@ -79,10 +76,9 @@ def test_gap_writes_the_corrected_file_and_leaves_mine(cpfls, folder, tmp_path):
     mine = folder / "mine.sdf"
     before, output = mine.read_bytes(), tmp_path / "gap"
     words = ("gap", mine, folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", output)
-    assert cpfls(*words, "--dry-run").exit_code == 0
+    cpfls.done(*words, "--dry-run")
     assert not output.exists()
-    result = cpfls(*words)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done(*words)
     assert mine.read_bytes() == before
     said = json.loads((output / "gap.json").read_text())["corrected"]
     (change,) = said["changes"]
@@ -92,8 +88,7 @@ def test_gap_writes_the_corrected_file_and_leaves_mine(cpfls, folder, tmp_path):
     assert "-      &lt;motorConstant&gt;2.4e-08" in (output / "report.html").read_text()
     assert {path.name for path in output.iterdir()} >= {"study.yaml", "mine.sdf", "report.html", "extended.h5"}
     # What was made of the file is a study like any other.
-    again = cpfls("gap", output / "study.yaml", folder / "log0.csv", folder / "log1.csv", "-o", tmp_path / "again")
-    assert again.exit_code == 0, again.stderr
+    cpfls.done("gap", output / "study.yaml", folder / "log0.csv", folder / "log1.csv", "-o", tmp_path / "again")
     assert "corrected" in json.loads((tmp_path / "again" / "gap.json").read_text())
 
 
@@ -109,8 +104,7 @@ def test_a_second_fit_that_is_refused_leaves_the_first(cpfls, folder, tmp_path, 
 
     monkeypatch.setattr(extend, "refitted", refused)
     words = ("gap", folder / "mine.sdf", folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", tmp_path / "gap")
-    result = cpfls(*words)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done(*words)
     assert len(asked) == 2
     model = cpfls.summary("info", tmp_path / "gap" / "extended.h5")
     assert "parameter_error" in json.dumps(model)
@@ -154,8 +148,7 @@ def test_a_file_without_rotors_takes_those_of_the_log(cpfls, folder, tmp_path):
         '<mujoco><worldbody><body name="b"><freejoint/><inertial pos="0 0 0" mass="0.045" '
         'diaginertia="3.7e-5 4.2e-5 6.6e-5"/></body></worldbody></mujoco>'
     )
-    result = cpfls("init", "--from", mine, folder / "log0.csv", "-o", output, "--arm", "0.046")
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("init", "--from", mine, folder / "log0.csv", "-o", output, "--arm", "0.046")
     vehicle = load_study(output).vehicle
     assert vehicle.unknown == ("drag_factor", "thrust_factor")
     np.testing.assert_allclose([r.position_m[:2] for r in vehicle.rotors], TRUE.places, atol=1e-4)
@@ -197,8 +190,7 @@ def test_a_direction_that_nobody_states_is_asked_for(cpfls, refuse, folder, tmp_
     """The first actuator turns nothing: its spin is that of a log that is sure of it, and else asked for."""
     mine = tmp_path / "mine.xml"
     mine.write_text(ROUND)
-    result = cpfls("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
     assert [rotor.spin for rotor in load_study(tmp_path / "study.yaml").vehicle.rotors] == [-1, 1, -1, 1]
     # Rotors of another time say nothing of the motion.
     header, *rows = (folder / "log0.csv").read_text().splitlines()

@@ -14,8 +14,7 @@ CONFIG = Path(__file__).parents[2] / "configs" / "crazyflie.yaml"
 
 
 def summary_of(*words):
-    result = run(*words)
-    assert result.exit_code == 0, result.stderr
+    result = run.done(*words)
     return json.loads(result.stdout)
 
 
@@ -57,8 +56,7 @@ def test_the_file_tells_what_was_done_about_the_gap(study):
 @pytest.mark.usefixtures("drawn")
 def test_the_page_tells_it_too(study):
     page = study.flight.with_name("page.html")
-    result = run("report", CONFIG, study.flight, "-o", page)
-    assert result.exit_code == 0, result.stderr
+    run.done("report", CONFIG, study.flight, "-o", page)
     assert "gaps in the time stamps, up to 0.0595 s: interpolated" in page.read_text()
 
 

@@ -1,5 +1,6 @@
 """Flights with the centre of mass off, and what `cpfls gap` finds in them."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,9 +26,10 @@ def shifted(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def offset_answer(cpfls, gap_config, shifted, tmp_path_factory):
-    """The folder that `cpfls gap` fills from these flights, and its summary; nobody writes into it."""
+    """The folder that `cpfls gap` fills from these flights, what it says and its summary; nobody writes into it."""
     folder = tmp_path_factory.mktemp("found") / "gap"
-    return SimpleNamespace(folder=folder, summary=cpfls.summary("gap", gap_config, *shifted, "-o", folder))
+    stdout = cpfls.done("gap", gap_config, *shifted, "-o", folder, "-v").stdout
+    return SimpleNamespace(folder=folder, stdout=stdout, summary=json.loads((folder / "gap.json").read_text()))
 
 
 @pytest.fixture(scope="session")

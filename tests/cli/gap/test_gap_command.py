@@ -18,19 +18,12 @@ def found(offset_answer):
 
 
 @pytest.fixture(scope="module")
-def again(cpfls, gap_config, shifted, tmp_path_factory):
-    """The same again, for people."""
-    folder = tmp_path_factory.mktemp("again") / "gap"
-    result = cpfls.done("gap", gap_config, *shifted, "-o", folder, "-v")
-    return SimpleNamespace(folder=folder, stdout=result.stdout)
-
-
-@pytest.fixture(scope="module")
-def none(cpfls, gap_config, exact, tmp_path_factory):
+def none(cpfls, gap_config, exact, offset_answer, tmp_path_factory):
+    """Flights without a secret, in a folder with the files of others before and one of the user."""
     folder = tmp_path_factory.mktemp("none") / "gap"
-    result = cpfls("gap", gap_config, *exact, "-o", folder, "--json")
-    assert result.exit_code == 0, result.stderr
-    return SimpleNamespace(folder=folder, summary=json.loads(result.stdout))
+    shutil.copytree(offset_answer.folder, folder)
+    (folder / "notes.txt").write_text("mine")
+    return SimpleNamespace(folder=folder, summary=cpfls.summary("gap", gap_config, *exact, "-o", folder, "--force"))
 
 
 @pytest.mark.decides
@@ -63,7 +56,6 @@ def test_json_has_every_promised_key(found):
     assert set(found.summary["effects"][0]) == {
         "name", "coefficients", "identified", "p_value", "share", "sentence",
     }  # fmt: skip
-    assert json.loads((found.folder / "gap.json").read_text()) == found.summary
     assert {"findings", "warnings"} <= set(found.summary["audit"])
 
 
@@ -113,8 +105,8 @@ def test_one_flight_is_split_in_time(cpfls, gap_config, shifted, tmp_path):
         assert file["recorded/flight-2/time"][0] == pytest.approx(16.0)
 
 
-def test_people_read_the_verdict_first(again, shifted):
-    lines = again.stdout.splitlines()
+def test_people_read_the_verdict_first(found, shifted):
+    lines = found.stdout.splitlines()
     assert lines[0] == "NAMED: What the model misses is offset of the centre of mass."
     assert lines[1].startswith("  Offset of the centre of mass (com_offset): c_x = 0.0079")
     assert [line.split("  ")[0] for line in lines[2:6]] == ["Gap", "How sure", "Where", "Next"]
@@ -131,7 +123,7 @@ def test_people_read_the_verdict_first(again, shifted):
     assert re.match(r"playback, body rate +rad/s +0\.\d+ +0\.0\d+ +0\.\d+ +better than “rate fades”", rows[2])
     assert any(line.startswith("The gap in the torque about y (pitch) follows thrust") for line in lines)
     assert any(line.endswith("extended.h5: the model with offset of the centre of mass.") for line in lines)
-    folder, words = again.folder, lines[-1].split()
+    folder, words = found.folder, lines[-1].split()
     assert lines[-2] == "next:"
     assert words[:2] == ["cpfls", "replay"]
     assert words[3:5] == [str(folder / "extended.h5"), str(shifted[0])]
@@ -148,15 +140,12 @@ def test_nothing_hidden_nothing_named(none):
     assert none.summary["effects"] == []
     assert none.summary["extension"]["written"] is False
     assert "NO_GAP" in none.summary["extension"]["reason"]
-    assert {path.name for path in none.folder.iterdir()} == FILES - {"extended.h5"}
     assert max(none.summary["gap_before"]["floors"]) < 1.5
+    assert json.loads((none.folder / "gap.json").read_text()) == none.summary
 
 
-def test_a_later_run_leaves_no_file_of_an_earlier_one(cpfls, gap_config, found, exact, tmp_path):
-    shutil.copytree(found.folder, tmp_path / "x")
-    (tmp_path / "x" / "notes.txt").write_text("mine")
-    cpfls.done("gap", gap_config, *exact, "-o", tmp_path / "x", "-q", "--force")
-    assert {path.name for path in (tmp_path / "x").iterdir()} == (FILES - {"extended.h5"}) | {"notes.txt"}
+def test_a_later_run_leaves_no_file_of_an_earlier_one(none):
+    assert {path.name for path in none.folder.iterdir()} == (FILES - {"extended.h5"}) | {"notes.txt"}
 
 
 def test_extended_model_holds_the_effect_and_the_inertia(found):

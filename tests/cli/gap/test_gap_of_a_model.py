@@ -11,9 +11,7 @@ import cpfls_cli
 @pytest.fixture(scope="module")
 def answer(cpfls, gap_config, pipeline, with_attitude, tmp_path_factory):
     folder = tmp_path_factory.mktemp("model") / "gap"
-    result = cpfls("gap", gap_config, *with_attitude, "--model", pipeline.model, "-o", folder, "--json")
-    assert result.exit_code == 0, result.stderr
-    return folder, json.loads(result.stdout)
+    return folder, cpfls.summary("gap", gap_config, *with_attitude, "--model", pipeline.model, "-o", folder)
 
 
 def test_artifacts_carry_the_model(answer, pipeline):

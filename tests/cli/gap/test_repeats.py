@@ -55,8 +55,7 @@ def found(cpfls, tmp_path_factory):
         np.savetxt(path, np.column_stack(parts), delimiter=",", header=header, comments="", fmt="%.9g")
     study = folder / "study.yaml"
     study.write_text(yaml.safe_dump(config()))
-    result = cpfls("gap", study, *paths, "-o", folder / "gap", "-v")
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("gap", study, *paths, "-o", folder / "gap", "-v")
     summary = json.loads((folder / "gap" / "gap.json").read_text())
     return SimpleNamespace(folder=folder / "gap", stdout=result.stdout, summary=summary)
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from cpfls_cli import store
+from cpfls_cli.flightlog.results import Flight
 from cpfls_cli.playback.replay import Playback
 from cpfls_cli.result import plain
-from tests.builders.artifacts import edited
+from tests.builders.artifacts import edited, with_fields
 from tests.builders.studies import VEHICLE
 
 NAMES = ["model", "nothing-moves", "rate-stays", "stated"]
@@ -23,8 +24,7 @@ def replayed(cpfls, gap_config, tmp_path_factory):
 
     def call(model, *flights, options=FAST, config=gap_config):
         output = tmp_path_factory.mktemp("replay") / "replay.h5"
-        result = cpfls.done("replay", config, model, *flights, "-o", output, "--json", *options)
-        return json.loads(result.stdout), output
+        return cpfls.summary("replay", config, model, *flights, "-o", output, *options), output
 
     return call
 
@@ -32,11 +32,6 @@ def replayed(cpfls, gap_config, tmp_path_factory):
 @pytest.fixture(scope="module")
 def of_vehicle(replayed, with_attitude):
     return replayed("vehicle", *with_attitude)
-
-
-def imported(cpfls, gap_config, log, output):
-    cpfls.done("import", gap_config, log, "-o", output)
-    return output
 
 
 def test_json_tells_every_prediction_by_signal_and_horizon(of_vehicle):
@@ -151,50 +146,44 @@ def test_a_simulated_flight_of_the_vehicle_itself_is_predicted(cpfls, replayed, 
         assert sums["model"] < 0.03 * min(sums["nothing-moves"], sums["rate-stays"]), signal
 
 
-def paused(path, flight, gap=slice(1000, 1050)):
-    """Take samples out of a flight, so that its clock has a pause."""
-    with h5py.File(flight) as source, edited(path, "w") as target:
-        for name, value in source.attrs.items():
-            target.attrs[name] = value
-        source.copy("config", target)
-        source.copy("inputs", target)
-        samples = len(source["time"])
-        for name, values in source.items():
-            if isinstance(values, h5py.Dataset) and values.shape[:1] == (samples,):
-                made = target.create_dataset(name, data=np.delete(values[()], gap, axis=0))
-                for key, value in values.attrs.items():
-                    made.attrs[key] = value
-            elif name not in ("config", "inputs"):
-                source.copy(name, target)
-    return path
+@pytest.fixture(scope="module")
+def eight_seconds(cpfls, gap_config, with_attitude, tmp_path_factory):
+    """The beginning of a flight: 800 samples."""
+    output = tmp_path_factory.mktemp("eight") / "flight.h5"
+    cpfls.done("import", gap_config, with_attitude[0], "--set", "import.crop_s=[0.0, 7.99]", "-o", output)
+    return output
 
 
-def test_windows_do_not_cross_a_pause(cpfls, replayed, gap_config, with_attitude, tmp_path):
-    flight = imported(cpfls, gap_config, with_attitude[0], tmp_path / "flight.h5")
-    answer, output = replayed("vehicle", paused(tmp_path / "paused.h5", flight), options=("--every", "1"))
-    assert answer["windows"] == (1000 - 50) + (2400 - 1050 - 50)
+def test_windows_do_not_cross_a_pause(replayed, eight_seconds, tmp_path):
+    held = vars(store.read(eight_seconds, Flight)[0])
+    rows = {name: values for name, values in held.items() if isinstance(values, np.ndarray) and len(values) == 800}
+    paused = {name: np.delete(values, slice(300, 350), axis=0) for name, values in rows.items()}
+    with_fields(eight_seconds, tmp_path / "paused.h5", **paused)
+    answer, output = replayed("vehicle", tmp_path / "paused.h5", options=("--every", "1"))
+    assert answer["windows"] == (300 - 50) + (800 - 350 - 50)
     assert any("2 stretches without a pause" in warning for warning in answer["warnings"])
     start = store.read(output, Playback)[0].window_start
-    assert not np.any((start > 9.49) & (start < 10.49))
+    assert not np.any((start > 2.49) & (start < 3.49))
 
 
 def test_a_log_is_played_back_on_both_sides_of_its_gaps(replayed, with_attitude, tmp_path):
     lines = with_attitude[0].read_text().splitlines()
     log = tmp_path / "paused.csv"
-    log.write_text("\n".join([lines[0], *lines[1:601], *lines[701:1001], *lines[1061:]]) + "\n")
+    log.write_text("\n".join([lines[0], *lines[1:301], *lines[401:501], *lines[561:701]]) + "\n")
     answer, output = replayed("vehicle", log, options=("--every", "1"))
-    assert answer["windows"] == (600 - 50) + (300 - 50) + (2400 - 1060 - 50)
-    assert any("3 stretches without a pause, 2240 of 2240 samples" in warning for warning in answer["warnings"])
+    assert answer["windows"] == (300 - 50) + (100 - 50) + (140 - 50)
+    assert any("3 stretches without a pause, 540 of 540 samples" in warning for warning in answer["warnings"])
     start = store.read(output, Playback)[0].window_start
-    assert (start[0], start[550], start[-1]) == pytest.approx((0.0, 7.0, 23.49), abs=1e-6)
+    assert (start[0], start[250], start[-1]) == pytest.approx((0.0, 4.0, 6.49), abs=1e-6)
 
 
-def test_unknown_samples_part_a_flight_too(cpfls, replayed, gap_config, with_attitude, tmp_path):
-    flight = imported(cpfls, gap_config, with_attitude[0], tmp_path / "flight.h5")
+def test_unknown_samples_part_a_flight_too(replayed, eight_seconds, tmp_path):
+    flight = tmp_path / "flight.h5"
+    flight.write_bytes(eight_seconds.read_bytes())
     with edited(flight) as file:
         file["rotor_speed"][500:510] = math.nan
     answer, _ = replayed("vehicle", flight, options=("--every", "1"))
-    assert answer["windows"] == (500 - 50) + (2400 - 510 - 50)
+    assert answer["windows"] == (500 - 50) + (800 - 510 - 50)
 
 
 def test_a_model_that_runs_away_is_counted_bounded_and_named(cpfls, gap_config, with_attitude, tmp_path):

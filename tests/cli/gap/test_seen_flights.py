@@ -9,8 +9,7 @@ from tests.builders.artifacts import read_result
 def two_models(cpfls, gap_config, pipeline, with_attitude, tmp_path_factory):
     """What is put into an identified model from the first two thirds of one flight."""
     folder = tmp_path_factory.mktemp("seen") / "gap"
-    result = cpfls("gap", gap_config, with_attitude[0], "--model", pipeline.model, "-o", folder)
-    assert result.exit_code == 0, result.stderr
+    cpfls.done("gap", gap_config, with_attitude[0], "--model", pipeline.model, "-o", folder)
     return folder / "extended.h5"
 
 

@@ -34,9 +34,14 @@ def words(search, pipeline):
 
 
 @pytest.fixture(scope="session")
-def whole(cpfls, words, tmp_path_factory):
-    """The model of a search that nobody stopped."""
+def ended(cpfls, words, tmp_path_factory):
+    """The model of a search that nobody stopped, and what it said."""
     output = tmp_path_factory.mktemp("whole") / "model.h5"
-    cpfls.done(*words, "-o", output)
+    said = cpfls.done(*words, "-o", output, "-v").stdout
     assert [path.name for path in output.parent.iterdir()] == ["model.h5"]
-    return output
+    return output, said
+
+
+@pytest.fixture(scope="session")
+def whole(ended):
+    return ended[0]

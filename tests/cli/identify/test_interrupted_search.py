@@ -11,6 +11,7 @@ import pytest
 from cpfls_cli import load_model
 from cpfls_cli.arguments import seconds
 from cpfls_cli.artifacts.identified import IdentifiedModel
+from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.store import read
 from tests.builders.command_line import act_at_evaluation, interrupt_this_process
 
@@ -51,22 +52,20 @@ def test_interrupted_search_keeps_a_model_and_goes_on_to_the_same_end(
     assert names(tmp_path) == ["model.h5"]
 
 
-def test_incomplete_model_predicts(cpfls, words, pipeline, tmp_path, interrupt_at):
-    interrupt_at(40)
-    assert cpfls(*words, "-o", tmp_path / "model.h5").exit_code == 130
+def test_incomplete_model_predicts(pipeline, stopped):
     with pytest.warns(UserWarning, match="has no verdict"):
-        assert np.isfinite(load_model(tmp_path / "model.h5").predict(pipeline.flight).torque).all()
+        assert np.isfinite(load_model(stopped).predict(pipeline.flight).torque).all()
 
 
 def test_interrupted_again_and_again_it_evaluates_nothing_twice(cpfls, words, whole, tmp_path, interrupt_at):
     output, option, runs = tmp_path / "model.h5", (), []
     while not runs or runs[-1].exit_code == 130:
-        # The first runs do not even finish the initial population.
-        interrupt_at(12)
+        # The first run does not even finish the initial population.
+        interrupt_at(15)
         runs.append(cpfls(*words, "-o", output, *option))
         option = ("--resume",)
         assert stored(output, "history/evaluations")[-1] == min(
-            12 * len(runs), stored(whole, "history/evaluations")[-1]
+            15 * len(runs), stored(whole, "history/evaluations")[-1]
         )
     assert runs[-1].exit_code == 0
     assert output.read_bytes() == whole.read_bytes()
@@ -84,13 +83,17 @@ def test_interrupted_in_the_last_evaluation_it_is_judged_when_it_goes_on(cpfls, 
     assert (tmp_path / "model.h5").read_bytes() == whole.read_bytes()
 
 
-def test_interrupted_without_a_finite_model(cpfls, words, tmp_path, interrupt_at, monkeypatch):
-    def nothing(_, genes):
-        from cpfls_cli.evolution.archive import Evaluation
+@pytest.fixture
+def nothing_found(monkeypatch):
+    """Every chromosome fails."""
+    monkeypatch.setattr(
+        "cpfls_cli.identification.evaluator.Evaluator.__call__",
+        lambda _, genes: Evaluation(genes, np.full((len(genes), 3), np.inf)),
+    )
 
-        return Evaluation(genes, np.full((len(genes), 3), np.inf))
 
-    monkeypatch.setattr("cpfls_cli.identification.evaluator.Evaluator.__call__", nothing)
+@pytest.mark.usefixtures("nothing_found")
+def test_interrupted_without_a_finite_model(cpfls, words, tmp_path, interrupt_at):
     interrupt_at(20)
     result = cpfls(*words, "-o", tmp_path / "model.h5")
     assert (result.exit_code, result.stdout) == (130, "")
@@ -101,26 +104,14 @@ def test_interrupted_without_a_finite_model(cpfls, words, tmp_path, interrupt_at
     )
 
 
-def test_search_that_found_nothing_at_its_end_leaves_nothing(cpfls, words, pipeline, tmp_path, monkeypatch):
-    def nothing(_, genes):
-        from cpfls_cli.evolution.archive import Evaluation
-
-        return Evaluation(genes, np.full((len(genes), 3), np.inf))
-
-    monkeypatch.setattr("cpfls_cli.identification.evaluator.Evaluator.__call__", nothing)
+@pytest.mark.usefixtures("nothing_found")
+def test_search_that_found_nothing_at_its_end_leaves_nothing(cpfls, words, pipeline, tmp_path):
     result = cpfls(*words, "-o", tmp_path / "model.h5")
     assert result.exit_code == 1
     assert result.stderr == (
         f"cpfls: error: {pipeline.flight}: no chromosome gave a finite model; perhaps nothing moves in the data\n"
     )
     assert names(tmp_path) == []
-
-
-def test_handlers_are_as_they_were(cpfls, words, tmp_path, interrupt_at):
-    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
-    interrupt_at(20)
-    cpfls(*words, "-o", tmp_path / "model.h5")
-    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
 
 
 def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_path, at_evaluation, monkeypatch):
@@ -159,7 +150,7 @@ def test_time_limit_that_is_none(cpfls, words, tmp_path, text):
     assert names(tmp_path) == []
 
 
-def test_stalled_search_ends_converged(cpfls, words, tmp_path):
+def test_stalled_search_ends_converged(cpfls, words, ended, tmp_path):
     stall = ("--set", "identification.stall_generations=1", "--set", "identification.stall_improvement=0.9")
     summary = cpfls.summary(*words, "-o", tmp_path / "model.h5", *stall)
     assert (summary["stop_reason"], summary["complete"], summary["generations"] < 6) == ("converged", True, True)
@@ -169,7 +160,7 @@ def test_stalled_search_ends_converged(cpfls, words, tmp_path):
         f"converged after generation {summary['generations']}: no objective improved enough "
         "(identification.stall_generations = 1)"
     ) in lines
-    assert "converged" not in cpfls(*words, "-o", tmp_path / "whole.h5", "-v").stdout
+    assert "converged" not in ended[1]
 
 
 @pytest.fixture(scope="module")
@@ -227,8 +218,11 @@ def test_force_starts_again(cpfls, words, stopped, whole):
 
 
 def test_forced_search_gives_up_the_checkpoint_from_the_start(cpfls, words, stopped, interrupt_at):
+    """And leaves the handlers of signals as they were."""
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     interrupt_at(3)
     assert cpfls(*words, "-o", stopped, "--force").exit_code == 130
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
     with h5py.File(f"{stopped}.checkpoint") as checkpoint:
         assert checkpoint["generation"][()] == -1
 
@@ -264,7 +258,7 @@ def test_other_selection_and_other_flight(cpfls, refuse, search, pipeline, stopp
 
 
 def test_more_generations(cpfls, words, stopped, tmp_path):
-    more = ("--set", "identification.generations=8")
+    more = ("--set", "identification.generations=7")
     cpfls.done(*words, "-o", stopped, "--resume", *more)
     cpfls.done(*words, "-o", tmp_path / "straight.h5", *more)
     assert stopped.read_bytes() == (tmp_path / "straight.h5").read_bytes()

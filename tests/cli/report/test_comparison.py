@@ -51,8 +51,7 @@ def write(bare, tmp_path):
 def compared(cpfls, study, tmp_path):
     def call(*models):
         output = tmp_path / "report.json"
-        result = cpfls("report", study, *models, "-o", output, "--force")
-        assert result.exit_code == 0, result.stderr
+        cpfls.done("report", study, *models, "-o", output, "--force")
         page = json.loads(output.read_text(encoding="utf-8"))
         names = [section["name"] for section in page["sections"]]
         return names, next((part["blocks"] for part in page["sections"] if part["name"] == "comparison"), [])
@@ -222,7 +221,7 @@ def test_predictors_that_are_equal_are_both_the_least(cpfls, study, write, tmp_p
     own = steps()
     own["steps/attitude"][1] = above * own["steps/attitude"][0]
     path, output = write("one.h5", **own), tmp_path / "steps.json"
-    assert cpfls("report", study, path, "-o", output).exit_code == 0
+    cpfls.done("report", study, path, "-o", output)
     page = json.loads(output.read_text(encoding="utf-8"))
     blocks = unfolded(next(part["blocks"] for part in page["sections"] if part["name"] == "identify"))
     assert ["◂" in row[3] for row in table(blocks, "Horizon")["rows"][:3]] == marks
@@ -233,7 +232,7 @@ def test_a_model_that_is_the_rigid_body_hides_its_line_and_the_caption_says_so(c
     own = {path: values for path, values in curves().items() if path.startswith("curves/")}
     own["curves/inertia"] = own["curves/rigid_body"] * (1.0 + 1e-12) if same else own["curves/inertia"]
     output = tmp_path / "curves.json"
-    assert cpfls("report", study, write("one.h5", **own), "-o", output).exit_code == 0
+    cpfls.done("report", study, write("one.h5", **own), "-o", output)
     page = json.loads(output.read_text(encoding="utf-8"))
     blocks = unfolded(next(part["blocks"] for part in page["sections"] if part["name"] == "identify"))
     caption = named(blocks, "identify-1-inertia-curves-1")["caption"]
@@ -253,8 +252,7 @@ def test_vehicles_of_equal_file_names_are_called_by_their_folders(cpfls, study, 
         )
         write_vehicle(path, replace(vehicle, numbers=tuple(numbers)))
     output = tmp_path / "report.html"
-    result = cpfls("report", study, *paths, "-o", output)
-    assert result.exit_code == 0, result.stderr
+    result = cpfls.done("report", study, *paths, "-o", output)
     *_, one, two, differ = result.stdout.splitlines()
     assert [line.split()[0] for line in (one, two)] == ["still/vehicle.h5", "gusty/vehicle.h5"]
     assert differ == "differ beyond both intervals: Ixx"

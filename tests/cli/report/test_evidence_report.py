@@ -34,8 +34,7 @@ FIGURES = [
 def report(cpfls, study, tmp_path_factory):
     def write(*artifacts, form="html"):
         output = tmp_path_factory.mktemp("report") / f"report.{form}"
-        result = cpfls("report", study, *artifacts, "-o", output, "--json")
-        assert result.exit_code == 0, result.stderr
+        result = cpfls.done("report", study, *artifacts, "-o", output, "--json")
         text = output.read_text(encoding="utf-8")
         return SimpleNamespace(text=text, words=words(text), **json.loads(result.stdout))
 
@@ -237,8 +236,7 @@ def shown(folder, *artifacts, options=()):
     config, output = folder / "study.yaml", folder / "report.html"
     config.write_text("seed: 1\n" + VEHICLE)
     paths = [written(folder / f"{number}.h5", each) for number, each in enumerate(artifacts)]
-    result = run("report", config, *paths, "-o", output, "--json", "--force", *options)
-    assert result.exit_code == 0, result.output
+    result = run.done("report", config, *paths, "-o", output, "--json", "--force", *options)
     html = output.read_text(encoding="utf-8")
     body = re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", html, flags=re.DOTALL)
     text = re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", body)))
@@ -315,8 +313,7 @@ def test_an_extended_model_alone_brings_its_figures(tmp_path):
 
 
 def test_a_fault_of_a_sensor_stands_under_sensors(tmp_path):
-    finding = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
-    page = shown(tmp_path, made.diagnosis(named=({"name": "gyro_bias", "kind": "sensor"},), **made.audit([finding])))
+    page = shown(tmp_path, made.diagnosis(named=("gyro_bias",), audit=made.audit_with_fault()))
     assert "SENSOR FAULT" in page.text
     assert "The gyroscope shows 0.01 rad/s at rest. The diagnosis repairs it" in page.text
     assert "Not tested for gyro scale and misaligned IMU: no attitude." in page.text

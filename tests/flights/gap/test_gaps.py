@@ -63,8 +63,7 @@ def changed(tmp_path_factory):
     def call(today, since):
         flown, before = ([path_of_log("real/crazypad_usd", name) for name in side] for side in (today, since))
         words = ("changed", CONFIGS / "crazypad_usd.yaml", *flown, "--since", *before, "-o", out, "--json", "--force")
-        result = run(*words)
-        assert result.exit_code == 0, result.stderr
+        result = run.done(*words)
         return json.loads(result.stdout)
 
     return call

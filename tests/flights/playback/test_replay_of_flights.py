@@ -1,6 +1,5 @@
 """Real flights are played back."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,9 +22,7 @@ SIGNALS = ("body_rate", "attitude", "velocity", "position")
 
 def replayed(config, folder, name, output):
     words = ("replay", CONFIGS / f"{config}.yaml", "vehicle", path_of_log(folder, name), "-o", output, "--every", "5")
-    result = run(*words, "--json")
-    assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout)
+    return run.summary(*words)
 
 
 def known(answer):
@@ -145,9 +142,7 @@ def test_what_is_hidden_is_seen(name):
 
 
 def answered(*words):
-    result = run(*words, "--json", "--force")
-    assert result.exit_code == 0, result.stderr
-    return json.loads(result.stdout)
+    return run.summary(*words, "--force")
 
 
 @pytest.mark.parametrize("name", [name for name, hidden in ROTORPY_HIDDEN.items() if hidden])
@@ -179,9 +174,7 @@ ASKED = (
 @pytest.mark.parametrize("name", ["normal_flight__E8_log00"])
 def test_the_twin_is_nearer_than_the_setpoint(tmp_path, name):
     words = ("simulate", CRAZYPAD, path_of_log("real/crazypad_usd", name), "--autopilot", "crazyflie")
-    result = run(*words, "--set", ASKED[0], "--set", ASKED[1], "-o", tmp_path / "twin.h5", "--json")
-    assert result.exit_code == 0, result.stderr
-    said = json.loads(result.stdout)
+    said = run.summary(*words, "--set", ASKED[0], "--set", ASKED[1], "-o", tmp_path / "twin.h5")
     assert (said["asked"], said["thrust_from"], said["gains"]["source"]) == ("body_rate", "setpoint", "defaults")
     for channel in ("roll rate", "pitch rate"):
         own, asked, still = (said["rms"][each][channel] for each in ("vehicle", "setpoint", "nothing-moves"))

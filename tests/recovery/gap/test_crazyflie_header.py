@@ -36,7 +36,7 @@ def gap(folder, logs, speed, **wrong):
     mine, study, vehicle = (folder / name for name in ("platform_defaults_mine.h", "study.yaml", "vehicle.h5"))
     mine.write_text(header_of(TRUE, speed, **wrong))
     before = mine.read_bytes()
-    assert command_line.run("init", "--from", mine, logs[0], "-o", study).exit_code == 0
+    command_line.done("init", "--from", mine, logs[0], "-o", study)
     settings = load_study(study).vehicle
     factors = {"thrust_factor_n_s2": TRUE.thrust_factor, "drag_factor_n_m_s2": TRUE.drag_factor}
     rotors = tuple(type(rotor)(**(vars(rotor) | factors)) for rotor in settings.rotors)
@@ -45,8 +45,7 @@ def gap(folder, logs, speed, **wrong):
     known = type(settings)(**(vars(settings) | {"inertia_kg_m2": inertia, "rotors": rotors, "unknown": ()}))
     write_vehicle(vehicle, vehicle_of(VehicleModel(vehicle=known)), config=study.read_text())
     words = ("gap", mine, *logs[:-1], "--held-out", logs[-1], "--model", vehicle, "-o", folder / "gap", "--json")
-    result = command_line.run(*words)
-    assert result.exit_code == 0, result.stderr
+    result = command_line.done(*words)
     assert mine.read_bytes() == before
     return json.loads(result.stdout), before.decode(), (folder / "gap" / mine.name).read_text()
 

@@ -42,8 +42,7 @@ def corrected(folder, logs, text="", ending="sdf", **wrong):
     mine.write_text(text or sdf_of(TRUE, **wrong))
     before = mine.read_bytes()
     words = ("gap", mine, *logs[:-1], "--held-out", logs[-1], "-o", folder / "gap", "--json")
-    result = command_line.run(*words)
-    assert result.exit_code == 0, result.stderr
+    result = command_line.done(*words)
     assert mine.read_bytes() == before
     return json.loads(result.stdout), read_model(folder / "gap" / mine.name)
 
@@ -82,8 +81,7 @@ def require_the_same_of_exports(folder, change):
     model, mine = folder / "gap" / "extended.h5", read_model(folder / "mine.sdf")
     side = abs(mine.hubs[0, 0])
     for word, name in (("sdf", "of.sdf"), ("px4params", "of.params"), ("betaflight", "of.txt")):
-        result = command_line.run("export", model, "--format", word, "-o", folder / name)
-        assert result.exit_code == 0, result.stderr
+        command_line.done("export", model, "--format", word, "-o", folder / name)
     again = read_model(folder / "of.sdf")
     np.testing.assert_allclose(again.hubs, mine.hubs, rtol=1e-9, atol=1e-12)
     factors = [rotor.thrust.value for rotor in again.rotors]
@@ -151,8 +149,7 @@ def test_a_thrust_17_percent_too_large_in_python(tmp_path, few):
     """RotorPy's dictionary, whose other numbers and text stay as they are."""
     mine = tmp_path / "mine.py"
     mine.write_text(rotorpy_of(TRUE, thrust=1 / 0.83))
-    result = command_line.run("gap", mine, *few[:-1], "--held-out", few[-1], "-o", tmp_path / "gap")
-    assert result.exit_code == 0, result.stderr
+    result = command_line.done("gap", mine, *few[:-1], "--held-out", few[-1], "-o", tmp_path / "gap")
     said = json.loads((tmp_path / "gap" / "gap.json").read_text())["corrected"]
     (change,) = said["changes"]
     assert change["element"] == "quad_params.k_eta"
@@ -173,15 +170,14 @@ def test_a_yaw_share_one_and_a_half_times_too_large_in_newtons(tmp_path, logs):
     """Where controls are thrusts, the thrust by speed is the model's, and the file has the yaw torque over thrust."""
     mine, study, vehicle = (tmp_path / name for name in ("mine.xml", "study.yaml", "vehicle.h5"))
     mine.write_text(mjcf_in_newtons(TRUE, SPINS, ratio=1.5))
-    assert command_line.run("init", "--from", mine, logs[0], "-o", study).exit_code == 0
+    command_line.done("init", "--from", mine, logs[0], "-o", study)
     settings = load_study(study).vehicle
     factors = {"thrust_factor_n_s2": TRUE.thrust_factor, "drag_factor_n_m_s2": TRUE.drag_factor}
     rotors = tuple(replace(rotor, **factors) for rotor in settings.rotors)
     known = replace(settings, rotors=rotors, unknown=())
     write_vehicle(vehicle, vehicle_of(VehicleModel(vehicle=known)), config=study.read_text())
     words = ("gap", mine, *logs[:-1], "--held-out", logs[-1], "--model", vehicle, "-o", tmp_path / "gap", "--json")
-    result = command_line.run(*words)
-    assert result.exit_code == 0, result.stderr
+    result = command_line.done(*words)
     said, share = json.loads(result.stdout)["corrected"], TRUE.drag_factor / TRUE.thrust_factor
     assert {change["element"] for change in said["changes"]} == {"gear yaw"}
     for change in said["changes"]:

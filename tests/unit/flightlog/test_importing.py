@@ -73,6 +73,17 @@ def test_a_time_stamp_that_is_not_a_number_drops_its_row():
     assert read_signals(columns, settings()).dropped["time_not_finite"] == 1
 
 
+def test_columns_with_fewer_than_two_values_are_all_named():
+    columns = log() | {"p": np.full(201, np.nan), "r": np.append(0.0, np.full(200, np.nan))}
+    with pytest.raises(InputError) as caught:
+        read_signals(columns, settings())
+    assert str(caught.value).splitlines() == [
+        "import.signals.body_rate.columns: 'p' has fewer than two values (0) in the 201 rows that are read",
+        "import.signals.body_rate.columns: 'r' has fewer than two values (1) in the 201 rows that are read; map another"
+        " column, or leave the signal out of import.signals",
+    ]
+
+
 def test_a_short_gap_is_interpolated_and_counted():
     signals = read_signals(without(log(), slice(100, 105)), settings())
     assert signals.gaps == 1

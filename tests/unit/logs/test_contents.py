@@ -59,16 +59,6 @@ def test_of_a_csv_only_what_is_wanted_is_read(tmp_path):
         log_contents(path, ["mode"])
 
 
-def test_a_parquet_states_the_unit_of_its_stamps(tmp_path):
-    path = tmp_path / "log.parquet"
-    stamps = pyarrow.array([5_000, 5_250], pyarrow.timestamp("ms"))
-    parquet.write_table(pyarrow.table({"t": stamps, "roll": [1, 2], "mode": ["hover", "land"]}), path)
-    contents = log_contents(path)
-    assert listed(contents) == {"": {"t": [0, 0.25], "roll": [1, 2]}}
-    assert contents.units == {"t": "s"}
-    assert contents.warnings == ("columns that hold no numbers are left out: mode",)
-
-
 def test_a_ulog_holds_topics_and_what_px4_knows_of_the_vehicle(tmp_path):
     path = tmp_path / "log.ulg"
     battery = "uint64_t timestamp;float voltage_v"
@@ -109,6 +99,25 @@ def test_a_message_of_a_ulog_within_itself_is_refused(tmp_path):
     path.write_bytes(ulogs.ulog([(0, 0, [1.0])], {"a": "uint64_t timestamp;a x"}))
     with pytest.raises(InputError, match=r"log\.ulg: a broken ULog file: one of its messages contains itself"):
         log_contents(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (ulogs.header()[:10], "a broken ULog file: "),
+        (ulogs.header(), "a ULog file without samples: was the logger stopped at once, or the file cut off?"),
+        (ulogs.header() + ulogs.definitions({"a": "uint64_t timestamp"}), "a ULog file without samples: "),
+        (ulogs.header() + ulogs.message("B", bytes(8) + b"\x80" + bytes(31)), "a broken ULog file: "),
+        (b"ULogEnc\x01" + bytes(100), "is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does"),
+    ],
+    ids=["header-cut", "header-only", "no-data", "unknown-flag", "encrypted"],
+)
+def test_what_is_no_ulog(tmp_path, content, said):
+    path = tmp_path / "log.ulg"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        log_contents(path)
+    assert str(caught.value).startswith(f"{path}: {said}")
 
 
 def test_what_a_small_file_cannot_hold_is_refused_before_it_is_read(tmp_path, monkeypatch):
@@ -211,7 +220,7 @@ ROWS = [[0.0, 1.5, -2.0], [0.5, 2.5, 3e-3], [1.0, 3.5, 4.0]]
 
 
 def _written(path: Path, text: str) -> Path:
-    path.write_text(text, encoding="utf-8")
+    path.write_bytes(text.encode())
     return path
 
 
@@ -232,6 +241,8 @@ def _rows(separator: str, decimal: str = ".") -> str:
         "# time p q\n" + _rows(" "),
         "# a flight\n# time,p,q\n" + _rows(" "),
         "% time\tp\tq\n" + _rows("\t"),
+        ("time,p,q\n" + _rows(",")).replace("\n", "\r\n"),
+        "\ufefftime,p,q\n" + _rows(","),
     ],
     ids=lambda text: text[:12].replace("\n", " "),
 )
@@ -623,6 +634,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.data", b"0.5 12 IMU_GYRO 0.1 0.2 0.3\n", "a log of Paparazzi", "write its numbers as CSV"),
         ("a.bin", b"", "an empty file", "the copy failed"),
         ("a.log", b"", "an empty file", "the copy failed"),
+        ("a.ulg", b"", "an empty file", "the copy failed"),
         ("a.pdf", b"%PDF-1.4", "a PDF", "the log that it shows"),
         ("a.jpg", b"\xff\xd8\xff\xe0", "a picture", "the log that it shows"),
     ],

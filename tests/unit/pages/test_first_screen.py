@@ -6,21 +6,18 @@ import numpy as np
 import pytest
 
 from cpfls_cli import page
+from cpfls_cli.gap.naming.results import Alternative, ByKind, Unexplained
 from cpfls_cli.gap.residual.rotor_loss import RotorLoss
 from cpfls_cli.report.content import Box, Facts, Folded, Table, Text
 from cpfls_cli.result import Estimate, plain
 from cpfls_cli.simulators.results import Corrected
 from tests.builders import gap_artifacts as made
+from tests.builders.gap_artifacts import diagnosis
 from tests.builders.vehicle_search import CONFIG
 
 BEFORE_AND_AFTER = "held-out flights before and after, and what to know of the verdict"
-RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust", "")]
 USE = "Take the model with it, extended.h5"
 WRONG = "the inertia about z would have to be 29 times that of the config"
-
-
-def diagnosis(*args, **given):
-    return made.diagnosis(*args, **given)
 
 
 def screen(found, **origin):
@@ -68,28 +65,28 @@ def next_steps(found):
             "What the model misses is offset of the centre of mass. That is the closest, not all of it.",
         ),
         (
-            {"verdict": "AMBIGUOUS", "alternatives": RIVALS},
+            {"verdict": "AMBIGUOUS", "alternatives": (made.RIVAL,)},
             "These flights cannot separate offset of the centre of mass from constant torque.",
         ),
         (
-            {"verdict": "UNEXPLAINED", "named": ({"named": 0},)},
+            {"verdict": "UNEXPLAINED", "named": (), "closest": (made.effect(),)},
             "There is a gap that nothing in the catalogue explains.",
         ),
         (
-            {"verdict": "FLIGHTS_DIFFER", "named": ({"named": 0},)},
+            {"verdict": "FLIGHTS_DIFFER", "named": (), "closest": (made.effect(),)},
             "These flights differ: what shows in some of them does not show in the others.",
         ),
-        ({"named": ({"name": "gyro_bias", "kind": "sensor"},)}, "The sensors are at fault: gyro bias."),
+        ({"named": ("gyro_bias",)}, "The sensors are at fault: gyro bias."),
         (
-            {"named": ({"name": "channel_delay", "kind": "actuator"},)},
+            {"named": ("channel_delay",)},
             "The sensors are at fault: time shift between rotor and gyro channels.",
         ),
         (
-            {"named": ({"name": "parameter_error", "kind": "parameter"},)},
+            {"named": ("parameter_error",)},
             "A parameter of the vehicle is wrong: Izz over yaw torque +24.0 % against the config.",
         ),
         (
-            {"verdict": "CONTRADICTED", "named": (), "impossible": made.texts(WRONG)},
+            {"verdict": "CONTRADICTED", "named": (), "contradictions": (WRONG,)},
             f"The log contradicts itself: T{WRONG[1:]}.",
         ),
     ],
@@ -112,7 +109,7 @@ def test_a_name_comes_with_its_size_its_interval_and_how_sure_it_is():
 
 
 def test_a_wrong_number_of_the_vehicle_is_named_as_people_do():
-    box, *_ = screen(diagnosis(named=({"name": "parameter_error", "kind": "parameter"},)))
+    box, *_ = screen(diagnosis(named=("parameter_error",)))
     assert list(box.sentences) == [
         "Wrong inertia or thrust scale (parameter_error): Izz over yaw torque +24.0 % [+20.0, +28.1] (p < 10⁻⁶, 93 % of"
         " the gap)."
@@ -132,9 +129,7 @@ GUESSED = "guesses from mass and arms are used for what the config leaves open (
 )
 def test_a_number_is_wrong_against_what_was_taken_for_it(moments, cautions, against):
     config = CONFIG.replace("[0.0040, 0.0044, 0.0075]", moments)
-    box, *_ = screen(
-        diagnosis(named=({"name": "parameter_error", "kind": "parameter"},)), config=config, cautions=cautions
-    )
+    box, *_ = screen(diagnosis(named=("parameter_error",)), config=config, cautions=cautions)
     assert box.title == f"A parameter of the vehicle is wrong: Izz over yaw torque +24.0 % against {against}."
 
 
@@ -155,31 +150,31 @@ def test_what_speaks_against_the_model_stands_in_the_box():
 @pytest.mark.parametrize("verdict", ["NAMED", "PARTIAL", "AMBIGUOUS"])
 def test_a_model_that_plays_back_worse_is_not_to_be_taken(verdict):
     worse = made.played_pair(body_rate=(0.5, 0.3, 0.3, 0.4), attitude=(0.1, 0.3, 0.3, 0.2))
-    said = next_steps(diagnosis(verdict, **worse))
+    said = next_steps(diagnosis(verdict, playback=worse))
     assert said.endswith("Leave the model as it is: with what is named, held-out flights play back worse in body rate.")
     alike = made.played_pair(body_rate=(0.4001, 0.5, 0.5, 0.4), attitude=(0.1, 0.3, 0.3, 0.2))
-    assert "ake the model with it" in next_steps(diagnosis(verdict, **alike))
+    assert "ake the model with it" in next_steps(diagnosis(verdict, playback=alike))
 
 
 def test_names_that_make_no_forecast_come_with_what_does():
     losing = made.played_pair(body_rate=(0.4, 0.3, 0.3, 0.6), attitude=(0.5, 0.3, 0.3, 0.7))
-    assert "`cpfls vehicle` looks for one that forecasts" in next_steps(diagnosis("PARTIAL", **losing))
+    assert "`cpfls vehicle` looks for one that forecasts" in next_steps(diagnosis("PARTIAL", playback=losing))
     winning = made.played_pair(body_rate=(0.2, 0.3, 0.3, 0.6), attitude=(0.5, 0.3, 0.3, 0.7))
-    assert "cpfls vehicle" not in next_steps(diagnosis("PARTIAL", **winning))
+    assert "cpfls vehicle" not in next_steps(diagnosis("PARTIAL", playback=winning))
 
 
 def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tells():
-    sure, below = (screen(diagnosis("PARTIAL", alternatives=RIVALS))[place] for place in (1, 4))
+    sure, below = (screen(diagnosis("PARTIAL", alternatives=(made.RIVAL,)))[place] for place in (1, 4))
     assert sure["How sure"] == (
         "Of the held-out gap above the noise, 97 % is gone. "
         "It could be constant torque instead of offset of the centre of mass."
     )
     answer = "constant torque from offset of the centre of mass: change the thrust"
     assert ("To separate", answer) in below
-    _, facts, _, _, below = screen(diagnosis("AMBIGUOUS", alternatives=RIVALS))
+    _, facts, _, _, below = screen(diagnosis("AMBIGUOUS", alternatives=(made.RIVAL,)))
     planned = "`cpfls trajectory CONFIG --for diagnosis.h5 -o path.h5` plans such a flight."
     assert facts["Next"] == f"To separate {answer}. {planned} Until then t{USE[1:]}."
-    untried = diagnosis("AMBIGUOUS", alternatives=[("wind", "com_offset", np.nan, "log velocity", "")])
+    untried = diagnosis("AMBIGUOUS", alternatives=(Alternative("wind", "com_offset", np.nan, "log velocity"),))
     assert planned not in next_steps(untried)
     assert next_steps(untried).startswith("To separate steady wind from offset of the centre of mass: log velocity.")
     assert facts["How sure"] == "Of the held-out gap above the noise, 97 % is gone."
@@ -187,8 +182,8 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tell
 
 
 def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tells_them():
-    pair = [("motor_lag", "low_pass_filter", 1.0, "log the speeds of the rotors", "command_delay")]
-    answer = diagnosis("AMBIGUOUS", named=({"name": "low_pass_filter"},), alternatives=pair)
+    pair = (Alternative("motor_lag", "low_pass_filter", 1.0, "log the speeds of the rotors", "command_delay"),)
+    answer = diagnosis("AMBIGUOUS", named=("low_pass_filter",), alternatives=pair)
     box, facts, *_ = screen(answer)
     assert "from motor lag with delay of the command" in str(box)
     assert "trajectory" not in facts["Next"]
@@ -207,7 +202,7 @@ def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tel
         ({"verdict": "NO_GAP", "named": ()}, "Nothing, unless you suspect one of the effects that these flights "),
         ({"verdict": "NOT_EXCITED", "named": ()}, "Fly more: roll, pitch and yaw sweeps at two amplitudes, "),
         (
-            {"verdict": "CONTRADICTED", "named": (), "impossible": made.texts(WRONG)},
+            {"verdict": "CONTRADICTED", "named": (), "contradictions": (WRONG,)},
             "Correct what is wrong, in the section `import` of the config or in `vehicle`, and run this again.",
         ),
     ],
@@ -228,7 +223,7 @@ def test_where_says_channel_time_and_how_long():
 
 def test_where_nothing_is_above_the_noise_nothing_is_located():
     quiet = np.array([0.4, 0.5, 0.6, 0.7, 1.42, 0.9])
-    record = diagnosis("NO_GAP", named=(), **{"gap/before_floors": quiet, "gap/after_floors": quiet})
+    record = diagnosis("NO_GAP", named=(), gap=made.gap_change(quiet, quiet))
     _, facts, rows, caption, _ = screen(record)
     assert facts["Where"] == "Nowhere above the noise."
     assert facts["How sure"] == (
@@ -244,15 +239,15 @@ def test_the_gap_stands_before_and_after_beside_the_noise():
     assert texts(rows["gap, roll torque"]) == ["N m", "0.494", "0.0136", "0.0123", "40 → 1.1 floors"]
     assert "gap, yaw torque" not in rows
     assert "Within the noise: torque z." in caption
-    grew = {"gap/after_floors": np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2])}
-    _, _, rows, caption, _ = screen(diagnosis(**grew))
+    grew = made.gap_change(after=np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2]))
+    _, _, rows, caption, _ = screen(diagnosis(gap=grew))
     worse = rows["gap, roll torque"][-1]
     assert (worse.text, worse.tone) == ("40 → 60 floors, worse", "warning")
 
 
 def test_playback_stands_before_and_after_beside_what_knows_no_model():
     ends = {"velocity": (0.1, 0.5, 0.3, 0.2), "position": (0.4, 0.3, 0.5, 0.6)}
-    _, _, rows, caption, _ = screen(diagnosis(**made.played_pair(**ends)))
+    _, _, rows, caption, _ = screen(diagnosis(playback=made.played_pair(**ends)))
     assert texts(rows["playback, body rate"]) == ["rad/s", "2.0", "0.10", "1.0", "better than “nothing moves”"]
     assert texts(rows["playback, attitude"]) == ["°", "17", "0.57", "5.7", "better than “rate stays”"]
     assert texts(rows["playback, velocity"]) == ["m/s", "0.20", "0.10", "0.30", "better than “rate stays”"]
@@ -266,7 +261,7 @@ def test_what_cannot_be_played_back_is_said():
     assert "Playback: mean error after 0.5 s; velocity and position cannot be played back, " in caption
     assert not {"playback, velocity", "playback, position"} & set(rows)
     still = made.played_pair(body_rate=(0.0,) * 4, attitude=(0.0,) * 4)
-    _, _, rows, caption, _ = screen(diagnosis(**still))
+    _, _, rows, caption, _ = screen(diagnosis(playback=still))
     assert "The flights show no motion that could be played back." in caption
     _, _, rows, caption, _ = screen(replace(diagnosis(), playback=None))
     assert "layback" not in caption
@@ -277,29 +272,29 @@ def test_what_cannot_be_played_back_is_said():
     ("left", "said"),
     [
         (
-            ("torque z", 3.04, "speed", 0.4, np.nan, "drains"),
+            ("torque z", 3.04, "speed", 0.4, None, "drains"),
             "Torque about z (yaw), 3.0 floors: follows speed most (40 % of it), drains energy from the motion.",
         ),
         (
-            ("torque x", 2.2, "", 0.6, 4.013, "feeds"),
+            ("torque x", 2.2, None, 0.6, 4.013, "feeds"),
             "Torque about x (roll), 2.2 floors: rings at 4.01 Hz (60 % of it), feeds energy into the motion.",
         ),
         (
             ("torque z", 14.2, "yaw", 0.82, 3.21, "neither"),
             "Torque about z (yaw), 14 floors: follows yaw most and rings at 3.21 Hz (82 % of it).",
         ),
-        (("force z", 2.2, "", 0.0, np.nan, "neither"), "Force along z (up), 2.2 floors: follows no one signal."),
+        (("force z", 2.2, None, 0.0, None, "neither"), "Force along z (up), 2.2 floors: follows no one signal."),
     ],
 )
 def test_what_is_left_has_an_axis_a_cause_and_a_way_of_energy(left, said):
-    assert screen(diagnosis("UNEXPLAINED", named=(), unexplained=[left]))[1]["Residual"] == (
+    assert screen(diagnosis("UNEXPLAINED", named=(), unexplained=(Unexplained(*left),)))[1]["Residual"] == (
         f"In what it was fitted to: {said[0].lower()}{said[1:]}"
     )
     assert "Residual" not in screen(diagnosis())[1]
 
 
 def test_the_closest_effects_are_not_the_answer_and_say_how_little_they_do():
-    box, facts, _, caption, below = screen(diagnosis("UNEXPLAINED", named=({"named": 0},), share=0.31))
+    box, facts, _, caption, below = screen(diagnosis("UNEXPLAINED", named=(), closest=(made.effect(),), share=0.31))
     assert box.sentences[0].startswith(
         "The closest was offset of the centre of mass, which does not explain the gap: com_offset, "
     )
@@ -316,15 +311,15 @@ def test_flights_held_out_and_why_stand_below():
 
 
 def test_remarks_are_told_but_those_that_are_told_elsewhere():
-    notes = made.texts("A note that readers need.", WRONG, "The motion follows the rotors by 12 ms.")
-    record = diagnosis("CONTRADICTED", named=(), note=notes, impossible=made.texts(WRONG))
+    notes = ("A note that readers need.", WRONG, *made.AUDIT.notes)
+    record = diagnosis("CONTRADICTED", named=(), notes=notes, contradictions=(WRONG,))
     assert remarks(record) == ["A note that readers need."]
     assert plain(record)["contradictions"] == [WRONG]
-    assert plain(record)["notes"] == notes.tolist()
+    assert plain(record)["notes"] == list(notes)
 
 
 def test_what_is_gone_is_said_of_torque_and_force_where_both_had_a_gap():
-    both, torque = (np.array([0.95, share]) for share in (0.412, np.nan))
+    both, torque = (ByKind(torque=0.95, force=share) for share in (0.412, np.nan))
     assert screen(diagnosis("PARTIAL", share_by_kind=both))[1]["How sure"].startswith(
         "Of the held-out gap above the noise, 95 % of the torque and 41 % of the force is gone"
     )
@@ -340,15 +335,15 @@ def test_effects_are_credited_with_what_the_vehicles_own_numbers_leave():
 
 
 def test_what_differs_between_flights_stands_above_and_not_below():
-    differ = made.texts("the gap about y is in training alone")
-    record = diagnosis("FLIGHTS_DIFFER", named=({"named": 0},), difference=differ, note=differ)
+    differ = ("the gap about y is in training alone",)
+    record = diagnosis("FLIGHTS_DIFFER", named=(), closest=(made.effect(),), differences=differ, notes=differ)
     assert screen(record)[1]["Differs"] == "The gap about y is in training alone."
     assert not remarks(record)
 
 
 def test_a_rotor_that_loses_thrust_is_the_answer():
     loss = RotorLoss(flight="two.csv", rotor=3, time_s=12.0, loss=Estimate.around(0.08, 0.01))
-    record = diagnosis("FLIGHTS_DIFFER", named=(), difference=made.texts(loss.sentence))
+    record = diagnosis("FLIGHTS_DIFFER", named=(), differences=(loss.sentence,))
     box, facts, *_ = screen(replace(record, rotor_losses=(loss,)))
     assert (box.label, box.title) == ("FLIGHTS DIFFER", "M3 lost thrust in flight.")
     assert facts["Differs"].startswith("In two.csv M3 pulls 8 % [7, 9] less from 12.0 s on")
@@ -366,26 +361,29 @@ def test_rotors_that_are_logged_rarely_are_said_first():
 
 
 @pytest.mark.parametrize(
-    ("named", "words"),
+    ("given", "words"),
     [
-        (({},), "with offset of the centre of mass"),
-        (({"named": 0},), "with the closest effects, offset of the centre of mass, which are not the answer"),
-        ((), "with nothing but the vehicle's own parameters refitted"),
+        ({}, "with offset of the centre of mass"),
+        (
+            {"named": (), "closest": (made.effect(),)},
+            "with the closest effects, offset of the centre of mass, which are not the answer",
+        ),
+        ({"named": ()}, "with nothing but the vehicle's own parameters refitted"),
     ],
 )
-def test_the_second_model_is_said_to_be_what_it_is(named, words):
-    assert f"; after: {words}." in made.text_of(diagnosis(named=named), "diagnose")
+def test_the_second_model_is_said_to_be_what_it_is(given, words):
+    assert f"; after: {words}." in made.text_of(diagnosis(**given), "diagnose")
 
 
 def test_notes_on_flights_are_folded():
-    said = blocks(diagnosis(warning=made.texts("a.csv: gaps", "b.csv: late")))
+    said = blocks(diagnosis(warnings=("a.csv: gaps", "b.csv: late")))
     assert said[-1].summary == "2 notes on the flights and their import"
     assert [row[0].text for row in said[-1].blocks[0].cells] == ["a.csv: gaps.", "b.csv: late."]
     assert "notes on the flights" not in str(blocks(diagnosis()))
 
 
 def test_machines_read_what_people_read():
-    summary = plain(diagnosis(warning=made.texts("a.csv: gaps")))
+    summary = plain(diagnosis(warnings=("a.csv: gaps",)))
     assert summary["where"] == {
         "channels": ["force z", "torque x", "force x", "force y", "torque y"],
         "flight": "two.csv", "start_s": 1.0, "end_s": 2.5, "floors": 80.0, "share_of_time": 0.75,

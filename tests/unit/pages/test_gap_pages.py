@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import starmap
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 
 from cpfls_cli import page
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.gap.naming.results import Estimate, LikelySet, Unexplained
 from cpfls_cli.pages.gap import BEFORE, MEASURED, effect_title, keep_in_view, leaves_view, marked
 from cpfls_cli.pages.gap_words import NOT_SPLIT, WHAT_TO_FLY, repeatability_drawn
 from cpfls_cli.playback.disturbance import FoundGusts
@@ -58,12 +59,12 @@ def test_only_a_curve_that_runs_away_leaves_the_picture(error, leaves):
     assert bool(bad.max() > high or bad.min() < low) is leaves
 
 
-GREW = {"gap/after_floors": np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2])}
-FAULT = ("gyro_bias", 1, 1e-9, "The gyroscope shows 0.01 rad/s at rest.")
-RIVALS = [("torque_bias", "com_offset", 0.98, "change the thrust", "")]
-LEFT = [("torque z", 14.2, "yaw", 0.82, 3.21, "feeds"), ("force x", 2.0, "", 0.0, np.nan, "neither")]
+GREW = made.gap_change(after=np.array([60.0, 0.01, 0.9, 0.9, 0.8, 1.2]))
+LEFT = (
+    Unexplained("torque z", 14.2, "yaw", 0.82, 3.21, "feeds"),
+    Unexplained("force x", 2.0, None, 0.0, None, "neither"),
+)
 _WIDE = 80
-BROKEN = made.texts("rotor 2 looks saturated")
 
 
 @pytest.mark.parametrize(
@@ -71,18 +72,16 @@ BROKEN = made.texts("rotor 2 looks saturated")
     [
         ("compare", made.disagreement()),
         ("compare", made.disagreement(force=False)),
-        ("compare", made.disagreement(**{"gap/floors": np.linspace(1.0, 1.5, 6)})),
+        ("compare", made.disagreement(floors=np.linspace(1.0, 1.5, 6))),
         ("diagnose", made.diagnosis()),
-        ("diagnose", made.diagnosis("AMBIGUOUS", alternatives=RIVALS)),
-        ("diagnose", made.diagnosis("UNEXPLAINED", named=({"named": 0},), unexplained=LEFT)),
+        ("diagnose", made.diagnosis("AMBIGUOUS", alternatives=(made.RIVAL,))),
+        ("diagnose", made.diagnosis("UNEXPLAINED", named=(), closest=(made.effect(),), unexplained=LEFT)),
         ("diagnose", made.diagnosis("NO_GAP", named=(), force=False)),
         ("extend", made.extended()),
-        ("extend", made.extended(**GREW)),
+        ("extend", made.extended(gap=GREW)),
         (
             "diagnose",
-            made.diagnosis(
-                named=({"name": "gyro_bias", "kind": "sensor"},), **made.audit([FAULT]) | {"audit/warning": BROKEN}
-            ),
+            made.diagnosis(named=("gyro_bias",), audit=made.audit_with_fault(warnings=("rotor 2 looks saturated",))),
         ),
     ],
 )
@@ -197,13 +196,14 @@ def test_errors_of_the_vehicles_numbers_are_per_cent_with_a_sign():
 
 
 def test_an_effect_stands_once_beside_its_coefficients():
-    found = made.diagnosis(named=({}, {"name": "wind"}))
+    found = made.diagnosis(named=("com_offset", "wind"))
     (table,) = [each for each in tables(found) if each.header[:2] == ["Effect", "Coefficient"]]
     assert [row[0].text for row in table.cells] == ["com_offset", "wind"]
 
 
 def test_sets_stand_in_a_table_with_how_likely_each_is():
-    found = made.diagnosis(sets=[(("com_offset", "motor_lag"), 0.954), (("torque_bias", "motor_lag"), 0.046)])
+    likely = {("com_offset", "motor_lag"): 0.954, ("torque_bias", "motor_lag"): 0.046}
+    found = made.diagnosis(sets=tuple(starmap(LikelySet, likely.items())))
     (table,) = [each for each in tables(found) if each.header[0] == "Set of effects"]
     assert [[cell.text for cell in row] for row in table.cells] == [
         ["offset of the centre of mass and motor lag", "95 %"],
@@ -215,10 +215,6 @@ def test_sets_stand_in_a_table_with_how_likely_each_is():
 NOTHING_HIDDEN = np.array([1.01, 1.15, 0.908, 1.01, 1.06, 1.10])
 
 
-def disagreement(floors):
-    return made.disagreement(**{"gap/floors": floors})
-
-
 @pytest.mark.parametrize(
     ("floors", "above"),
     [
@@ -228,7 +224,7 @@ def disagreement(floors):
     ],
 )
 def test_every_form_calls_the_same_channels_above_noise(floors, above):
-    record = disagreement(floors)
+    record = made.disagreement(floors=floors)
     assert "".join("y" if index in record.sizes.above_noise else "n" for index in record.sizes.known) == above
     for form, text in in_all_forms(made.source_of(record, "compare"), made.blocks_of(record, "compare")).items():
         begins = ("roll t", "pitch t", "yaw t", "force")
@@ -240,7 +236,7 @@ def test_every_form_calls_the_same_channels_above_noise(floors, above):
 
 
 def test_no_signal_is_drawn_where_nothing_is_above_noise():
-    assert "(dependence)" not in made.text_of(disagreement(NOTHING_HIDDEN), "compare")
+    assert "(dependence)" not in made.text_of(made.disagreement(floors=NOTHING_HIDDEN), "compare")
 
 
 @given(st.lists(st.tuples(st.floats(0, 1e4), st.integers(1, 30)), min_size=1, max_size=5))
@@ -377,7 +373,7 @@ def test_the_split_stands_behind_a_verdict_and_before_a_gap():
 @pytest.mark.parametrize("floors", [2.0, 1.0])
 def test_a_gap_that_does_not_come_again_is_said_beside_the_verdict(floors):
     """And what to do next is no search for an effect; within the noise nothing is left."""
-    given = made.diagnosis(**{"verdict": "UNEXPLAINED", "named": (), "gap/after_floors": np.full(6, floors)})
+    given = made.diagnosis("UNEXPLAINED", named=(), gap=made.gap_change(after=np.full(6, floors)))
     groups = {"repeatability_before": made.repeatability(NOTHING), "repeatability_after": made.repeatability(NOTHING)}
     box, facts, *_ = made.blocks_of(replace(given, **groups), "diagnose")
     assert (NO_EFFECT in box.sentences) == (floors > 1.5)
@@ -475,7 +471,7 @@ def test_machines_read_sizes():
 
 def test_gusts_stand_on_a_small_screen_beside_however_many_effects():
     air = replace(FOUND, alone=np.isfinite(FOUND.size))
-    blocks = made.blocks_of(replace(made.diagnosis(named=({},) * 3), air=air), "diagnose")
+    blocks = made.blocks_of(replace(made.diagnosis(named=("com_offset",) * 3), air=air), "diagnose")
     rows = [row for block in blocks if isinstance(block, Facts) for row in block.rows]
     (words,) = [words for name, words in rows if name == "Gusts"]
     assert words.startswith("The residual is gusts, ")
