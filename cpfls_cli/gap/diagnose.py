@@ -466,8 +466,7 @@ def _concluded(
     share = min(removed.values(), default=1.0)
     listed = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
     once = {(rival.name, rival.instead_of, rival.jointly_with): rival for rival in listed}
-    rivals = (*once.values(), *untried(hypothesis, named, settings))
-    rivals += tuple(not_separated(found.judgement.found, numbers)) if numbers is not None else ()
+    rivals = (*once.values(), *untried(hypothesis, named, settings), *not_separated(found.judgement.found, numbers))
     before, after = (held_out.size(each).floors for each in (held_out.parameters, held_out.after))
     remains = bool(remainder)
     if effects:

@@ -181,23 +181,25 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
     return tuple(rivals)
 
 
-def not_separated(found: NamedFit, wrong: NamedEffect) -> Iterator[Alternative]:
+def not_separated(found: NamedFit, wrong: NamedEffect | None) -> Iterator[Alternative]:
     """List the rivals of wrong numbers of the vehicle that, with these as stated, differ by nothing that shows.
 
     Under a vehicle that hardly changes its speed a load on a cable does not swing, and is more weight. Its swing is
     computed from measured motion, with the acceleration and from the velocity alone, because noise swings it too, and
     that of each differently.
     """
+    if wrong is None:
+        return
     hypothesis, floor = found.hypothesis, found.floor
     named = np.array([each.name in wrong.coefficients for each in VEHICLE_NUMBERS.coefficients])
     stated = [replace(flight, turns=flight.turns * ~named) for flight in hypothesis.flights]
     by_velocity = [replace(each, signals=replace(each.signals, acceleration=None), seen={}) for each in stated]
-    own = hypothesis.residual_at(fit_within_bounds(hypothesis, floor)[0])
+    own = hypothesis.base @ fit_within_bounds(hypothesis, floor)[0]
 
     def alike(candidate: Candidate) -> bool:
         there, again = (system(flights, [*hypothesis.chosen, candidate]) for flights in (stated, by_velocity))
         linear, _ = fit_within_bounds(there, floor)
-        left, anew = ((each.residual_at(linear) - own) / floor for each in (there, again))
+        left, anew = ((each.base @ linear - own) / floor for each in (there, again))
         return bool((np.mean(left * anew, axis=0) < VISIBLE**2).all())
 
     for name, separated_by in VEHICLE_NUMBERS.rivals.items():

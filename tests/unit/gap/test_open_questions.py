@@ -116,17 +116,20 @@ def carried(size, share, highest_hz):
     )
 
 
+def with_wrong_thrust(signals):
+    found = fitted([weak(signals, force=True)], (), np.array([1e3, 1e3, 1e3, 0.2, 0.2, 0.2]), GapSettings())
+    thrust = next(each for each in found.estimates.parameters if each.name == "thrust_scale")
+    return found, named_effect("parameter_error", numbers=[thrust])
+
+
 @pytest.mark.parametrize(
     ("size", "share", "highest_hz", "rivals"),
     [(0.02, 0.12, 0.5, ["payload"]), (1.0, 0.12, 1.5, []), (0.02, -0.12, 0.5, [])],
     ids=["hardly moves", "would swing", "too much thrust"],
 )
 def test_a_load_that_hardly_swings_is_a_double_of_too_little_thrust(size, share, highest_hz, rivals):
-    floor = np.array([1e3, 1e3, 1e3, 0.2, 0.2, 0.2])
-    found = fitted([weak(carried(size, share, highest_hz), force=True)], (), floor, GapSettings())
-    thrust = next(each for each in found.estimates.parameters if each.name == "thrust_scale")
-    assert thrust.value == pytest.approx(1 / (1 + share) - 1, abs=0.003)
-    wrong = named_effect("parameter_error", numbers=[thrust])
+    found, wrong = with_wrong_thrust(carried(size, share, highest_hz))
+    assert wrong.numbers[0].value == pytest.approx(1 / (1 + share) - 1, abs=0.003)
     assert [each.name for each in not_separated(found, wrong)] == rivals
     ignoring = found._replace(settings=GapSettings(ignore=("payload",)))
     assert list(not_separated(ignoring, wrong)) == []
