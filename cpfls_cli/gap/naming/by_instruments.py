@@ -52,7 +52,8 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
         values, left_out = _stepped(at, sources)
-        now = (left_out != values).any(axis=0)
+        # What follows from others is identified where they are.
+        now = np.any([*(numbers for _, numbers in sources), (left_out != values).any(axis=0)], axis=0)
         if before is not None:
             # A number that no source identifies where it has come to is as uncertain as when one did.
             left_out[:, ~now] = before[:, ~now]

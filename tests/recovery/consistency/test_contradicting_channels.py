@@ -244,7 +244,7 @@ SEVERAL = {
         lambda s: WRONG["velocity in km/h"][0](WRONG["in g"][0](s)),
     ),
     "axes": (("velocity has y, x, -z",), WRONG["velocity in NED"][0]),
-    "offset": ((), of_acceleration(lambda _, a: a + np.array([0.3, -0.2, 0.4]))),
+    "offset": (("acceleration has a bias of +0.",), of_acceleration(lambda _, a: a + np.array([0.3, -0.2, 0.4]))),
 }
 
 
