@@ -45,7 +45,7 @@ from cpfls_cli.gap.naming.causes import (
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, ends_on_bound, fitted
 from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
 from cpfls_cli.gap.naming.noisy_rate import with_noisy_rate
-from cpfls_cli.gap.naming.open_questions import not_excited, unexplained_channels, untried, with_unnamed
+from cpfls_cli.gap.naming.open_questions import not_excited, not_separated, unexplained_channels, untried, with_unnamed
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import (
     Alternative,
@@ -379,7 +379,7 @@ def _wrong_inertia(named: _Named) -> bool:
     (hypothesis, estimates, *_), held_out = named.judgement
     names = (each.effect.name for each in hypothesis.chosen)
     numbers = dict(zip(names, estimates.effects, strict=True))
-    wrong = wrong_numbers(estimates, numbers, held_out.removed_by_numbers(0.0))
+    wrong = wrong_numbers(estimates, numbers, held_out.removed_by_numbers(0.0), hypothesis.vehicle)
     return wrong is not None and any(each.name.startswith("inertia") for each in wrong.numbers)
 
 
@@ -456,7 +456,7 @@ def _concluded(
     # In gusts instruments identify the numbers, and a gap need not be clear.
     still = not hypothesis.gusty.any()
     taken = held_out.removed_by_numbers(NOISE if still else 0.0)
-    numbers = wrong_numbers(estimates, {each.name: each.numbers for each in effects}, taken)
+    numbers = wrong_numbers(estimates, {each.name: each.numbers for each in effects}, taken, hypothesis.vehicle)
     effects += [numbers] if numbers is not None else []
     # Where wrong numbers leave no gap, there is none that names could take a share of.
     removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)
@@ -466,7 +466,7 @@ def _concluded(
     share = min(removed.values(), default=1.0)
     listed = [*found.alike, *(rival for each in judged for rival in each.alternatives)]
     once = {(rival.name, rival.instead_of, rival.jointly_with): rival for rival in listed}
-    rivals = (*once.values(), *untried(hypothesis, named, settings))
+    rivals = (*once.values(), *untried(hypothesis, named, settings), *not_separated(found.judgement.found, numbers))
     before, after = (held_out.size(each).floors for each in (held_out.parameters, held_out.after))
     remains = bool(remainder)
     if effects:

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.effects.signals import TRAINING, in_roles
 from cpfls_cli.errors import ComputationError, InputError, SettingError, about
@@ -176,11 +176,13 @@ def _open_effects(
     if rivals:
         require_visible([CATALOGUE[each.name] for each in rivals], str(path), study.vehicle)
         return rivals, []
-    hidden = [CATALOGUE[each.name] for each in found.not_excited if each.name in visible]
+    # Numbers of the vehicle are free in every fit: of their rivals it is asked whether they show.
+    of_numbers = [each for each in found.alternatives if each.instead_of == VEHICLE_NUMBERS.name]
+    hidden = [CATALOGUE[each.name] for each in of_numbers or found.not_excited if each.name in visible]
     unseen = [each for each in hidden if not all(each.missing(flight.signals) for flight in flights)]
     if asked:
         return [], []
-    if found.verdict not in _OPEN or not unseen:
+    if not unseen or not (of_numbers or found.verdict in _OPEN):
         raise InputError(
             f"{path}: its verdict is {found.verdict}, and it leaves nothing to separate; to plan a flight all the "
             "same name effects with --separate A,B"

@@ -128,6 +128,15 @@ def _log(signals: Mapping[str, Array], motion: TrueMotion, values: Mapping[str, 
     return {name: signals[name] + rotations.multiply(motion.rotation, more) for name, more in added.items()}
 
 
+def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
+    """Say which mass does the same as a scale of the thrust: acceleration shows the ratio of the two alone."""
+    scale = 1 + values.get("thrust_scale", -1.0)
+    if scale <= 0:
+        return ""
+    mass = vehicle.mass_kg / scale
+    return f"A mass of {mass:.3g} kg instead, {mass - vehicle.mass_kg:+.2g} kg, or a load, would do the same."
+
+
 def _acts(see: Instant, p: Numbers) -> Wrench:
     moments, rate = see.vehicle.inertia_kg_m2[:3], see.body_rate
     turned = tuple(-p[f"inertia_{axis}"] * own * each for axis, own, each in zip("xyz", moments, rate, strict=True))
@@ -161,9 +170,11 @@ EFFECT = Effect(
         "rotor_mismatch": "apply yaw effort at constant roll and pitch",
         "rotor_acceleration": "compare slow with fast yaw: a wrong Izz acts in both",
         "motor_lag": "compare slow with fast torque: a wrong inertia acts in both",
+        "payload": "accelerate and stop, then wait for some swings: a wrong mass, or thrust, does not swing",
     },
     source="Newton-Euler equations",
     columns=_columns,
     log=SensorLog(change=_log),
     acts=_acts,
+    describe=_describe,
 )

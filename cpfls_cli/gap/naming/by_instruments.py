@@ -52,7 +52,8 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
         values, left_out = _stepped(at, sources)
-        now = np.any([numbers for _, numbers in sources], axis=0)
+        # What follows from others is identified where they are.
+        now = np.any([*(numbers for _, numbers in sources), (left_out != values).any(axis=0)], axis=0)
         if before is not None:
             # A number that no source identifies where it has come to is as uncertain as when one did.
             left_out[:, ~now] = before[:, ~now]
@@ -78,7 +79,10 @@ def _of_config(found: NamedFit) -> NamedFit:
 
 
 def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]:
-    """Move numbers to where instruments and residual do not correlate; and with each block left out."""
+    """Move numbers to where instruments and residual do not correlate; and with each block left out.
+
+    Shapes that follow from coefficients follow them.
+    """
     values, prior = found.values, known_before(found.hypothesis)
     change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
     for products, numbers in sources:
@@ -93,8 +97,11 @@ def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]
         for each in found.hypothesis.chosen
         for shape in each.effect.shapes
     ]
-    ends = np.array([(-np.inf, np.inf)] * len(found.estimates.linear) + shapes)
-    return np.clip(values + change, *ends.T), np.clip(values + without, *ends.T)
+    ends, linear = np.array([(-np.inf, np.inf)] * len(found.estimates.linear) + shapes), len(found.estimates.linear)
+    rows = np.clip(values + np.vstack([change, without]), *ends.T)
+    said = np.array([found.hypothesis.following(row[:linear]) for row in rows])
+    rows[:, linear:] = np.where(np.isnan(said), rows[:, linear:], said)
+    return rows[0], rows[1:]
 
 
 def with_lean(found: NamedFit, across: Array) -> NamedFit:
@@ -204,7 +211,8 @@ def _sources(found: NamedFit, given: Instruments) -> list[_Source]:
     vehicle, of_vehicle = hypothesis.places[0]
     free[of_vehicle] &= np.isin([each.name for each in vehicle.effect.coefficients], list(NUMBERS))
     lags = np.array([each.effect.is_lag for each in hypothesis.chosen for _ in each.effect.shapes], dtype=bool)
-    open_, early = np.append(free, np.ones_like(lags)), np.append(np.ones_like(free), ~lags)
+    own = np.isnan(hypothesis.following(found.estimates.linear))
+    open_, early = np.append(free, own), np.append(np.ones_like(free), ~lags)
     windows = _windows_of_runs(found, given)
     blocks = np.unique(np.concatenate([run.block for run in chain(*windows)]))
     for place, runs in enumerate(windows):

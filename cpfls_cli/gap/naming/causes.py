@@ -21,6 +21,7 @@ from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, Named
 from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in_place_of
 from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
 from cpfls_cli.rounding import ascending
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MATTERS = 0.02  # Relative error of a moment of inertia or of the thrust from which on it is named.
 
@@ -119,9 +120,11 @@ def shares(found: NamedFit) -> Array:
 
 
 def wrong_numbers(
-    estimates: Estimates, effects: Mapping[str, Sequence[Estimate]], removed: Array
+    estimates: Estimates, effects: Mapping[str, Sequence[Estimate]], removed: Array, vehicle: VehicleSettings
 ) -> NamedEffect | None:
     """Name the numbers of the vehicle that are significantly wrong, relevant, and not explained by a named effect.
+
+    Where inertia over rotor torque shows a wrong thrust too, the mass is right.
 
     `effects`: the numbers of those that are named.
     `removed`, shape (6,): part of each channel's gap on unseen flights that refitting the numbers takes off.
@@ -143,7 +146,8 @@ def wrong_numbers(
         return None
     share = float(max(shown[number.name] for number in wrong))
     p_value = min(_chance(number) for number in wrong)
-    return _without_columns(VEHICLE_NUMBERS.name, tuple(wrong), p_value, share, VEHICLE_NUMBERS.sentence)
+    sentence = effect_sentence(VEHICLE_NUMBERS, [] if of_thrust(wrong) else wrong, vehicle)
+    return _without_columns(VEHICLE_NUMBERS.name, tuple(wrong), p_value, share, sentence)
 
 
 def of_thrust(numbers: Sequence[Estimate]) -> list[str]:

@@ -1,6 +1,6 @@
 """Open questions of a diagnosis: unexplained residuals, and effects too small for a name or not shown at all."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,14 +8,14 @@ import numpy as np
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import FEWEST_BLOCKS, half_width, mean_error
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.balance_system import System, residual_along, system, window_noise
-from cpfls_cli.gap.balance.refine import least_squares
+from cpfls_cli.gap.balance.balance_system import System, is_free, residual_along, system, window_noise
+from cpfls_cli.gap.balance.refine import fit_within_bounds, least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted, size_in_floors
 from cpfls_cli.gap.naming.odds import names_of
-from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
+from cpfls_cli.gap.naming.ranking import RankedStep, candidates_of, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
@@ -179,6 +179,35 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
                 separated_by = f"{' and '.join(asked)}, without which it was not tried"
                 rivals.append(Alternative(name, effect.name, np.nan, separated_by))
     return tuple(rivals)
+
+
+def not_separated(found: NamedFit, wrong: NamedEffect | None) -> Iterator[Alternative]:
+    """List the rivals of wrong numbers of the vehicle that, with these as stated, differ by nothing that shows.
+
+    Under a vehicle that hardly changes its speed a load on a cable does not swing, and is more weight. Its swing is
+    computed from measured motion, with the acceleration and from the velocity alone, because noise swings it too, and
+    that of each differently.
+    """
+    if wrong is None:
+        return
+    hypothesis, floor = found.hypothesis, found.floor
+    named = np.array([each.name in wrong.coefficients for each in VEHICLE_NUMBERS.coefficients])
+    stated = [replace(flight, turns=flight.turns * ~named) for flight in hypothesis.flights]
+    by_velocity = [replace(each, signals=replace(each.signals, acceleration=None), seen={}) for each in stated]
+    own = hypothesis.base @ fit_within_bounds(hypothesis, floor)[0]
+
+    def alike(candidate: Candidate) -> bool:
+        there, again = (system(flights, [*hypothesis.chosen, candidate]) for flights in (stated, by_velocity))
+        linear, _ = fit_within_bounds(there, floor)
+        left, anew = ((each.base @ linear - own) / floor for each in (there, again))
+        return bool((np.mean(left * anew, axis=0) < VISIBLE**2).all())
+
+    for name, separated_by in VEHICLE_NUMBERS.rivals.items():
+        effect = CATALOGUE[name]
+        untried = name in {*found.settings.ignore, *names_of(hypothesis.chosen)} or effect.columns is None
+        tried = [] if untried else filter(hypothesis.can, candidates_of([effect]))
+        if any(alike(each) for each in tried if is_free(each)):
+            yield Alternative(name, wrong.name, 1.0, separated_by)
 
 
 def _lacked(hypothesis: System, effect: Effect) -> tuple[Sequence[str], Sequence[str]]:

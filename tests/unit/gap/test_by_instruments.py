@@ -10,12 +10,22 @@ from scipy.stats import ttest_1samp
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_instruments
-from cpfls_cli.gap.naming.by_instruments import _chance, _Source, _strong, significant_effects, with_lean
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit
+from cpfls_cli.gap.naming.by_instruments import (
+    _chance,
+    _Source,
+    _sources,
+    _stepped,
+    _strong,
+    _Windows,
+    significant_effects,
+    with_lean,
+)
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.playback.innovations import PER_WINDOW, innovations
 from cpfls_cli.playback.instruments import held as stays
+from tests.builders.gap_flights import candidate, fly, weak
 
 BLOCKS, WINDOWS = 20, 12
 OWN, OTHER = np.array([True, False]), np.array([False, True])
@@ -136,3 +146,22 @@ def test_a_vehicle_that_leans_against_gusts_may_have_more_thrust(across, more):
     assert inertia == numbers[0]
     assert (thrust.value, thrust.low) == (0.2, 0.19)
     assert thrust.high == pytest.approx(0.21 + 1.2 * more)
+
+
+def test_the_hook_of_a_load_follows_its_torque_and_mass(monkeypatch):
+    """Instruments move both; the depth moves with them, in all blocks and without each, and not by its own."""
+    effect = (candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.1), [0.06, 0.0, 0.0, 0.6])
+    flights = [weak(fly(1, [effect], seconds=30.0, speed=1.0), force=True)]
+    found = fitted(flights, [effect[0]], np.full(6, 0.1), GapSettings())
+    linear, rng = len(found.estimates.linear), np.random.default_rng(1)
+    rows = rng.standard_normal((240, 6, len(found.values) + 1))
+    windows = [_Windows(rows, rows, np.repeat(np.arange(20), 12))]
+    monkeypatch.setattr(by_instruments, "_windows_of_runs", lambda *_: (windows, windows))
+    sources = _sources(found, None)
+    identified = dict(zip([shape.name for shape in effect[0].effect.shapes], sources[0].numbers[linear:], strict=True))
+    assert identified == {"length_m": True, "damping_1_s": True, "depth_m": False}
+    values, left_out = _stepped(found, sources)
+    for moved in (values, *left_out):
+        depth, _, _, mass = moved[linear - 4 : linear]
+        assert moved[-1] == pytest.approx(np.clip(depth / mass, 0.0, 0.3))
+    assert np.ptp(left_out[:, -1]) > 0

@@ -7,6 +7,7 @@ from scipy.stats import norm
 from cpfls_cli.gap.naming.causes import JudgedEffect, impossible_ratios, likely_sets, wrong_numbers
 from cpfls_cli.gap.naming.estimate import Estimates
 from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.gap_artifacts import named_effect
 
 
@@ -26,7 +27,8 @@ SURE = number("inertia_x", 0.15, 0.02)
 
 
 def result(*numbers, effects=(), share=0.5):
-    effect = wrong_numbers(found(*numbers), {each.name: each.numbers for each in effects}, np.broadcast_to(share, 6))
+    known = {each.name: each.numbers for each in effects}
+    effect = wrong_numbers(found(*numbers), known, np.broadcast_to(share, 6), VehicleSettings())
     return () if effect is None else tuple(each.name for each in effect.numbers)
 
 
@@ -60,7 +62,7 @@ def test_the_channel_of_the_number_has_to_shrink():
 
 
 def test_probability_is_that_of_a_normal_error_of_the_surest_number():
-    effect = wrong_numbers(found(SURE, number("inertia_y", 0.05, 0.02)), {}, np.full(6, 0.5))
+    effect = wrong_numbers(found(SURE, number("inertia_y", 0.05, 0.02)), {}, np.full(6, 0.5), VehicleSettings())
     assert effect.p_value == pytest.approx(2 * norm.sf(1.96 * 0.15 / 0.02))
     assert (effect.name, effect.share) == ("parameter_error", 0.5)
 
@@ -88,6 +90,13 @@ def test_a_wrong_drag_factor_accounts_for_as_much_of_izz():
     assert result(small, effects=(wrong,)) == ()
     assert result(large, effects=(wrong,)) == ("inertia_z",)
     assert result(other, effects=(wrong,)) == ("inertia_x",)
+
+
+@pytest.mark.parametrize(("inertia", "said"), [(0.0, True), (1 / 0.9 - 1, False)])
+def test_where_rates_show_a_wrong_thrust_too_it_is_no_mass(inertia, said):
+    numbers = found(number("thrust_scale", -0.1, 0.001), number("inertia_x", inertia, 0.005))
+    effect = wrong_numbers(numbers, {}, np.full(6, 0.5), VehicleSettings())
+    assert ("A mass of" in effect.sentence) is said
 
 
 def test_a_load_accounts_for_any_thrust():

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.naming.estimate import effect_sentence
+from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.naming.estimate import effect_sentence, estimates_of
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from tests.builders.gap_flights import candidate, fly, weak
 
 
 def result(name, vehicle=None, **values):
@@ -46,6 +48,25 @@ def test_vehicle_without_opposite_pairs_names_the_weakest_rotor():
 )
 def test_state_of_descent(knots, words):
     assert words in result("vertical_descent", **knots)
+
+
+def test_too_little_thrust_may_be_more_mass():
+    vehicle = VehicleSettings(mass_kg=0.0397)
+    said = result("parameter_error", vehicle, thrust_scale=(-0.1059, 0.001))
+    assert said == "A mass of 0.0444 kg instead, +0.0047 kg, or a load, would do the same."
+    assert result("parameter_error", vehicle, inertia_x=(0.2, 0.01)) == ""
+    assert result("parameter_error", vehicle, thrust_scale=(-1.5, 0.01)) == ""
+
+
+def test_what_cannot_be_below_zero_has_no_interval_there():
+    known = system([weak(fly(1))], [candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.01)])
+    values = np.concatenate([np.zeros(known.base.shape[2]), known.shape_values])
+    left_out = values + 0.01 * np.random.default_rng(1).standard_normal((20, len(values)))
+    (numbers,) = estimates_of(known, values, left_out).effects
+    hook, aside, *_, depth = numbers
+    assert (hook.low, depth.low) == (0.0, 0.0)
+    assert aside.low < 0.0
+    assert depth.value == 0.01 < depth.high
 
 
 def test_other_effects_keep_their_sentence():

@@ -31,6 +31,7 @@ from cpfls_cli.gap.settings import NOISE, RARE, GapSettings
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.simulation.inverse import squared_speeds
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
+from cpfls_cli.stages._next_flight import _open_effects
 from cpfls_cli.trajectory.profile import LimitSettings
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
 from cpfls_cli.weak_form.windows import windows
@@ -395,3 +396,11 @@ def test_judged_on_hover_is_not_sure():
     (answer,) = answered([gathered(offset, [LOGGING.weak(along(path_of(2, 0.0)))], FLOOR, GapSettings())])
     assert answer.sure < 0.01
     assert usual(CATALOGUE["motor_lag"], VEHICLE).linear.tolist() == [1.0]
+
+
+def test_of_a_double_of_wrong_numbers_it_is_asked_whether_it_shows():
+    """Numbers of the vehicle are free in every fit, and no effect that a flight could separate from another."""
+    load = Alternative("payload", "parameter_error", 1.0, "wait for some swings")
+    found = SimpleNamespace(alternatives=(load,), effects_of_motion=(), not_excited=(), verdict="AMBIGUOUS")
+    study = SimpleNamespace(trajectory=TrajectorySettings(), vehicle=VEHICLE)
+    assert _open_effects(study, found, [weak(fly(1))], "diagnosis.h5") == ([], [CATALOGUE["payload"]])

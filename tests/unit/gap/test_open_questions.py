@@ -1,13 +1,19 @@
-"""What stays open: effects that would not show, and which way a nameless torque feeds the motion."""
+"""What stays open: effects that would not show, doubles of wrong numbers, and which way a nameless torque feeds."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from cpfls_cli import rotations
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.naming.open_questions import energy_directions, not_excited
-from tests.builders.gap_flights import candidate, fly, weak
+from cpfls_cli.gap.naming.estimate import fitted
+from cpfls_cli.gap.naming.open_questions import energy_directions, not_excited, not_separated
+from cpfls_cli.gap.settings import GapSettings
+from tests.builders.gap_artifacts import named_effect
+from tests.builders.gap_flights import PERIOD, VEHICLE, candidate, fly, sines, weak
 
 FLOOR = np.full(6, 0.05)
 RNG = np.random.default_rng(1)
@@ -86,3 +92,44 @@ def test_few_blocks_say_nothing():
 def test_noise_is_seldom_taken_for_either():
     found = [energy_directions(RNG.normal(size=(400, 3)), RATE, BLOCK) for _ in range(100)]
     assert sum(word != "neither" for words in found for word in words) < 15
+
+
+def carried(size, share, highest_hz):
+    """A flight that leans for its acceleration, of `size` m/s^2, whose rotors pull by a share too much."""
+    rng = np.random.default_rng(1)
+    time = PERIOD * np.arange(3000)
+    acceleration, _, _ = sines(time, [size, size, 0.5 * size], 0.2, highest_hz, rng)
+    felt = acceleration + np.array([0.0, 0.0, 9.81])
+    length = np.linalg.norm(felt, axis=1)
+    angles = -np.arcsin(felt[:, 1] / length), np.arctan2(felt[:, 0], felt[:, 2]), 0.0 * time
+    attitude = np.stack(angles, axis=1)
+    noise = rng.standard_normal((2, *acceleration.shape))
+    speed = np.sqrt((1 + share) * VEHICLE.mass_kg * length / sum(r.thrust_factor_n_s2 for r in VEHICLE.rotors))
+    return Signals(
+        time=time,
+        vehicle=VEHICLE,
+        attitude=attitude,
+        body_rate=rotations.body_rate(attitude, np.gradient(attitude, time, axis=0)),
+        velocity=np.cumsum(acceleration, axis=0) * PERIOD + 0.02 * noise[0],
+        acceleration=acceleration + 0.2 * noise[1],
+        rotor_speed=np.tile(speed[:, None], (1, 4)),
+    )
+
+
+def with_wrong_thrust(signals):
+    found = fitted([weak(signals, force=True)], (), np.array([1e3, 1e3, 1e3, 0.2, 0.2, 0.2]), GapSettings())
+    thrust = next(each for each in found.estimates.parameters if each.name == "thrust_scale")
+    return found, named_effect("parameter_error", numbers=[thrust])
+
+
+@pytest.mark.parametrize(
+    ("size", "share", "highest_hz", "rivals"),
+    [(0.02, 0.12, 0.5, ["payload"]), (1.0, 0.12, 1.5, []), (0.02, -0.12, 0.5, [])],
+    ids=["hardly moves", "would swing", "too much thrust"],
+)
+def test_a_load_that_hardly_swings_is_a_double_of_too_little_thrust(size, share, highest_hz, rivals):
+    found, wrong = with_wrong_thrust(carried(size, share, highest_hz))
+    assert wrong.numbers[0].value == pytest.approx(1 / (1 + share) - 1, abs=0.003)
+    assert [each.name for each in not_separated(found, wrong)] == rivals
+    ignoring = found._replace(settings=GapSettings(ignore=("payload",)))
+    assert list(not_separated(ignoring, wrong)) == []
