@@ -109,9 +109,9 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
             raise InputError(f"a log of {AIRPLANE} or its like ({joined(surfaces)}: {_SURFACES}), {NO_MULTIROTOR}")
         warnings += [warning for own in found["rotor_command"] for warning in _beyond_commands(own, parameters)][:1]
     shares = None if command is None or command.columns.unit != "1" else command
-    beside = {name for named, *_ in found["rotor_command"] for name in named.group.columns}
+    others = {name for named, *_ in found["rotor_command"] for name in named.group.columns}
     power = None if shares is None or speed is None else _power(found, speed, shares)
-    command_is = None if shares is None else _meaning(shares, beside, parameters, system, power)
+    command_is = None if shares is None else _meaning(shares, others, parameters, system, power)
     return RotorColumns(speed, command, command_is, tuple(left_out), tuple(warnings))
 
 
@@ -460,7 +460,7 @@ def _power(found: Mapping[str, Sequence[Found]], speed: Guess, command: Guess) -
 
 
 def _meaning(
-    command: Guess, beside: Collection[str], parameters: Parameters, system: str, power: float | None
+    command: Guess, others: Collection[str], parameters: Parameters, system: str, power: float | None
 ) -> KeyChoice:
     """Tell whether a command is a share of thrust or of speed, by what other columns of commands there are too."""
 
@@ -470,7 +470,7 @@ def _meaning(
     if command.kind == CRAZYFLIE:
         if "motor.m" not in command.columns.columns[0]:
             return choose("speed", "pwm.* of a Crazyflie is what the motors get")
-        if any("pwm.m" in name for name in beside):
+        if any("pwm.m" in name for name in others):
             said = "motor.m* of a Crazyflie that logs pwm.m* too are thrusts, before it compensates for the battery"
             return choose("thrust", said)
         before = "of firmware before November 2022 they are thrusts, before it compensates for the battery"

@@ -222,9 +222,9 @@ def test_it_flies_like_any_other_and_its_page_says_what_it_tells(cpfls, next_con
 
 
 def test_a_single_effect_is_shown(cpfls, next_config, tmp_path):
-    (row,) = cpfls.summary(
-        "trajectory", next_config, "--separate", "rotor_drag", *SMALL, *FEW, "-o", tmp_path / "n.h5"
-    )["questions"]
+    (row,) = cpfls.summary("trajectory", next_config, "--to-tell", "rotor_drag", *SMALL, *FEW, "-o", tmp_path / "n.h5")[
+        "questions"
+    ]
     assert (row["true"], row["rival"]) == ("rotor_drag", "")
 
 
