@@ -183,6 +183,7 @@ _GONE = {
     ("report", "paper"): _PAPER,
     ("simulation", "computed_torque"): f"remove it; {_CONTROL}",
     **{("sweep", key): _LOOP for key in ("seeds", "set", "settings")},
+    ("trajectory.next_flight", "to_tell"): "call it separate",
 }
 """What to do about keys that configs of before hold; inside artifacts they are left out, in a file they are refused."""
 
@@ -241,19 +242,26 @@ def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[st
 def _known(section: str, values: Any) -> Any:
     if not isinstance(values, dict):
         return values
-    return {key: value for key, value in values.items() if (section, key) not in _WITHOUT_EFFECT.union(_GONE)}
+    left = {key: value for key, value in values.items() if (section, key) not in _WITHOUT_EFFECT.union(_GONE)}
+    return {key: _known(f"{section}.{key}", value) for key, value in left.items()}
 
 
 def gone_lines(data: dict[str, Any], source: str) -> list[str]:
     """Say of the keys of a file that are gone what to do; warn of those that have no effect any more."""
-    sections = {section: values for section, values in data.items() if isinstance(values, dict)}
+
+    def held(section: str) -> Any:
+        values: Any = data
+        for name in section.split("."):
+            values = values.get(name) if isinstance(values, dict) else None
+        return values if isinstance(values, dict) else {}
+
     for section, key in sorted(_WITHOUT_EFFECT):
-        if key in sections.get(section, ()):
+        if key in held(section):
             logging.getLogger("cpfls_cli").warning("%s: %s.%s has no effect any more; remove it", source, section, key)
     return [
         f"{source}: {section}.{key}: is no longer a key: {remedy}"
         for (section, key), remedy in _GONE.items()
-        if key in sections.get(section, ())
+        if key in held(section)
     ]
 
 

@@ -75,12 +75,6 @@ def _whole_number(loader: _StudyLoader, node: yaml.ScalarNode) -> int:
 
 _StudyLoader.add_constructor(_TAG + "int", _whole_number)
 _StudyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping_without_duplicates)
-_CompiledLoader = type(
-    "_CompiledLoader",
-    (getattr(yaml, "CSafeLoader", _StudyLoader),),
-    {name: getattr(_StudyLoader, name) for name in ("yaml_implicit_resolvers", "yaml_constructors")},
-)
-"""The same in a fifth of the time, where PyYAML has been built with it."""
 
 
 def parse_yaml(text: str, source: str) -> Any:
@@ -101,14 +95,7 @@ def parse_yaml(text: str, source: str) -> Any:
 @lru_cache(maxsize=8)
 def _parsed(text: str) -> Any:
     """Parse a document once: the artifacts that a command reads and writes mostly hold one and the same config."""
-    try:
-        return _document(_CompiledLoader(text))
-    except Exception:
-        # This one says more of what is wrong.
-        return _document(_StudyLoader(text))
-
-
-def _document(loader: Any) -> Any:
+    loader = _StudyLoader(text)
     try:
         node = loader.get_single_node()
         if node is None:

@@ -22,7 +22,7 @@ from cpfls_cli.consistency.motion import (
     by_thrust,
     checked,
 )
-from cpfls_cli.consistency.repairs import UP, ChannelRepair, is_derived
+from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
 from cpfls_cli.rounding import largest, less
@@ -33,7 +33,6 @@ from cpfls_cli.words import joined
 _ROUNDS = 3  # Channels that are mended one after the other: there are no more.
 # Parts of the flights whose scatter says whether a reading surely fits better, and by how many standard errors.
 _PARTS, _PARTS_SIGMAS = 16, 4.0
-_BIAS = 0.1  # Of a velocity, m/s, or of an acceleration, a hundredth of gravity: what calibrated sensors are off by.
 _MOVES_M_S2 = 0.1  # Below this a vehicle hovers, and noise points anywhere.
 # Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
 # and more along z.
@@ -120,30 +119,7 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
             break
         repairs = (*repairs, *found)
         now = _Compared.of(now.repaired(*found), windows)
-    biased = tuple(_biased(now.checks))
-    checks = checked(now.repaired(*biased), windows) if biased else now.checks
-    return Settled((*repairs, *biased), checks, dropped=dropped)
-
-
-def _biased(checks: Sequence[PairCheck]) -> Iterator[ChannelRepair]:
-    """Take off what a velocity has on the mean and the position does not show, or an acceleration and the velocity.
-
-    What the attitude leans too much looks like a bias of an accelerometer across, so that counts along z alone.
-    """
-    for check in checks:
-        witness, name, _ = check.pair
-        apart, wrong = check.second - check.first, any(each.contradiction for each in check.problems)
-        if wrong or len(apart) < _PARTS or witness not in ("position", "velocity"):
-            continue
-        parts = np.array([part.mean(axis=0) for part in np.array_split(apart, _PARTS)])
-        bias = parts.mean(axis=0) * (UP if name == "specific_force" else 1.0)
-        bias[np.abs(bias) < np.maximum(_BIAS, _PARTS_SIGMAS * mean_error(parts))] = 0.0
-        if bias.any():
-            unit = "m/s" if name == "velocity" else "m/s^2"
-            sizes = [f"{size:+.2f} {unit} along {axis}" for axis, size in zip(AXES, bias.tolist(), strict=True) if size]
-            what = f"the {CHANNELS[name].words} has a bias of {joined(sizes)}, judged by the {CHANNELS[witness].words}"
-            finding = Finding(what, "calibrate it", check.pair.channels, contradiction=False, repairable=True)
-            yield ChannelRepair(name, bias=bias).with_finding(finding, _DONE)
+    return Settled(repairs, now.checks, dropped=dropped)
 
 
 def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:

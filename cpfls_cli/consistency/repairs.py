@@ -23,7 +23,7 @@ _SCALED = 0.1
 
 @dataclass(frozen=True)
 class ChannelRepair:
-    """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z - bias``, or nothing."""
+    """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing."""
 
     channel: str = about("that is corrected or left out; of rotor_speed the delay alone counts")
     dropped: bool = about("1 where it is left out, and nothing else counts", default=False)
@@ -33,11 +33,7 @@ class ChannelRepair:
         default_factory=lambda: np.eye(3),
         metadata={"about": About("unit and axes, after the turn to world axes", ("axis", "axis"))},
     )
-    gravity_m_s2: float = about("added along the vertical", unit="m/s^2", default=0.0)
-    bias: Array = field(
-        default_factory=lambda: np.zeros(3),
-        metadata={"about": About("of velocity or acceleration, subtracted last, in its own axes", ("axis",), "SI")},
-    )
+    gravity_m_s2: float = about("added along the vertical, last", unit="m/s^2", default=0.0)
     sentence: str = about(
         "what is wrong, what shows it, and what to correct; empty for a channel that goes with another", default=""
     )
@@ -78,7 +74,7 @@ class ChannelRepair:
         if self.gravity_m_s2:
             sensed = self.channel == "specific_force"
             truth = truth + self.gravity_m_s2 * (signals.rotation[:, 2] if sensed else UP)
-        return np.asarray(truth - self.bias)
+        return np.asarray(truth)
 
 
 def accelerated(signals: Signals) -> Array | None:

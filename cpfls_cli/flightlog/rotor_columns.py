@@ -41,9 +41,10 @@ _FEWEST_SAMPLES = 20  # For medians and rates.
 _MIXED = ("controller.cmd_thrust", "controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw")
 # Of M1 to M4 the factors of these columns: power_distribution_quadrotor.c of the firmware.
 _CRAZYFLIE_MIXER = ((1.0, -0.5, 0.5, 1.0), (1.0, -0.5, -0.5, -1.0), (1.0, 0.5, -0.5, 1.0), (1.0, 0.5, 0.5, -1.0))
-# Means of so long, s; least command that counts, and least spread of their logarithms; the power between that of a
-# thrust and of a speed, and how far from it, as a logarithm, one of them is clear.
-_MEAN_S, _IDLE, _LEAST_SPREAD, _BETWEEN, _CLEAR = 0.5, 0.05, 0.05, float(np.sqrt(0.5)), 0.1
+# Means of so long, s; least command that counts, and least spread of the changes of their logarithms.
+_MEAN_S, _IDLE, _LEAST_SPREAD = 0.5, 0.05, 0.02
+# Powers that are between those of a thrust and of a speed, or near them, and what divides these; least correlation.
+_POWERS, _BETWEEN, _CORRELATED = (0.35, 1.4), float(np.sqrt(0.5)), 0.9
 _ORTHOGONAL = 1e-2  # Median by which products of the rows of a rotation matrix are off those of the unit matrix.
 _SAME = 0.02  # Part of the largest one's spread below which an output is not connected to a motor.
 # Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller.
@@ -109,9 +110,9 @@ def find_rotors(found: Mapping[str, Sequence[Found]], parameters: Parameters, sy
             raise InputError(f"a log of {AIRPLANE} or its like ({joined(surfaces)}: {_SURFACES}), {NO_MULTIROTOR}")
         warnings += [warning for own in found["rotor_command"] for warning in _beyond_commands(own, parameters)][:1]
     shares = None if command is None or command.columns.unit != "1" else command
-    others = {name for named, *_ in found["rotor_command"] for name in named.group.columns}
+    logged = {name for named, *_ in found["rotor_command"] for name in named.group.columns}
     power = None if shares is None or speed is None else _power(found, speed, shares)
-    command_is = None if shares is None else _meaning(shares, others, parameters, system, power)
+    command_is = None if shares is None else _meaning(shares, logged, parameters, system, power)
     return RotorColumns(speed, command, command_is, tuple(left_out), tuple(warnings))
 
 
@@ -440,7 +441,10 @@ def _stated_range(named: Named, parameters: Parameters) -> tuple[float, float, s
 
 
 def _power(found: Mapping[str, Sequence[Found]], speed: Guess, command: Guess) -> float | None:
-    """Find the power of commands that measured speeds grow with, by means over what is longer than a rotor's lag."""
+    """Find the power of commands that measured speeds grow with, by changes of means over longer than a rotor's lag.
+
+    A battery that sags falls out of changes. None where speeds do not follow commands, as a lag or noise has it.
+    """
 
     def means(guess: Guess) -> tuple[IntArray, Array]:
         own = next(each for each in found[guess.signal] if {*guess.columns.columns} <= {*each[0].group.columns})
@@ -453,14 +457,16 @@ def _power(found: Mapping[str, Sequence[Found]], speed: Guess, command: Guess) -
     (turned, speeds), (asked, commands) = means(speed), means(command)
     _, first, second = np.intersect1d(turned, asked, return_indices=True)
     running = (commands[second].min(axis=1) > _IDLE) & (speeds[first].min(axis=1) > 0)
-    x, y = np.log(commands[second][running]), np.log(speeds[first][running])
-    if len(x) < _FEWEST_SAMPLES or float((x - x.mean(axis=0)).std()) < _LEAST_SPREAD:
+    next_one = np.diff(turned[first][running]) == 1
+    x, y = (np.diff(np.log(each[running]), axis=0)[next_one].ravel() for each in (commands[second], speeds[first]))
+    if len(x) < _FEWEST_SAMPLES or x.std() < _LEAST_SPREAD or y.std() == 0 or np.corrcoef(x, y)[0, 1] < _CORRELATED:
         return None
-    return float(np.polyfit((x - x.mean(axis=0)).ravel(), (y - y.mean(axis=0)).ravel(), 1)[0])
+    power = float(y.std() / x.std())
+    return power if _POWERS[0] < power < _POWERS[1] else None
 
 
 def _meaning(
-    command: Guess, others: Collection[str], parameters: Parameters, system: str, power: float | None
+    command: Guess, logged: Collection[str], parameters: Parameters, system: str, power: float | None
 ) -> KeyChoice:
     """Tell whether a command is a share of thrust or of speed, by what other columns of commands there are too."""
 
@@ -470,7 +476,7 @@ def _meaning(
     if command.kind == CRAZYFLIE:
         if "motor.m" not in command.columns.columns[0]:
             return choose("speed", "pwm.* of a Crazyflie is what the motors get")
-        if any("pwm.m" in name for name in others):
+        if any("pwm.m" in name for name in logged):
             said = "motor.m* of a Crazyflie that logs pwm.m* too are thrusts, before it compensates for the battery"
             return choose("thrust", said)
         before = "of firmware before November 2022 they are thrusts, before it compensates for the battery"
@@ -490,9 +496,8 @@ def _meaning(
     if power is not None:
         meant, other = ("thrust", "speed") if power < _BETWEEN else ("speed", "thrust")
         said = f"measured speeds grow with the commands to the power of {power:.2g}: 1 for a speed, 0.5 for a thrust"
-        clear = abs(np.log(power / _BETWEEN)) > _CLEAR if power > 0 else False
-        rivals = () if clear else (Rival(f"rotor_command_is: {other}", "the power is between the two"),)
-        return choose(meant, said, *rivals, sure="data" if clear else "guess")
+        # Motors that idle at a command of 0 have powers between.
+        return choose(meant, said, Rival(f"rotor_command_is: {other}", "idling motors change the power"), sure="guess")
     rival = Rival("rotor_command_is: thrust", "the log does not say which")
     reason = f"as with most motor controllers{f' ({system})' if system else ''}"
     return choose("speed", reason, rival, sure="guess")

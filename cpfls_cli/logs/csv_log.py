@@ -7,7 +7,7 @@ import re
 import zlib
 from array import array
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
@@ -26,6 +26,7 @@ from cpfls_cli.words import some
 # Characters of a line, which may hold thousands of columns; compressed, a longer one may fill the memory.
 _LONGEST_LINE = 1 << 20
 _LONGEST_ROW = 64  # Lines of the first row.
+_LONGEST_LIST = 50  # Numbers of a list that becomes columns: of a vehicle nothing is longer, a scan is.
 _REMARKS: Final = ("#", "%", "//")  # With which a remark before the column names begins.
 # A number as it is written in much of Europe, where semicolons separate columns.
 _DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
@@ -142,31 +143,42 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
             break
     rows = _rows(chain(begun, lines), delimiter)
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
-        rows = ([field.replace(",", ".") for field in fields] for fields in rows)
-        first = [field.replace(",", ".") for field in first]
-    widths = [len(_listed(field)) for field in first]
-    if len(names) == len(widths) < sum(widths):
-        rows = (_spread(fields, widths) for fields in rows)
-        names = [own for name, width in zip(names, widths, strict=True) for own in _numbered(name, width)]
-        first = _spread(first, widths)
+        rows = (list(map(_with_points, fields)) for fields in rows)
+        first = list(map(_with_points, first))
+    sizes = [len(_listed(field)) for field in first] if len(names) == len(first) else []
+    # What is called so already stays.
+    sizes = [0 if f"{name}[0]" in names else size for name, size in zip(names, sizes, strict=False)]
+    if any(sizes):
+        rows = (_spread(fields, sizes) for fields in rows)
+        parts = zip(names, sizes, strict=True)
+        names = [own for name, size in parts for own in ([f"{name}[{at}]" for at in range(size)] or [name])]
+        first = _spread(first, sizes)
     return _Table(names, first, rows, line + 1)
 
 
+def _with_points(field: str) -> str:
+    return field if field.lstrip().startswith("[") else field.replace(",", ".")
+
+
 def _listed(field: str) -> list[str]:
-    """Part a field that holds a list or a matrix of numbers, as Python writes arrays into a table; others are one."""
-    return re.findall(r"[^][,\s]+", field) if field.lstrip().startswith("[") else [field]
+    """Part a field that holds a list or a matrix of numbers, as Python writes arrays into a table; others hold none."""
+    parts = re.findall(r"[^][,\s]+", field) if field.lstrip().startswith("[") else []
+    try:
+        _plain_numbers(parts)
+    except ValueError:
+        return []
+    return parts if len(parts) <= _LONGEST_LIST else []
 
 
-def _spread(fields: list[str], widths: list[int]) -> list[str]:
-    """Give each number of a list a field of its own, and as many to a list that is absent."""
-    if len(fields) != len(widths):
+def _spread(fields: list[str], sizes: Sequence[int]) -> list[str]:
+    """Give each number of a list a field of its own, which are empty where the list is absent or of another length."""
+    if len(fields) != len(sizes):
         return fields
-    parts = zip(map(_listed, fields), widths, strict=True)
-    return [own for part, width in parts for own in (part if any(part) else [""] * width)]
-
-
-def _numbered(name: str, width: int) -> list[str]:
-    return [name] if width == 1 else [f"{name}[{index}]" for index in range(width)]
+    spread = []
+    for field, size in zip(fields, sizes, strict=True):
+        own = _listed(field) if size else [field]
+        spread += own if len(own) == max(size, 1) else [""] * size
+    return spread
 
 
 def _delimiter(line: str) -> str:

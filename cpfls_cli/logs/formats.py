@@ -347,7 +347,7 @@ _TEXTS: Final = (
     (rb"\[\d{4}-\d\d-\d\d[ t]", "text with a stamp in brackets before each line", _AS_CSV),
     (rb"[{\[]", "JSON", _AS_CSV),
     (rb"\d+\.\d+ \d+ [a-z_0-9]+ ", "a log of Paparazzi", _AS_CSV),
-    (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*$)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),
+    (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*^[\w/]+:)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )

@@ -134,7 +134,7 @@ def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     if scale <= 0:
         return ""
     mass = vehicle.mass_kg / scale
-    return f"A mass of {mass:.3g} kg instead, {mass - vehicle.mass_kg:+.2g} kg, or a load, would do the same."
+    return f"A mass of {mass:.3g} kg instead, {mass - vehicle.mass_kg:+.2g} kg, would do the same."
 
 
 def _acts(see: Instant, p: Numbers) -> Wrench:

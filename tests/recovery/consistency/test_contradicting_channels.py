@@ -112,9 +112,6 @@ WRONG = {
     "velocity of another north": (of_velocity(lambda _, v: v @ turned(30).T), "The velocity is rotated by"),
     "velocity late": (of_velocity(lambda _, v: late(v, 0.1)), "The velocity is late by"),
     "velocity in km/h": (of_velocity(lambda _, v: 3.6 * v), "The velocity is in km/h"),
-    "biased": (of_acceleration(lambda _, a: a + 0.04 * UP), "The acceleration has a bias of +0."),
-    "sensed with a bias": (of_accelerometer(lambda _, f: f - 0.04 * UP), "The accelerometer has a bias of -0."),
-    "velocity with a bias": (of_velocity(lambda _, v: v + 0.03 * UP[[2, 0, 1]]), "The velocity has a bias of +0."),
     "attitude late": (lambda s: replace(s, attitude=late(s.attitude, 0.03)), "The attitude is late by"),
 }
 
@@ -150,11 +147,6 @@ def test_channels_that_agree_are_left_alone(flights):
             found = audit(part, WINDOWS)
             assert (found.repairs, found.warnings, found.filtered) == ((), (), ())
             assert found.repaired(part[0]) is part[0]
-
-
-def test_across_an_accelerometer_may_be_right_and_the_attitude_lean(flights):
-    leaning = [replace(sensing(s), attitude=s.attitude + np.array([0.0, 0.04, 0.0])) for s in flights]
-    assert audit(leaning, WINDOWS).repairs == ()
 
 
 def test_what_no_usual_mistake_explains_is_left_out(flights):
@@ -244,7 +236,7 @@ SEVERAL = {
         lambda s: WRONG["velocity in km/h"][0](WRONG["in g"][0](s)),
     ),
     "axes": (("velocity has y, x, -z",), WRONG["velocity in NED"][0]),
-    "offset": (("acceleration has a bias of +0.",), of_acceleration(lambda _, a: a + np.array([0.3, -0.2, 0.4]))),
+    "offset": ((), of_acceleration(lambda _, a: a + np.array([0.3, -0.2, 0.4]))),
 }
 
 

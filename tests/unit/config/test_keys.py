@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from cpfls_cli.config.check import commented_default, keys_of, known_keys
 from cpfls_cli.config.load import apply_override, load_study, parse_config, validate
-from cpfls_cli.config.study import SECTIONS, Study, _parsed, _StudyLoader, parse_yaml, resolved, to_yaml
+from cpfls_cli.config.study import SECTIONS, Study, parse_yaml, resolved, to_yaml
 from cpfls_cli.errors import ConfigError
 from cpfls_cli.evolution.settings import EvolutionSettings
 from cpfls_cli.flightlog.settings import SignalName
@@ -28,23 +28,6 @@ def all_keys(settings, prefix=""):
         yield prefix + key.name, key
         if key.section is not None:
             yield from all_keys(key.section, f"{prefix}{key.name}.")
-
-
-WRONG = ("a: {b: 1, b: 2}", "a: b: c", "- [1, @]", '"\\ud800"', 2000 * "[", "a: !!python/name:os.system", "a\x00: 1")
-
-
-@pytest.mark.parametrize("text", [VEHICLE, "a: [1e-3, .5, on, 0x1F, 1:30, 2001-01-01, ~, &x [y], *x]", *WRONG])
-def test_both_loaders_read_and_refuse_alike(monkeypatch, text):
-    def said():
-        _parsed.cache_clear()
-        try:
-            return parse_yaml(text, "study.yaml")
-        except ConfigError as error:
-            return str(error)
-
-    found = said()
-    monkeypatch.setattr("cpfls_cli.config.study._CompiledLoader", _StudyLoader)
-    assert said() == found
 
 
 def test_every_key_has_one_line_of_documentation():
@@ -123,6 +106,10 @@ def test_a_config_file_with_keys_that_are_gone_is_refused_with_what_to_do(tmp_pa
     lines = str(refused.value).splitlines()
     assert [line.split(": ")[1] for line in lines] == ["report.evaluation_times", "report.paper"]
     assert all("remove it; `make reproduce`" in line for line in lines)
+    path.write_text("trajectory: {next_flight: {to_tell: [inflow], box_m: [1, 2, 3]}}\n" + VEHICLE)
+    wrong = r"study.yaml: trajectory\.next_flight\.to_tell: is no longer a key: call it separate"
+    with pytest.raises(ConfigError, match=wrong):
+        load_study(path)
     path.write_text("sweep: {seeds: 3}\n" + VEHICLE)
     with pytest.raises(ConfigError, match=r"sweep\.seeds: is no longer a key: remove it; a loop over `cpfls identify"):
         load_study(path)

@@ -264,19 +264,39 @@ def test_commands_of_a_crazyflie_are_what_its_motors_get_unless_it_logs_these_to
     assert choice.value == meant
 
 
-@pytest.mark.parametrize(
-    ("power", "meant", "sure"), [(1.0, "speed", True), (0.6, "thrust", True), (0.73, "speed", False)]
-)
-def test_measured_speeds_say_what_commands_are_shares_of(power, meant, sure):
-    own = flight(seconds=20.0, climb=4.0, highest_hz=0.8)
-    commands = 1000 + 1000 * (own.speed / 1500) ** (1 / power)
-    columns = named(own.speed, *(f"rotor_speed_{motor}" for motor in range(1, 5)))
+def logged_with_speeds(own, commands, speeds):
+    columns = named(speeds, *(f"rotor_speed_{motor}" for motor in range(1, 5)))
     columns |= named(commands, *(f"motor{motor}_pwm" for motor in range(1, 5)))
     recognition = seen(flat_log(own, speed=columns))
     assert recognition.signal("rotor_speed").columns.columns[0] == "rotor_speed_1"
     (choice,) = [each for each in recognition.choices if each.key == "rotor_command_is"]
-    assert (choice.value, choice.sure == "data") == (meant, sure)
-    assert f"to the power of {power:.2g}:" in choice.reason
+    return choice
+
+
+@pytest.mark.parametrize("sags", [False, True])
+@pytest.mark.parametrize(("power", "meant"), [(1.0, "speed"), (0.6, "thrust"), (0.73, "speed")])
+def test_measured_speeds_say_what_commands_are_shares_of(power, meant, sags):
+    own = flight(seconds=20.0, climb=4.0, highest_hz=0.8)
+    volts = np.linspace(1.0, 0.85 if sags else 1.0, len(own.time))[:, None]
+    choice = logged_with_speeds(own, 1000 + 1000 * (own.speed / 1500 / volts) ** (1 / power), own.speed)
+    assert (choice.value, choice.sure, len(choice.rivals)) == (meant, "guess", 1)
+    assert f"to the power of {power:.1g}" in choice.reason
+
+
+@pytest.mark.parametrize("follows", ["against", "hardly", "noise", "drift"])
+def test_speeds_that_follow_no_commands_say_nothing_of_them(follows):
+    own = flight(seconds=20.0, climb=4.0, highest_hz=0.8)
+    share, rng = own.speed / 1500, np.random.default_rng(0)
+    steady = 700.0 + 5.0 * rng.standard_normal(own.speed.shape)
+    drift = np.linspace(0.4, 0.6, len(share))[:, None] + 0.002 * rng.standard_normal(share.shape)
+    given = {
+        "against": (1 - share, own.speed), "hardly": (share**5, own.speed),
+        "noise": (share, steady), "drift": (drift, steady),
+    }  # fmt: skip
+    commands, speeds = given[follows]
+    choice = logged_with_speeds(own, 1000 + 1000 * commands, speeds)
+    assert (choice.value, choice.sure) == ("speed", "guess")
+    assert "power" not in choice.reason
 
 
 def test_commands_that_blow_up_are_said_with_the_moment(own):

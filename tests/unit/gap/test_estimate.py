@@ -53,7 +53,7 @@ def test_state_of_descent(knots, words):
 def test_too_little_thrust_may_be_more_mass():
     vehicle = VehicleSettings(mass_kg=0.0397)
     said = result("parameter_error", vehicle, thrust_scale=(-0.1059, 0.001))
-    assert said == "A mass of 0.0444 kg instead, +0.0047 kg, or a load, would do the same."
+    assert said == "A mass of 0.0444 kg instead, +0.0047 kg, would do the same."
     assert result("parameter_error", vehicle, inertia_x=(0.2, 0.01)) == ""
     assert result("parameter_error", vehicle, thrust_scale=(-1.5, 0.01)) == ""
 

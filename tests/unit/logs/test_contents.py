@@ -313,8 +313,28 @@ def test_lists_of_numbers_in_fields_are_columns(tmp_path: Path) -> None:
     values = np.column_stack(list(own.topics[""].values()))
     np.testing.assert_array_equal(values[0], [0, 1, -2e-3, 1, 2, 3, 1, 0, 0, 1])
     np.testing.assert_array_equal(values[1], [1, np.nan, np.nan, 4, 5, 6, 0, 1, 1, 0])
-    with pytest.raises(InputError, match=r"log\.csv:3: 3 fields, but 4 column names"):
-        contents(_written(tmp_path / "log.csv", 't,p\n0,"[1, 2, 3]"\n1,"[1, 2]"\n2,"[1, 2, 3]"\n'))
+
+
+@pytest.mark.parametrize("odd", ['"[1, 2, 3]"', "[0]", "None", "nan", "5", "", "[WARN] hot", '"[1, None]"'])
+def test_a_list_of_another_length_is_absent_and_moves_no_other_one(tmp_path: Path, odd: str) -> None:
+    own = contents(_written(tmp_path / "log.csv", f't,p,q\n0,"[1, 2]","[3, 4]"\n1,{odd},"[5, 6]"\n2,"[7, 8]",{odd}\n'))
+    values = np.column_stack(list(own.topics[""].values()))
+    expected = [[0, 1, 2, 3, 4], [1, np.nan, np.nan, 5, 6], [2, 7, 8, np.nan, np.nan]]
+    np.testing.assert_array_equal(values, expected)
+
+
+@pytest.mark.parametrize(
+    "words", ["[INFO] armed", "[2024-01-01 10:00:00]", '"[1, None]"', f'"[{", ".join(51 * "1")}]"']
+)
+def test_text_in_brackets_and_scans_are_no_columns(tmp_path: Path, words: str) -> None:
+    own = contents(_written(tmp_path / "log.csv", f"t,p\n0,{words}\n1,{words}\n"))
+    assert list(own.topics[""]) == ["t"]
+
+
+def test_lists_between_numbers_with_decimal_commas_are_read(tmp_path: Path) -> None:
+    own = contents(_written(tmp_path / "log.csv", "t;p;q\n0,5;[1.5, 2.5];1,25\n1,5;[3.5, 4.5];1,5\n"))
+    values = np.column_stack(list(own.topics[""].values()))
+    np.testing.assert_array_equal(values, [[0.5, 1.5, 2.5, 1.25], [1.5, 3.5, 4.5, 1.5]])
 
 
 def test_fields_in_quotes_may_hold_another_separator(tmp_path: Path) -> None:

@@ -33,7 +33,9 @@ def refused():
             path.write_bytes(content)
         with pytest.raises(InputError) as caught:
             log_contents(path, wanted)
-        return str(caught.value).removeprefix(f"{path}: ")
+        said = str(caught.value)
+        assert said.startswith(f"{path}: ")
+        return said.removeprefix(f"{path}: ")
 
     return call
 
