@@ -145,7 +145,7 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
             if fitting and unit not in fitting:
                 doubt = f"{name} is said to be in {unit}, but steps of {step:.3g} are those of a flight in {fitting[0]}"
             elif step == 1:
-                doubt = f"{name} rises by 1 from row to row, so it may count rows, or be s: is import.time_unit right?"
+                doubt = f"{name} rises by 1 from row to row, and may count rows or seconds: is import.time_unit right?"
             return name, unit, doubt
         if ranks[name] < 2:
             how = "log finer stamps" + (", or write one row for each stamp" if step == 0 else "")

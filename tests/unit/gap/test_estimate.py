@@ -5,7 +5,7 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.naming.estimate import effect_sentence, estimates_of
+from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gap_flights import candidate, fly, weak
@@ -71,3 +71,10 @@ def test_what_cannot_be_below_zero_has_no_interval_there():
 
 def test_other_effects_keep_their_sentence():
     assert result("com_offset", c_x=(0.01, 0.001)) == ""
+
+
+@pytest.mark.parametrize(("low", "listed"), [(0.01, True), (0.0, False), (-0.01, False)])
+def test_what_may_be_0_is_not_surely_on_its_bound(low, listed):
+    """Also where its interval ends at 0, below which it cannot be."""
+    number = Estimate("k_d", "1", 0.05, low, 0.06, (0.0, 0.05))
+    assert _on_bounds([number]) == ({number: 0.05} if listed else {})
