@@ -20,7 +20,7 @@ Between = Literal["cubic", "linear", "previous"]
 controller that runs faster than its log. ``linear`` needs no sample behind the next one, so an exported model can take
 it step by step. ``previous`` is a command that stays until the next sample.
 
-Beside the exact delay of signals of up to 8 Hz, sampled at 100 Hz, cubics are off by 0.04 % of the signal, a global
+Against the exact delay of signals of up to 8 Hz, sampled at 100 Hz, cubics are off by 0.04 % of the signal, a global
 spline by 0.004 %, monotone cubics by 0.4 %, straight lines by 1 %, the nearest sample by 8 %; a lag of 30 ms alike. A
 spline overshoots a step by 10 % and spreads an outlier over the flight, cubics by 6 % and over four samples.
 """

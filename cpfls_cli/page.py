@@ -1,6 +1,6 @@
 """What a person reads of a result: one template in Markdown, shown on a terminal, as HTML and as Markdown.
 
-Beside what Markdown has, a template knows
+In addition to Markdown, a template knows
 
 - folds, ``::: Title`` to ``:::``, which a terminal opens with -v and a page by a click; with ``{open}`` behind it the
   page shows them open;

@@ -18,7 +18,7 @@ RIDGE, OF_MANY = 1e-6, 1e-3
 """So that instruments that hardly differ do no harm; of many that go together, in flights that differ."""
 
 
-def fits_of_others(ztz: Numbers, ztx: Numbers, ridge: Numbers | float, beside: int = 0) -> Numbers:
+def fits_of_others(ztz: Numbers, ztx: Numbers, ridge: Numbers | float, neighbours: int = 0) -> Numbers:
     """Fit signals X to instruments Z on all parts but each, shape (part, ..., instrument, signal).
 
     Parameters
@@ -27,14 +27,14 @@ def fits_of_others(ztz: Numbers, ztx: Numbers, ridge: Numbers | float, beside: i
     ztx : array, shape (part, ..., instrument, signal)
     ridge : float or array, broadcast to (part, ..., instrument, instrument)
         Added to the diagonal.
-    beside : int
+    neighbours : int
         How many parts to either side are left out too.
 
     References
     ----------
     Angrist, Imbens and Krueger 1999 (jackknife instrumental variables).
     """
-    apart = np.abs(np.subtract.outer(np.arange(len(ztz)), np.arange(len(ztz)))) > beside
+    apart = np.abs(np.subtract.outer(np.arange(len(ztz)), np.arange(len(ztz)))) > neighbours
     gram, moment = (np.tensordot(apart.astype(float), each, 1) for each in (ztz, ztx))
     return np.asarray(np.linalg.solve(gram + ridge * np.eye(gram.shape[-1]), moment))
 

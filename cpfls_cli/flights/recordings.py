@@ -324,7 +324,7 @@ def _actuated(
             "motion with; name their columns in import.signals"
         )
     if speed is not None:
-        command = _command_beside(flight, known, study)
+        command = _own_command(flight, known, study)
         return replace(signals, rotor_speed=speed, commanded=commanded, rotor_command=command), ()
     by_wrench = _by_wrench(known, study.vehicle)
     if by_wrench is None:
@@ -352,7 +352,7 @@ def _by_wrench(known: Mapping[str, Array], vehicle: VehicleSettings) -> tuple[Ar
     return np.sqrt(np.maximum(squared, 0.0)), int((squared < 0).any(axis=1).sum())
 
 
-def _command_beside(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> Array | None:
+def _own_command(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> Array | None:
     """Give the commands of rotors whose speeds were measured, where they are speeds or shares of the largest."""
     command, unit = known.get("rotor_command"), flight.units.get("rotor_command", "rad/s")
     if "rotor_speed" not in known or command is None or command.shape != known["rotor_speed"].shape:

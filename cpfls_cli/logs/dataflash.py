@@ -60,7 +60,7 @@ class _Kind(NamedTuple):
     @property
     def stamp(self) -> str:
         """Name of the field of the stamps; empty where there is none."""
-        # Beside a week, TimeMS is that of GPS, and the log's own clock is T.
+        # In a record with a week, TimeMS is that of GPS, and the log's own clock is T.
         names = ("T",) if {"Week", "TimeMS", "T"} <= self.letters.keys() else ("TimeUS", "TimeMS")
         return next((name for name in names if self.letters.get(name) in ("I", "Q")), "")
 

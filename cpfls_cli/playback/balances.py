@@ -234,7 +234,7 @@ class Sums(NamedTuple):
 
     @classmethod
     def joined(cls, axes: Sequence[Sums]) -> Sums:
-        """Put axes beside each other."""
+        """Put axes side by side."""
         ztx, xtx, ztz = (np.concatenate(each, axis=2) for each in zip(*(own[:3] for own in axes), strict=True))
         return cls(ztx, xtx, ztz, axes[0].windows)
 

@@ -251,7 +251,7 @@ def gusts_in(
     powers = _powers(sides, given, band, instrument_kind)
     if len(powers.pieces) < ENOUGH_BLOCKS:
         return None
-    runs = min((len(beside) + 1 for beside in given.repeats.places if beside), default=1)
+    runs = min((len(others) + 1 for others in given.repeats.places if others), default=1)
     # Runs of a path are compared with each other, so a gust counts several times.
     shared = np.sqrt(2 * runs / (2 * runs - 1)) if instrument_kind == "repeats" else 1.0
     axes = [_Axis(band, power, powers.pieces) for power in powers.power.swapaxes(0, 1)]

@@ -103,7 +103,7 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
     return found._replace(turning=np.sqrt((rates**2).mean(axis=0)))
 
 
-def loop_beside_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> LoopBounds:
+def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> LoopBounds:
     """Bound as `loop_bounds` does, and judge flights by what explains them best: a model, or rotors that only lag.
 
     A model that was found and is wrong explains little of flights that show the vehicle well.

@@ -239,7 +239,7 @@ class VehicleModel:
 
     @property
     def filters(self) -> tuple[ModelEffect, ...]:
-        """Effects on what drives the rotors, beside the response."""
+        """Effects on what drives the rotors, in addition to the response."""
         return tuple(one for one in self.effects if one.is_filter)
 
     @property
@@ -332,23 +332,23 @@ class VehicleModel:
         -------
         array, shape (time, 6), N m and N, body frame
         """
-        beside = self.wrench_beside(signals)
+        others = self.other_wrench(signals)
         if signals.rotor_speed is None:
             rotor = np.zeros((len(signals), 1 + 4 * self.rotors))
-            beside = beside + signals.wrench
+            others = others + signals.wrench
         else:
             hold = self.hold_of(signals, "previous" if signals.commanded else "linear")
             response = self.response_to(signals)
             rotor = response.terms_at_samples(signals.rotor_speed, signals.period, hold)
         held = self.wrench(self._air(signals), signals.body_rate, rotor)
-        return held + self.with_lever(beside)
+        return held + self.with_lever(others)
 
     def with_lever(self, wrench: Array) -> Array:
         """Add the torque of forces about the centre of mass, from where they have their levers; shape (time, 6)."""
         lever = -np.cross(self.centre, wrench[:, 3:])
         return np.hstack([wrench[:, :3] + lever, wrench[:, 3:]])
 
-    def wrench_beside(self, signals: Signals) -> Array:
+    def other_wrench(self, signals: Signals) -> Array:
         """Evaluate what is not simulated with the state, at the samples of a flight.
 
         Of a flight that states torque and thrust that is also what depends on rotor speeds.

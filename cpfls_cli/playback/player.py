@@ -171,10 +171,10 @@ def _along(model: VehicleModel, stated: Array | None, parts: Sequence[Signals]) 
     """Give what acts over each step that is not simulated, shape (time, 6); None for nothing."""
     if stated is None and not model.along:
         return None
-    at_samples = (model.wrench_beside(part) for part in parts)
+    at_samples = (model.other_wrench(part) for part in parts)
     # Means over each step; the last one has no end.
-    beside = [0.5 * (own + np.concatenate([own[1:], own[-1:]])) for own in at_samples]
-    total = np.asarray(sum(each for each in (stated, np.concatenate(beside) if beside else None) if each is not None))
+    means = [0.5 * (own + np.concatenate([own[1:], own[-1:]])) for own in at_samples]
+    total = np.asarray(sum(each for each in (stated, np.concatenate(means) if means else None) if each is not None))
     return model.with_lever(total)
 
 

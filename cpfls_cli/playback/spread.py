@@ -49,7 +49,7 @@ that identify such a share."""
 _OF_A_GROUP = ": "
 """In the names of numbers that only another configuration has."""
 _EDGE = 1e-9
-"""Rounding, of a moment of inertia beside the sum of the others."""
+"""Rounding, of a moment of inertia next to the sum of the others."""
 
 
 @dataclass(frozen=True)

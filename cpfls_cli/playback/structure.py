@@ -442,7 +442,7 @@ def _judge_more(bench: _Bench, best: Judged, blocks: tuple[str, ...]) -> None:
 def _judge_other(bench: _Bench, choice: Judged, blocks: tuple[str, ...]) -> None:
     """Judge the choice with other rules of what is learned, and with an effect in its place.
 
-    What is learned can stand for several effects; none of them alone may then gain anything beside it.
+    What is learned can stand for several effects; none of them alone may then gain anything jointly with it.
     """
     structure = choice.structure
     absent = [block for block in blocks if needs_velocity(block) and block not in (*structure.blocks, *LEARNED)]

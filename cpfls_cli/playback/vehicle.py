@@ -21,7 +21,7 @@ from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
-from cpfls_cli.playback.loop import LoopBounds, loop_beside_plain
+from cpfls_cli.playback.loop import LoopBounds, loop_and_plain
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.player import Observer
@@ -149,7 +149,7 @@ def find_vehicle(
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fit, groups)
-    loop, given = loop_beside_plain(fitted.model, begun, own), instruments(own)
+    loop, given = loop_and_plain(fitted.model, begun, own), instruments(own)
     constants = find_constants(begun, own, given, settings.leave_out)
     if loop.unexplained and (constants is None or not constants.identified):
         constants = find_constants(begun, own, given, settings.leave_out, past=True) or constants

@@ -172,7 +172,7 @@ _HIGHEST_HZ = 100.0
 _OF_SAMPLING = 0.2
 """Highest frequency, share of that of sampling: above it a straight line between samples is no signal any more."""
 _MOST_BLOCKS = 40  # Of windows, in which combinations of instruments are found apart: more cost time.
-_BLOCKS_BESIDE = 2  # Blocks of half a window: windows of those further away have no sample in common.
+_NEIGHBOURS = 2  # Blocks of half a window: windows of those further away have no sample in common.
 _RIDGE = 1e-6  # Share of the power of a column of instruments, so that two equal ones leave something to solve.
 _ROUNDING = 1e-9
 _TINY = np.finfo(float).tiny
@@ -429,7 +429,7 @@ def _instrument(stretches: Sequence[Stretch], analysis: _Analysis, u: Array) -> 
     blocks = int(number.max()) + 1
     power = np.array([np.einsum("nfk,nfl->fkl", z[number == b].conj(), z[number == b]) for b in range(blocks)])
     cross = np.array([np.einsum("nfk,nf->fk", z[number == b].conj(), u[number == b]) for b in range(blocks)])
-    weights = fits_of_others(power, cross[..., None], _RIDGE * len(z), _BLOCKS_BESIDE)[..., 0]
+    weights = fits_of_others(power, cross[..., None], _RIDGE * len(z), _NEIGHBOURS)[..., 0]
     return np.asarray(np.einsum("nfk,nfk->nf", z, weights[number]))
 
 

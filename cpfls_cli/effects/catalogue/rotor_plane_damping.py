@@ -25,7 +25,7 @@ EFFECT = Effect(
     sentence="The rotor discs tilt later than a rolling or pitching body, and brake it more the faster they spin.",
     coefficients=(
         Coefficient(
-            "k_w", "N m s^2/rad^2", 0.0, 1.0, "damping per rotor speed and rate", scales.inertia_per_rotor_speed
+            "k_w", "N m s^2/rad^2", 0.0, 3.0, "damping per rotor speed and rate", scales.inertia_per_rotor_speed
         ),
         Coefficient(
             "k_F",

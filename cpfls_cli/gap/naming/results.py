@@ -279,7 +279,7 @@ def verdict_of(
 def gap_remains(
     before: Array, after: Array, remainder: Sequence[Unexplained], named_share: float, effects: int
 ) -> bool:
-    """Decide whether a gap remains beside what is named: the one gate between NAMED and PARTIAL.
+    """Decide whether a gap remains with what is named: the one gate between NAMED and PARTIAL.
 
     A gap is above `CLEAR` floors. It remains where a channel keeps more of it than names may leave, or several times
     that limit and more than a formula may be off by; with several effects wherever there is one, because one may fill

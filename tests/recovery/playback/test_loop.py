@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.playback.loop import loop_beside_plain, loop_bounds
+from cpfls_cli.playback.loop import loop_and_plain, loop_bounds
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
 from tests.builders.gusty_flights import CALM, GUSTS, LARGE, SMALL, STORM, Flight, gusty_flights
@@ -86,13 +86,13 @@ def test_a_model_that_explains_nothing_is_not_taken_for_the_loop(flights, bounds
     wrong = VehicleModel(vehicle=SMALL.vehicle, response=RotorResponse(lag_s=0.8))
     still = flights["45 g", CALM, 12.0]
     assert loop_bounds(wrong, still).shows_loop
-    found = loop_beside_plain(wrong, SMALL.vehicle, still)
+    found = loop_and_plain(wrong, SMALL.vehicle, still)
     assert (found.misses, found.shows_loop, found.unexplained) == (True, False, True)
     assert found.explained[:2].min() > 0.95
     np.testing.assert_array_equal(found.missed, loop_bounds(wrong, still).explained)
     for bandwidth in BANDWIDTHS[:2]:
         key = ("45 g", GUSTS, bandwidth)
-        gusty = loop_beside_plain(VehicleModel(vehicle=SMALL.vehicle), SMALL.vehicle, flights[key])
+        gusty = loop_and_plain(VehicleModel(vehicle=SMALL.vehicle), SMALL.vehicle, flights[key])
         assert (gusty.misses, gusty.shows_loop) == (False, True)
         assert gusty.least >= bounds[key].least
 

@@ -22,7 +22,8 @@ USUAL = {
     ("linear_damping", "d_x"): ((0.03, 0.4), (1e-6, 1e-5)),
     ("linear_damping", "d_z"): ((0.03, 0.4), (1e-6, 1e-5)),
     ("quadratic_damping", "d_y"): ((0.004, 0.1), (1e-7, 1e-6)),
-    ("rotor_plane_damping", "k_w"): ((0.02 / 1392, 0.1 / 1392), (1e-6 / 7156, 1e-6 / 7156)),
+    # The last: a thrust that leans by 16 / (Lock number w) per rate, Lock number 1, at hubs 8 mm up.
+    ("rotor_plane_damping", "k_w"): ((0.02 / 1392, 0.1 / 1392), (1e-6 / 7156, 2.9e-9)),
     ("rotor_drag", "k_d"): ((0.8e-3, 2.4e-3), (1e-6, 0.0147 / 7156)),
     ("flapping_moment", "k_f"): ((-2e-4, 2e-4), None),
     ("own_wake", "c_F"): ((0.01, 0.15), (0.01, 0.15)),

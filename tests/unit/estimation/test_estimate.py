@@ -144,7 +144,7 @@ def test_neighbours_are_left_out_too():
     rng = np.random.default_rng(2)
     z, x = rng.standard_normal((2, 8, 50, 2))
     ztz, ztx = z.swapaxes(1, 2) @ z, z.swapaxes(1, 2) @ x
-    found = fits_of_others(ztz, ztx, 0.0, beside=1)
+    found = fits_of_others(ztz, ztx, 0.0, neighbours=1)
     far = [0, 1, 5, 6, 7]
     expected = np.linalg.lstsq(z[far].reshape(-1, 2), x[far].reshape(-1, 2), rcond=None)[0]
     np.testing.assert_allclose(found[3], expected, rtol=1e-9)
