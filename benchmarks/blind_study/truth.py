@@ -56,10 +56,13 @@ def _delay(hidden, _vehicle):
 
 
 def _mismatch(hidden, vehicle):
-    # The two patterns that other vehicles have are not one weak rotor.
-    if vehicle.count != 4:
-        return {}
     gain, spin = np.array(hidden["gain"]), np.array(vehicle.spin)
+    if vehicle.count != 4:
+        # Others grow along x and y, and with the spin; what all have in common looks like another inertia.
+        x, y = (own / np.ptp(own) for own in vehicle.hubs[:2])
+        patterns = np.stack([x, y, x * spin, y * spin, np.ones_like(x), spin])
+        found = np.linalg.lstsq(patterns.T, gain, rcond=None)[0]
+        return {f"difference_{place + 1}": float(found[place]) for place in range(4)}
     # What a pair has in common looks like another inertia, so a difference is relative to the mean of its pair.
     pairs = [(gain[i] - gain[i + 2]) / (1 + (gain[i] + gain[i + 2]) / 2) for i in (0, 1)]
     left, right = gain[spin > 0].mean(), gain[spin < 0].mean()

@@ -479,8 +479,7 @@ def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     lifts, drags = (numbers.get(f"{what}_imbalance") for what in ("lift", "drag"))
     modes, spins = gain_modes(made.vehicle), [rotor.spin for rotor in made.vehicle.rotors]
     patterns = [
-        [_part(numbers.get(f"difference_{mode + 1}"), modes[index, mode]) for mode in (0, 1)]
-        for index in range(len(spins))
+        [_part(numbers.get(f"difference_{place}"), share) for place, share in enumerate(own, 1)] for own in modes
     ]
     lifting = [_sum(*own, _part(lifts, spin)) for own, spin in zip(patterns, spins, strict=True)]
     differ = "difference_1" in numbers

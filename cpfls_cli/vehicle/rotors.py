@@ -253,12 +253,13 @@ def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:
 
 
 def gain_modes(vehicle: VehicleSettings) -> Array:
-    """Construct two patterns of thrust gain that no wrong inertia can mimic.
+    """Construct patterns of thrust gain that no wrong inertia can mimic.
 
-    For a quadrotor they are the differences of its two opposite pairs. For other vehicles they grow along x and y.
-    What all rotors, or all rotors of one spin, have in common is taken out: it trades with Ixx and Iyy.
+    For a quadrotor they are the differences of its two opposite pairs. For other vehicles they grow along x and y, and
+    from six rotors on along both with the sign of the spin as well: one weak rotor is a sum of these, but for what
+    trades with the inertia. What all rotors, or all rotors of one spin, have in common is taken out for that.
 
-    Result: shape (rotor, 2); gain of each rotor for a difference of 1 from end to end.
+    Result: shape (rotor, 2) or (rotor, 4); gain of each rotor for a difference of 1 from end to end.
     """
     spins = np.array([float(rotor.spin) for rotor in vehicle.rotors])
     common = np.column_stack([np.ones_like(spins), spins])
@@ -270,7 +271,9 @@ def _seeds(vehicle: VehicleSettings) -> Array:
     hubs = np.array([rotor.position_m[:2] for rotor in vehicle.rotors])
     pairs = opposite_pairs(vehicle)
     if len(pairs) != 2 or len(hubs) != 4:
-        return np.asarray(hubs / np.ptp(hubs, axis=0))
+        along = hubs / np.ptp(hubs, axis=0)
+        spins = np.array([[float(rotor.spin)] for rotor in vehicle.rotors])
+        return np.hstack([along, along * spins]) if len(hubs) >= 6 else along
     seeds = np.zeros((4, 2))
     for mode, (first, second) in enumerate(pairs):
         seeds[[first, second], mode] = 0.5, -0.5

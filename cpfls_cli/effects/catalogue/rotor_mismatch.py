@@ -6,41 +6,53 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.rounding import largest
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 from cpfls_cli.vehicle.rotors import gain_modes, opposite_pairs
 from cpfls_cli.vehicle.settings import VehicleSettings
 
+_DIFFERENCES = ("difference_1", "difference_2", "difference_3", "difference_4")
+
 
 def gains(vehicle: VehicleSettings, differences: Array) -> Array:
-    """Assign each difference to the weaker rotor of its pair.
+    """Say which rotors pull less, or more, where as few as possible differ.
 
-    `differences`, shape (2,): the first two coefficients.
-    Result: shape (rotor,); relative error of each thrust, at most 0; on vehicles without two opposite pairs, the
-    patterns themselves.
+    Of a quadrotor it is the weaker rotor of each pair; of another vehicle the one that alone comes nearest.
+
+    `differences`, shape (pattern,): of the patterns of `gain_modes`.
+    Result: shape (rotor,); relative error of each thrust.
     """
-    pairs = opposite_pairs(vehicle)
-    patterns = gain_modes(vehicle) @ differences
-    if len(pairs) != 2 or len(vehicle.rotors) != 4:
-        return np.asarray(patterns)
-    loss = np.zeros(len(vehicle.rotors))
-    for pair, difference in zip(pairs, differences, strict=True):
-        loss[pair[0] if difference < 0 else pair[1]] = -abs(difference)
-    return loss
+    pairs, modes = opposite_pairs(vehicle), gain_modes(vehicle)
+    found = np.zeros(len(vehicle.rotors))
+    if len(pairs) == 2 and len(found) == 4:
+        for pair, difference in zip(pairs, differences, strict=True):
+            found[pair[0] if difference < 0 else pair[1]] = -abs(difference)
+        return found
+    pattern, of_one = modes @ differences, np.maximum(np.diag(_shown(vehicle)), 1e-9)
+    # Of two that come as near the weak one.
+    rotors = sorted(range(len(found)), key=lambda rotor: pattern[rotor] > 0)
+    nearest = largest(rotors, lambda rotor: pattern[rotor] ** 2 / of_one[rotor])
+    found[nearest] = pattern[nearest] / of_one[nearest]
+    return found
+
+
+def _shown(vehicle: VehicleSettings) -> Array:
+    """Compute what the patterns show of one rotor that differs by 1, shape (rotor, rotor that differs)."""
+    modes = gain_modes(vehicle)
+    return np.asarray(modes @ np.linalg.pinv(modes))
 
 
 def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
-    """Name the weak rotor; a strong opposite one looks the same."""
-    differences = np.array([values.get(f"difference_{mode}", 0.0) for mode in (1, 2)])
-    loss = gains(vehicle, differences).tolist()
-    other = {rotor: pair[1 - pair.index(rotor)] for pair in opposite_pairs(vehicle) for rotor in pair}
-    if len(other) != len(loss):
-        weak = loss.index(min(loss))
-        return f"M{weak + 1} pulls least, {-100 * loss[weak]:.2g} % less than modelled." if any(loss) else ""
-    return " ".join(
-        f"M{weak + 1} pulls {-100 * loss[weak]:.2g} % less than modelled, or M{other[weak] + 1} as much more."
-        for weak in range(len(loss))
-        if loss[weak] < 0
-    )
+    """Name the weak rotor, and the strong one that looks the same."""
+    shown, count = _shown(vehicle), gain_modes(vehicle).shape[1]
+    off = gains(vehicle, np.array([values.get(name, 0.0) for name in _DIFFERENCES[:count]])).tolist()
+    sentences = []
+    for rotor, own in enumerate(off):
+        alike = np.flatnonzero(np.abs(shown + shown[:, [rotor]]).max(axis=0) < 1e-6).tolist()
+        less, more = ("less", "more") if own < 0 else ("more", "less")
+        mirrored = "".join(f", or M{other + 1} as much {more}" for other in alike)
+        sentences += [f"M{rotor + 1} pulls {abs(100 * own):.2g} % {less} than modelled{mirrored}."] if own else []
+    return " ".join(sentences if len(off) == 4 else (f"If one rotor alone differs: {each}" for each in sentences))
 
 
 def _accounts(_number: str, values: Mapping[str, float]) -> float:
@@ -49,8 +61,8 @@ def _accounts(_number: str, values: Mapping[str, float]) -> float:
 
 def _acts(see: Instant, p: Numbers) -> Wrench:
     functions, drag = see.functions, see.rotor_drag
-    first, second = (functions.rotors(mode) for mode in gain_modes(see.vehicle).T.tolist())
-    gain = first * p["difference_1"] + second * p["difference_2"]
+    modes = (functions.rotors(mode) for mode in gain_modes(see.vehicle).T.tolist())
+    gain = sum(mode * p[name] for mode, name in zip(modes, _DIFFERENCES, strict=False))
     # A propeller that pulls less drags less.
     yaw = functions.total(drag * (p["drag_imbalance"] - see.spins * gain))
     # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force shows it.
@@ -85,6 +97,14 @@ EFFECT = Effect(
             0.25,
             "counter-clockwise rotors pull this much more, the others less; force only",
         ),
+        Coefficient(
+            "difference_3",
+            "1",
+            -0.5,
+            0.5,
+            "from six rotors on, where the first two are growth along x and y: growth along x with the spin",
+        ),
+        Coefficient("difference_4", "1", -0.5, 0.5, "the same along y"),
     ),
     needs=frozenset({"rotor_speed"}),
     excitation="yaw effort to both sides, and changes of thrust",

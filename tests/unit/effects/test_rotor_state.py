@@ -151,7 +151,7 @@ def circle(number):
 def test_columns_are_what_other_factors_do(columns, flight):
     true = with_gains(flight.vehicle, [0.05, -0.03, -0.05, 0.03], [-0.05, 0.07, -0.15, 0.13])
     change = body_wrench(true, flight.rotor_speed).body_torque - flight.torque
-    found = columns("rotor_mismatch", flight).direct @ [0.1, -0.06, 0.1, 0.0]
+    found = columns("rotor_mismatch", flight).direct @ [0.1, -0.06, 0.1, 0.0, 0.0, 0.0]
     np.testing.assert_allclose(found[:, :3], change, atol=1e-12)
     np.testing.assert_allclose(found[:, 5], body_wrench(true, flight.rotor_speed).thrust - flight.thrust, atol=1e-9)
 
@@ -179,7 +179,53 @@ def test_nothing_that_an_inertia_could_stand_in_for_is_left(number):
     modes = gain_modes(circle(number))
     spins = np.array([rotor.spin for rotor in circle(number).rotors])
     np.testing.assert_allclose(modes.T @ np.column_stack([np.ones(number), spins]), 0.0, atol=1e-12)
-    assert np.linalg.matrix_rank(modes) == 2
+    assert np.linalg.matrix_rank(modes) == modes.shape[1] == min(number - 2, 4)
+
+
+def stacked():
+    """Two rotors on each of four arms, which turn against each other."""
+    hubs = [(0.2 * x, 0.2 * y, z) for z in (0.05, -0.02) for x, y in ((1, -1), (-1, -1), (-1, 1), (1, 1))]
+    spins = (1, -1, 1, -1, -1, 1, -1, 1)
+    return VehicleSettings(
+        rotors=tuple(RotorSettings(position_m=hub, spin=spin) for hub, spin in zip(hubs, spins, strict=True))
+    )
+
+
+@pytest.mark.parametrize("craft", [circle(6), circle(8), stacked()], ids=["six", "eight", "stacked"])
+def test_torque_of_one_weak_rotor_is_held_but_for_what_an_inertia_does(columns, flight, craft):
+    """Growth along x and y alone leaves a tenth of it and more."""
+    hubs, spins = np.array([each.position_m for each in craft.rotors]).T, [each.spin for each in craft.rotors]
+    efforts = 0.2 * flight.body_rate / np.abs(flight.body_rate).max(axis=0)
+    efforts = np.column_stack([np.ones(len(flight)) + efforts[:, 0] ** 2, efforts])
+    squared = 350.0**2 * efforts @ np.stack([np.ones(len(spins)), hubs[1] / 0.3, -hubs[0] / 0.3, spins])
+    flown = replace(flight, vehicle=craft, rotor_speed=np.sqrt(squared))
+    loss = np.zeros(len(spins))
+    loss[2] = -0.04
+    change = body_wrench(with_gains(craft, loss, loss), flown.rotor_speed).body_torque - flown.torque
+    turned = np.stack([flown.torque @ np.diag(axis) for axis in np.eye(3)], axis=2)
+    crossed = flown.torque[:, [1, 0, 2]] * [1.0, 1.0, 0.0]
+    own = columns("rotor_mismatch", flown).direct[:, :3]
+
+    def left(places):
+        held = np.concatenate([own[..., places], turned, crossed[..., None]], axis=2).reshape(change.size, -1)
+        fitted = held @ np.linalg.lstsq(held, change.ravel(), rcond=None)[0]
+        return np.linalg.norm(change.ravel() - fitted) / np.linalg.norm(change)
+
+    assert left([0, 1, 2, 4, 5]) < 1e-6
+    assert left([0, 1, 2]) > 0.1
+
+
+@pytest.mark.parametrize(("number", "weak"), [(6, 2), (8, 5)])
+def test_one_weak_rotor_of_many_is_found(number, weak):
+    """What a growth along x and y alone cannot show: the torque of one rotor."""
+    craft, loss = circle(number), np.zeros(number)
+    loss[weak] = -0.04
+    differences = np.linalg.pinv(gain_modes(craft)) @ loss
+    found = gains(craft, differences)
+    # In eight on a circle a strong one opposite looks the same.
+    assert np.argmin(found) == weak
+    assert found[weak] == pytest.approx(-0.04)
+    assert np.count_nonzero(found) == 1
 
 
 def test_the_weaker_rotor_is_blamed(vehicle):
