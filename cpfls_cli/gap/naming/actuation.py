@@ -53,7 +53,7 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
         if best and (sets.count(best) == count or sets.is_predictable(best)):
             untried = [each for each in sets.all if sets.count(each) == count and each not in sets.predictable]
             rivals += sets.fit(untried)
-            best = sets.least([best, *(names for names in rivals if sets.count(names) == count)])
+            best = sets.least([best, *(names for names in rivals if sets.count(names) == count and names != best)])
     alike = []
     lacking = bool(best) and sets.is_predictable(best)
     for names in rivals:
@@ -129,10 +129,13 @@ class _Sets:
         """Check whether the past predicts the residual of a set, which makes an answer more careful."""
         return self._more(self.predictable[names], CHANCE)
 
-    def surely_more(self, one: _Names, other: _Names) -> bool:
-        """Check whether it surely leaves more than another; the right one leaves nothing, and less than that chance."""
+    def surely_more(self, one: _Names, other: _Names, tried: int = 1) -> bool:
+        """Check whether it surely leaves more than another; the right one leaves nothing, and less than that chance.
+
+        `tried`: how many others there are, at the rate of errors of all.
+        """
         residual = (self.predictable[names] * (self.predictable[names].sum() > 0) for names in (one, other))
-        return self._more(more_residual(*residual), self.found.settings.significance)
+        return self._more(more_residual(*residual), self.found.settings.significance / tried)
 
     def _more(self, residual: Array, rate: float) -> bool:
         """Check whether a residual is more than chance, and more than formulas are off by."""
@@ -142,7 +145,7 @@ class _Sets:
         """Choose the first that no later one leaves surely less than."""
         first, *further = tried
         for names in further:
-            first = names if self.surely_more(first, names) else first
+            first = names if self.surely_more(first, names, len(further)) else first
         return first
 
     def numbers(self, names: _Names) -> dict[str, tuple[Estimate, ...]]:

@@ -133,6 +133,16 @@ def test_more_numbers_are_tried_where_one_leaves_something(together, filtered, n
     assert apart(monkeypatch, LAG, left, {BOTH: [together, together]})[:2] == (names, rivals)
 
 
+def test_one_of_several_that_leaves_less_by_chance_is_a_rival_alone(monkeypatch):
+    """Where 7 blocks leave more and none less, p is 0.0078: less than 1 in 100 of one, and not of one of two."""
+    some = np.where(np.arange(BLOCKS) < 7, 3.0, 0.0)
+    left = {(): 90.0, LAG: 30.0, DELAY: 31.0, BOTH: some, ("low_pass_filter",): 0.0, ("notch_filter",): 30.0}
+    names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})
+    assert (names, rivals) == (BOTH, {("low_pass_filter", "motor_lag", "")})
+    del left[("notch_filter",)]
+    assert apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})[0] == ("low_pass_filter",)
+
+
 def test_where_instruments_tell_nothing_or_the_number_may_be_0_nothing_is_named(monkeypatch):
     for left, sizes in (({(): 90.0}, {}), ({(): 90.0, LAG: LITTLE}, {LAG: [ABSENT]})):
         names, rivals, result, _ = apart(monkeypatch, LAG, left, sizes)
