@@ -151,7 +151,9 @@ class _Way:
     def swing(self, start: Array) -> Array:
         """Integrate from a deflection along x and y and a rate of it, both in radians, the rate over the frequency."""
         across, rate = start[:2], start[2:] * self.natural
-        down = -np.sqrt(1 - across @ across)
+        height = 1 - across @ across
+        # No load hangs there; it is at rest then, as what is lost.
+        down = -np.sqrt(height) if height > 0 else np.nan
         first = np.array([*across, down, *rate, -(across @ rate) / down])
         states = integrate(self.felt, self.middles, self.step, self.length, self.damping, first)
         # A jump of the velocity, as at the end of a crash, throws it further than steps can follow: from there on it is

@@ -90,6 +90,11 @@ def hook_way(signals, depth):
     return CubicSpline(TIME, signals.position + rotation.apply([0.0, 0.0, -depth]))
 
 
+def test_a_start_further_out_than_the_cable_is_long_is_at_rest(flight):
+    found = _Way.of(flight, 1.5, 0.2, 0.0).swing(np.array([0.9, 0.9, 0.1, 0.0]))
+    np.testing.assert_array_equal(found, np.broadcast_to(HANGING, found.shape))
+
+
 @pytest.mark.parametrize("depth", [0.0, 0.2])
 @pytest.mark.parametrize("accelerometer", [True, False])
 def test_swing_under_a_hook_that_tumbles_with_the_vehicle(flight, depth, accelerometer):
