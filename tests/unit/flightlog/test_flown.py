@@ -35,7 +35,7 @@ def test_standing_and_idling_rotors_are_cut_with_a_margin():
     flown = flown_by(level, None, turning(10, 30))
     assert flown.span_s == (pytest.approx(10.5, abs=0.1), pytest.approx(29.5, abs=0.1))
     assert flown.reasons[0].startswith("the first 10.5 s are cut: ")
-    assert flown.reasons[1].endswith(" s are cut: the rotors stand still")
+    assert flown.reasons[1].endswith(" s are cut: the rotors stand still or idle")
 
 
 def test_rotors_that_turn_fast_on_the_ground_do_not_fly():
@@ -91,12 +91,12 @@ def test_height_alone_tells_a_flight():
 @pytest.mark.parametrize(
     ("level", "height", "rate", "reason"),
     [
-        (0 * TIME, None, 0 * TIME, "no flight in it: the rotors stand still throughout"),
+        (0 * TIME, None, 0 * TIME, "no flight in it: the rotors stand still or idle throughout"),
         (
             0 * TIME,
             None,
             turning(0, 40),
-            "no flight in it: the rotors stand still throughout, and it is turned by hand",
+            "no flight in it: the rotors stand still or idle throughout, and it is turned by hand",
         ),
         (0 * TIME + 0.3, 0 * TIME, 0 * TIME, "no flight in it: the vehicle neither turns nor moves"),
         (
