@@ -31,6 +31,8 @@ _CORNERS: Final = {
     "rear left": (-1.0, 1.0),
 }
 _ENDS: Final = {"front": (1.0, 0.0), "right": (0.0, -1.0), "rear": (-1.0, 0.0), "left": (0.0, 1.0)}
+# What the parameters CA_ROTOR* of PX4 are unless changed: of some versions a log has only those that are.
+_PX4_USUAL: Final = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "KM": 0.05}
 _ROUNDED = 1e-9  # Below which a place along an axis is 0.
 _TURNS = ("roll", "pitch", "yaw")
 _LEAST_EXPLAINED = 0.05  # Share of the acceleration about one axis that chance does not explain.
@@ -111,7 +113,7 @@ def _of_px4(parameters: Parameters) -> Airframe | None:
         return None
     rotors, ratios = [], []
     for index in lifting:
-        x, y, z, ratio = (float(parameters.get(f"CA_ROTOR{index}_{name}", 0.0)) for name in ("PX", "PY", "PZ", "KM"))
+        x, y, z, ratio = (float(parameters.get(f"CA_ROTOR{index}_{name}", usual)) for name, usual in _PX4_USUAL.items())
         # Of PX4: y to the right, z down, and a positive moment for a rotor that turns counter-clockwise.
         rotors.append(RotorPlace(_name(x, -y), (x, 0.0 - y), int(np.sign(ratio)), 0.0 - z))
         ratios.append(abs(ratio))
@@ -306,8 +308,9 @@ def _driven(
     rate = low_pass(body_rate, rate_hz, cutoff, 2)
     acceleration = in_band(derivative(np.arange(len(rate)) / rate_hz, rate))
     squared = (speed / np.mean(speed)) ** 2
-    # Motors follow a command late; stamps of a measured speed may be late or early.
-    moved = [lagged(squared, rate_hz * lag).start for lag in (_LAGS_S if is_command else _LAGS_S[:3])]
+    # Motors follow a command late, fast ones by up to half a cycle; stamps of a measured speed may be late or early.
+    lags = _LAGS_S[bool(lowest_hz) :] if is_command else _LAGS_S[:3]
+    moved = [lagged(squared, rate_hz * lag).start for lag in lags]
     if not (is_command or lowest_hz):
         # Of what is fast such a shift is half a cycle, and turns its sign.
         moved += [delayed(squared, rate_hz * seconds) for seconds in _SHIFTS_S]

@@ -293,8 +293,9 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
     # What falls since its rotors stopped hits the ground later.
     lost = lost and not (stops and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S)
-    # Who flips and lands, or ends the log in a flip, has lost nothing.
-    if lost and (len(hits) or lies_then or _ignores_rotors(signs, part, int(troubled[0]))):
+    # Who flips and lands, ends the log in a flip, or flies on as before has lost nothing.
+    ignores = lost and not _recovers(signs, part) and _ignores_rotors(signs, part, int(troubled[0]))
+    if lost and (len(hits) or lies_then or ignores):
         return _crash(signs, troubled, hits, strained)
     if rests_then:
         return {"rests with its rotors on": after}
@@ -328,11 +329,25 @@ def _last_burst(samples: IntArray, period: float) -> int:
     return int(samples[apart[-1] + 1 if len(apart) else 0])
 
 
+def _before(signs: Signs, part: tuple[int, int]) -> slice:
+    """Give the flight before the end of a stretch, which shows what it does in flight."""
+    first, after = part
+    return slice(first, after - min(round(_LAST_S / signs.period), (after - first) // 2))
+
+
+def _recovers(signs: Signs, part: tuple[int, int]) -> bool:
+    """Tell whether a vehicle still flies where the log ends, and turns and leans there as it did before."""
+    if part[1] < len(signs.time) or signs.turning is None or signs.upright is None:
+        return False
+    before, end = _before(signs, part), slice(part[1] - round(_FALL_S / signs.period), None)
+    up = _turned_up(signs.upright, before)
+    return bool(signs.turning[end].max() <= signs.turning[before].max() and up[end].min() >= up[before].min())
+
+
 def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Mark near the end of a stretch what flight before never had: motion, force, motion with a rotor at its limit."""
     first, after = part
-    last = min(round(_LAST_S / signs.period), (after - first) // 2)
-    before = slice(first, after - last)
+    before = _before(signs, part)
     # Rotors may drop at the impact.
     stop = min(len(signs.time), after + round(_THEN_S / signs.period))
     late = np.arange(first, stop) >= before.stop

@@ -42,6 +42,7 @@ _WORKS, _CLIMBS_M, _UNFELT = 1.0, 3.0, 0.12
 _TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
 _LONGEST_CUT_S = 3.0  # Longer than that no throttle is cut in flight: a fall of 44 m.
 _MOST_CLOCK_HZ = 50.0  # Rate that is enough to find a flight.
+_STAND = "the rotors stand still or idle"  # Of some logs no command is both.
 _FEWEST_ROWS = 10  # Of which it can be seen.
 SHORTEST_FLIGHT_S = 2.0  # Below which nothing is a flight.
 
@@ -171,7 +172,7 @@ def _active(signs: Signs) -> tuple[BoolArray | None, str]:
         if largest < ALIVE:
             moved = rate is not None and float(np.quantile(rate, 0.9)) > _TURNS_RAD_S
             by_hand = ", and it is turned by hand" if moved else ""
-            return None, f"no flight in it: the rotors stand still throughout{by_hand}"
+            return None, f"no flight in it: {_STAND} throughout{by_hand}"
         turning = _carried(signs, largest)
         how = f"the rotors are below {100 * _OF_HOVER:.0f} % of their hover level"
         how += "" if rate is None else ", with hardly any rotation"
@@ -348,11 +349,13 @@ def _held(signs: Signs, active: BoolArray) -> str:
 
 
 def _before_hits(signs: Signs, active: BoolArray) -> BoolArray:
-    """Mark what feels its thrust, of the parts between hits: what stands or lies since a hit has flown before."""
+    """Mark what feels its thrust or falls, of the parts between hits: what stands or lies since has flown before."""
     flies = np.zeros_like(active)
     if signs.felt is None or signs.level is None:
         return flies
-    hits = np.linalg.norm(signs.felt, axis=1) > HARD
+    size = np.linalg.norm(signs.felt, axis=1)
+    falls = averaged(size, signs.period, _TURN_S) < _FALLS
+    hits = (size > HARD) | falls
     if not hits.any():
         return flies
     step = max(1, round(SLOW_S / signs.period))
@@ -366,7 +369,8 @@ def _before_hits(signs: Signs, active: BoolArray) -> BoolArray:
         both, power = float(works @ feels), float(works @ works)
         alike = both / np.sqrt(power * float(feels @ feels) + 1e-12)
         share = _UNFELT * float(thrust @ thrust) / float(squares[first:after].mean())
-        flies[max(0, first - step) : after + step] = alike > _AS_HELD and both > share * power
+        free = falls[after : after + 2 * step].any() or (alike > _AS_HELD and both > share * power)
+        flies[max(0, first - step) : after + step] = free
     return smoothed(flies & active, signs.period, _SHORT_S)
 
 
@@ -439,4 +443,4 @@ def _how(signs: Signs, part: slice, how: str) -> str:
     if signs.level is None or float(np.quantile(signs.level[part], 0.9)) >= ALIVE:
         return how
     by_hand = signs.slow is not None and float(np.quantile(signs.slow[part], 0.9)) > _TURNS_RAD_S
-    return "the rotors stand still" + (" while it is moved by hand" if by_hand else "")
+    return _STAND + (" while it is moved by hand" if by_hand else "")

@@ -16,7 +16,7 @@ from cpfls_cli.flightlog.agreement import handed
 from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
-from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, nameless_clock
+from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, named_signals, nameless_clock
 from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
@@ -49,8 +49,25 @@ class LogTable:
             raise InputError(f"holds only {samples} samples, too few for a flight")
         stamps = _flat_time(topics[""], units) if self.flat else ("", "s", "")
         self.time_column, self.time_unit, self.time_doubt = stamps
+        if self.time_doubt:
+            self._take_unit_of_motion()
         self.origin = float(self.clock("")[0]) if self.flat else 0.0
         self.grid = np.empty(0)
+
+    def _take_unit_of_motion(self) -> None:
+        """Correct a doubtful unit of stamps to the one in which positions change as velocities say."""
+        named = {own.signal: own.group.columns for own in reversed(named_signals(column_groups(self.names), ""))}
+        if not named.keys() >= {"position", "velocity"}:
+            return
+        (time, places), (_, speeds) = self.values(named["position"]), self.values(named["velocity"])
+        if len(time) < _FEWEST_SAMPLES or not speeds.std() > 0:
+            return
+        times = np.gradient(places, time, axis=0).std() / speeds.std() * _TIME_UNITS[self.time_unit]
+        # Units are a thousand apart, and derivatives of positions noisy.
+        unit = next((own for own, factor in _TIME_UNITS.items() if 0.1 < times / factor < 10), self.time_unit)
+        if unit != self.time_unit:
+            self.time_doubt += f": so it is taken to be in {unit}, in which positions change as velocities say"
+            self.time_unit = unit
 
     def with_topic(self, topic: str, fields: Mapping[str, Array]) -> "LogTable":
         """Add a topic, which has stamps of its own."""

@@ -78,6 +78,9 @@ def _contents(content: bytes) -> LogContents:
         # A fork under a name of its own: Betaflight calls itself so, and its kin alone log setpoints. By the comma its
         # parameters are not taken for those of Betaflight (`Firmware.wrote`).
         system = f"Betaflight, as {system}"
+    elif re.fullmatch(r"[0-9a-f]{7,}", system):
+        # Before 2.1 Cleanflight wrote no version, but a commit.
+        system = f"{header.get('Firmware type', '')} {system}".strip()
     return LogContents({"": columns}, units, parameters, system, (lost,) if broken else (), _flown_at(header), first)
 
 

@@ -37,7 +37,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     with _opened(path) as table:
         names, first = table.names, dict(zip(table.names, table.first, strict=False))
         # What is absent at first may be a word later on.
-        for row in (own for own in table.rows if len(own) == len(first)):
+        for row in (own for _, own in table.rows if len(own) == len(first)):
             if all(map(str.strip, first.values())):
                 break
             first = {name: own.strip() or later for (name, own), later in zip(first.items(), row, strict=True)}
@@ -61,12 +61,12 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
         kept = [index for index, name in enumerate(names) if name in wanted]
         # Lists of numbers would take ten times as much.
         numbers, count = array("d"), 0
-        for number, row in enumerate(table.rows, start=table.line):
+        for number, row in table.rows:
             if not row:
                 continue
             if len(row) != len(names):
                 # A last line may have been cut, where more than one before it show how long they are.
-                if len(row) < len(names) and count > 1 and not any(table.rows):
+                if len(row) < len(names) and count > 1 and not any(own for _, own in table.rows):
                     break
                 way = "each row needs one field for each column name; a field that holds a separator needs quotes"
                 way = f"line {number - 1} has to name each column" if len(names) == 1 else way
@@ -83,13 +83,15 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
     return columns | {names[index]: values[:, position] for position, index in enumerate(kept)}
 
 
+_Rows = Iterator[tuple[int, list[str]]]
+
+
 class _Table(NamedTuple):
-    """A CSV that is open: column names, the first row that is not empty, all rows, the line of the first row."""
+    """A CSV that is open: column names, the first row that is not empty, all rows with the lines on which they end."""
 
     names: list[str]
     first: list[str]
-    rows: Iterator[list[str]]
-    line: int
+    rows: _Rows
 
 
 @contextmanager
@@ -138,22 +140,22 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
             break
     # A field in quotes may hold another separator than what parts the names.
     for delimiter in (_delimiter("".join(begun).strip() or header), _delimiter(header)):
-        first = next(filter(None, _rows(iter(begun), delimiter)), [])
+        first = next((own for _, own in _rows(iter(begun), delimiter) if own), [])
         if len(names) in (1, len(first)):
             break
-    rows = _rows(chain(begun, lines), delimiter)
+    rows = _rows(chain(begun, lines), delimiter, line)
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
-        rows = (list(map(_with_points, fields)) for fields in rows)
+        rows = ((at, list(map(_with_points, fields))) for at, fields in rows)
         first = list(map(_with_points, first))
     sizes = [len(_listed(field)) for field in first] if len(names) == len(first) else []
     # What is called so already stays.
     sizes = [0 if f"{name}[0]" in names else size for name, size in zip(names, sizes, strict=False)]
     if any(sizes):
-        rows = (_spread(fields, sizes) for fields in rows)
+        rows = ((at, _spread(fields, sizes)) for at, fields in rows)
         parts = zip(names, sizes, strict=True)
         names = [own for name, size in parts for own in ([f"{name}[{at}]" for at in range(size)] or [name])]
         first = _spread(first, sizes)
-    return _Table(names, first, rows, line + 1)
+    return _Table(names, first, rows)
 
 
 def _with_points(field: str) -> str:
@@ -186,12 +188,17 @@ def _delimiter(line: str) -> str:
     return next((each for each in ";\t," if each in line), " ")
 
 
-def _rows(lines: Iterator[str], delimiter: str) -> Iterator[list[str]]:
-    return map(str.split, lines) if delimiter == " " else csv.reader(lines, delimiter=delimiter)
+def _rows(lines: Iterator[str], delimiter: str, before: int = 0) -> _Rows:
+    """Give each row with the line on which it ends, after so many lines."""
+    if delimiter == " ":
+        return enumerate(map(str.split, lines), start=before + 1)
+    reader = csv.reader(lines, delimiter=delimiter)
+    # A field in quotes may go over several lines.
+    return ((before + reader.line_num, row) for row in reader)
 
 
 def _fields(line: str) -> list[str]:
-    return next(_rows(iter([line]), _delimiter(line)), [])
+    return next((own for _, own in _rows(iter([line]), _delimiter(line))), [])
 
 
 def _refuse_inflated(path: Path) -> None:
@@ -206,9 +213,9 @@ def _refuse_inflated(path: Path) -> None:
 
 
 def row_lines(path: Path) -> list[int]:
-    """List the line number, from 1, of each row of values in a CSV; empty lines hold none."""
+    """List the line number, from 1, on which each row of values in a CSV ends; empty lines hold none."""
     with _opened(path) as table:
-        return [number for number, row in enumerate(table.rows, start=table.line) if row]
+        return [number for number, row in table.rows if row]
 
 
 def _kind(text: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
-from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, SDLOG2, LogContents
+from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, SDLOG2, TABLE_ENDS, LogContents
 from cpfls_cli.logs.records import bytes_of, date, numbers, plain, seconds, table
 
 _HEAD = b"\xa3\x95"
@@ -77,8 +77,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         kinds, tables, lost = _read_lines(content[text.start() :])
     else:
         raise InputError(
-            f"{path}: not a DataFlash log: it does not start like one (encrypted, or of another kind?);"
-            " a table with a line of column names has to end in .csv"
+            f"{path}: not a DataFlash log: it does not start like one (encrypted, or of another kind?); {TABLE_ENDS}"
         )
     stated = _stated_units(tables, kinds)
     stamps = _all_stamps(kinds, tables)

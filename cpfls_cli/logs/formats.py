@@ -103,6 +103,7 @@ _OLDER_USD = re.compile(rb"[\x01-\xff][A-Za-z]\w*(\.\w+)*\([BbHhIifd]\),")
 _READERS: Final = "cpfls_cli.logs."
 _PYARROW: Final = (("pyarrow", "pyarrow.parquet"), "parquet")
 _ROSBAGS: Final = (("rosbags",), "rosbag")
+TABLE_ENDS: Final = "a table with a line of column names has to end in .csv"
 LOG_FORMATS = (
     LogFormat(".csv", "CSV", "CSV", b"", f"{_READERS}csv_log"),
     LogFormat(".csv.gz", "CSV", "gzip-compressed data", GZIP_MAGIC, f"{_READERS}csv_log"),
@@ -182,7 +183,8 @@ def _reader(path: Path) -> ModuleType:
     if form is None:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
         free = ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS if form.by_content))
-        raise InputError(f"{path}: not a log: its name must end in one of {named}, or it must hold one of {free}")
+        must = f"its name must end in one of {named}, or it must hold one of {free}"
+        raise InputError(f"{path}: not a log: {must}; {TABLE_ENDS}")
     alike = [other for other in LOG_FORMATS if other.begins(first)]
     if alike and form not in alike:
         remedy = f"rename it to end in {alike[0].suffix}" if alike[0].suffix else "rename it without an ending"

@@ -49,14 +49,15 @@ class Rotors:
         rebuilt = self.guess.columns.mixer is not None or self.guess.columns.columns[0].startswith(f"{REBUILT}.")
         return "rebuilt" if rebuilt else "logged"
 
-    def layout(self) -> tuple[Array, Array] | None:
+    def layout(self) -> tuple[Array, Array | None] | None:
         """Give places, shape (rotor, 2), forward and right as shares of the arm, and spins; None where not known."""
         rotors = () if self.airframe is None else self.airframe.rotors
         known = self.samples or self.speeds
         if not rotors or (known is not None and known.values.shape[1] != len(rotors)):
             return None
         places = np.array([rotor.direction for rotor in rotors]) * [1.0, -1.0]
-        return places / float(np.hypot(*places.T).max()), np.array([rotor.spin for rotor in rotors], dtype=float)
+        spins = np.array([rotor.spin for rotor in rotors], dtype=float)
+        return places / float(np.hypot(*places.T).max()), spins if spins.all() else None
 
     def thrusts(self, curve: ThrustCurve) -> Samples | None:
         """Give shares of full thrust, shape (sample, rotor): of commands, or else of the largest measured speeds."""

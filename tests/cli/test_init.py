@@ -130,7 +130,7 @@ def test_time_on_the_ground_is_cut_and_said(proposed, tmp_path, own):
     result, text, data = proposed(path, "--mass", MASS, "--arm", ARM, "-v")
     assert data["import"]["crop_s"] == pytest.approx([5.5, 24.5], abs=0.1)
     assert "the first 5.5 s are cut: the rotors are below 60 % of their hover level" in result.stdout
-    assert "# the last 4.5 s are cut: the rotors stand still" in text
+    assert "# the last 4.5 s are cut: the rotors stand still or idle" in text
 
 
 def test_two_guesses_that_the_data_cannot_part_are_both_listed(proposed, tmp_path, own):

@@ -50,6 +50,15 @@ def test_gusts_that_turn_a_vehicle_slowly_hide_no_rotors():
     assert "above 6 Hz" in found.airframe.reason
 
 
+def test_what_is_fast_of_late_motors_puts_no_rotor_opposite():
+    """Half a cycle after their commands, rotors push the other way."""
+    own = flight(seconds=20.0, angle=0.01, highest_hz=12.0, noise=0.1, climb=0.1)
+    rate = own.rate + 10.0 * flight(seconds=20.0, seed=8, noise=0.0).rate
+    found = airframe_from_motion(rate, np.roll(own.speed, -3, axis=0), 100.0, True)
+    assert [(rotor.name, rotor.spin) for rotor in found.airframe.rotors] == [(NAMES[hub[:2]], hub[2]) for hub in HUBS]
+    assert airframe_from_motion(rate, np.roll(own.speed, -5, axis=0), 100.0, True) is None
+
+
 def test_noise_tells_no_rotors():
     noise = np.random.default_rng(1)
     found = airframe_from_motion(noise.normal(size=(3000, 3)), noise.normal(500, 5, (3000, 4)), 100.0, False)
@@ -62,6 +71,13 @@ def test_parameters_of_px4_are_turned_into_the_axes_of_a_config():
     assert [(r.name, r.spin, r.height_m) for r in airframe.rotors] == [(NAMES[h[:2]], h[2], 0.02) for h in HUBS]
     assert [r.direction for r in airframe.rotors] == [pytest.approx((0.1 * x, 0.1 * y)) for x, y, _ in HUBS]
     assert airframe.moment_ratio_m == pytest.approx(0.05)
+
+
+def test_moments_of_px4_that_a_log_leaves_out_are_the_usual_ones():
+    parameters = px4(HUBS)
+    changed = {name: value for name, value in parameters.items() if not (name.endswith("_KM") and value > 0)}
+    assert len(changed) == len(parameters) - 2
+    assert stated_airframe(changed) == stated_airframe(parameters)
 
 
 def test_an_arm_scales_what_is_stated():

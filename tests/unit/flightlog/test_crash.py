@@ -168,9 +168,25 @@ def test_flips_are_flight_also_where_the_log_ends_in_them(own, known):
         assert flown(log, known).span_s is None
 
 
+def test_a_push_before_the_end_of_a_log_that_is_flown_out_of_is_no_loss_of_control(own):
+    """Such as the wake of another vehicle: its rotors do not turn it, and it flies on as before."""
+    pushed = type(own)(**vars(own))
+    pushed.rate, pushed.angles = own.rate.copy(), own.angles.copy()
+    begin = own.time[-1] - 1.3
+    turn = (own.time >= begin) & (own.time < begin + 0.4)
+    phase = 2 * np.pi * (own.time[turn] - begin) / 0.4
+    pushed.rate[turn, 0] += 12.0 * np.sin(phase)
+    pushed.angles[turn, 0] += 12.0 * 0.4 / (2 * np.pi) * (1 - np.cos(phase))
+    assert flown(pushed, ("height", "upright")).ended == ""
+    still = own.time < begin + 0.35
+    for name in ("time", "rate", "angles", "position", "specific_force", "speed"):
+        setattr(pushed, name, getattr(pushed, name)[still])
+    assert flown(pushed, ("height", "upright")).ended.startswith("loss of control at ")
+
+
 def test_a_vehicle_that_is_carried_home_by_hand_is_said_to(own):
     found = flown(ended.carried(own))
-    assert found.reasons == ("the last 18.5 s are cut: the rotors stand still while it is moved by hand",)
+    assert found.reasons == ("the last 18.5 s are cut: the rotors stand still or idle while it is moved by hand",)
 
 
 @pytest.mark.parametrize("known", [ALL, ("force",), ()])

@@ -35,7 +35,7 @@ def test_standing_and_idling_rotors_are_cut_with_a_margin():
     flown = flown_by(level, None, turning(10, 30))
     assert flown.span_s == (pytest.approx(10.5, abs=0.1), pytest.approx(29.5, abs=0.1))
     assert flown.reasons[0].startswith("the first 10.5 s are cut: ")
-    assert flown.reasons[1].endswith(" s are cut: the rotors stand still")
+    assert flown.reasons[1].endswith(" s are cut: the rotors stand still or idle")
 
 
 def test_rotors_that_turn_fast_on_the_ground_do_not_fly():
@@ -91,12 +91,12 @@ def test_height_alone_tells_a_flight():
 @pytest.mark.parametrize(
     ("level", "height", "rate", "reason"),
     [
-        (0 * TIME, None, 0 * TIME, "no flight in it: the rotors stand still throughout"),
+        (0 * TIME, None, 0 * TIME, "no flight in it: the rotors stand still or idle throughout"),
         (
             0 * TIME,
             None,
             turning(0, 40),
-            "no flight in it: the rotors stand still throughout, and it is turned by hand",
+            "no flight in it: the rotors stand still or idle throughout, and it is turned by hand",
         ),
         (0 * TIME + 0.3, 0 * TIME, 0 * TIME, "no flight in it: the vehicle neither turns nor moves"),
         (
@@ -267,6 +267,19 @@ def test_a_sensor_off_the_centre_of_what_vibrates_shows_no_test_stand(held):
     flown = find_flown(Signs(time=clock, rotors=rotors, body_rate=rate, force=force))
     assert flown.flies != held
     assert ("as on a test stand" in "".join(flown.reasons)) == held
+
+
+def test_what_falls_has_flown_before_however_calmly():
+    """A hover whose thrust hardly changes, a fall of 0.3 s, and rotors at more that push the ground."""
+    rng = np.random.default_rng(4)
+    falls = (TIME >= 25) & (TIME < 25.3)
+    rotors = np.repeat((between(2, 25.3, 0.42) + between(25.3, 31, 0.68))[:, None], 4, axis=1)
+    rate = 0.1 * rng.standard_normal((len(TIME), 3)) + turning(2, 31, 0.1)[:, None]
+    force = np.column_stack([0 * TIME, 0 * TIME, np.where(falls, 0.02, 1.0) + 0.03 * rng.standard_normal(len(TIME))])
+    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=force))
+    assert flown.stretches_s == ((pytest.approx(2.5, abs=0.3), pytest.approx(25.0, abs=0.7)),)
+    held = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=np.where(falls[:, None], force[:1], force)))
+    assert held.reasons == ("no flight in it: what it feels does not grow with its thrust, as on a test stand",)
 
 
 def test_what_is_cut_is_said_of_what_does_not_fly():

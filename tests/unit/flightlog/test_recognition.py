@@ -368,6 +368,21 @@ def test_milliseconds_of_a_counter_are_a_clock(own):
     assert (recognition.time_column, recognition.time_unit) == ("millis", "ms")
 
 
+@pytest.mark.parametrize("per_second", [1e6, 1e9])
+def test_stamps_in_another_unit_than_their_name_says_are_read_by_the_motion(own, per_second):
+    unit = {1e6: "us", 1e9: "ns"}[per_second]
+    log = flat_log(own, t={"time[ms]": per_second * own.time})
+    recognition = seen(log)
+    assert (recognition.time_unit, recognition.flown.span_s) == (unit, None)
+    assert recognition.warnings[0].endswith(
+        f": so it is taken to be in {unit}, in which positions change as velocities say"
+    )
+    for axis in "xyz":
+        del log.topics[""][f"v{axis}"]
+    with pytest.raises(InputError, match="never change, or hold too few samples"):
+        seen(log)
+
+
 def test_a_date_is_a_clock_whatever_its_name(own):
     log = flat_log(own, t=None)
     log.topics[""]["Date"], log.units["Date"] = own.time + 1.7e9, "s"

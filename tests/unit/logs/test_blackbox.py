@@ -131,6 +131,11 @@ def test_a_fork_of_betaflight_under_a_name_of_its_own_is_its_kin(read):
         assert read(renamed(content, **names)).system == unknown
 
 
+def test_a_firmware_that_states_a_commit_alone_is_called_by_its_type(read):
+    changes = {"Firmware revision": "747971f", "Firmware type": "Cleanflight"}
+    assert read(header(**changes) + b"".join(frames(flight()))).system == "Cleanflight 747971f"
+
+
 def test_what_is_broken_costs_the_frames_up_to_the_next_whole_one(read):
     rows = flight()
     parts = frames(rows)

@@ -375,6 +375,13 @@ def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
         contents(path, {"time", "p"})
 
 
+def test_lines_are_counted_past_fields_of_several_lines(tmp_path: Path) -> None:
+    path = _written(tmp_path / "log.csv", 'time,p,q\n0,1,"[1\n2]"\n1,2,"[3\n4]"\n2,x,"[5\n6]"\n')
+    assert row_lines(path) == [3, 5, 7]
+    with pytest.raises(InputError, match=r"log\.csv:7: column 'p' = 'x': not a number"):
+        contents(path, {"time", "p"})
+
+
 AT = 1_683_108_000.0
 """2023-05-03 10:00 UTC."""
 

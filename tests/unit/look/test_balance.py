@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.flightlog.airframe import usual_airframe
+from cpfls_cli.flightlog.vocabulary import BETAFLIGHT
 from cpfls_cli.look.balance import balance_of
+from cpfls_cli.look.driving import Rotors
 from cpfls_cli.look.flight import Samples
 from tests.builders.look_flights import CROSS, SPINS, hovering
 
@@ -44,6 +47,17 @@ def test_a_single_rotor_is_one_cause_of_several():
     (rotor,) = (cause for cause in balance.causes if cause.kind == "rotor")
     mean = (3 + 1 / 0.75) / 4
     assert rotor.size.low < (1 / 0.75 - 1) / mean < rotor.size.high
+
+
+def test_spins_of_which_one_is_not_known_are_not_known():
+    """By those alone that are, rotors of a hover would be expected to work as none do."""
+    frame = usual_airframe(BETAFLIGHT, 4)
+    _, spins = Rotors(None, None, frame).layout()
+    assert sorted(spins) == [-1, -1, 1, 1]
+    first, *others = frame.rotors
+    places, spins = Rotors(None, None, replace(frame, rotors=(first._replace(spin=0), *others))).layout()
+    assert places.shape == (4, 2)
+    assert spins is None
 
 
 def test_a_centre_of_mass_is_found():
