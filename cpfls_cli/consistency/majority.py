@@ -22,6 +22,7 @@ from cpfls_cli.consistency.motion import (
     by_thrust,
     checked,
 )
+from cpfls_cli.consistency.offsets import offsets
 from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
@@ -119,7 +120,9 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
             break
         repairs = (*repairs, *found)
         now = _Compared.of(now.repaired(*found), windows)
-    return Settled(repairs, now.checks, dropped=dropped)
+    found = tuple(offsets(now.checks, now.flights, windows))
+    checks = checked(now.repaired(*found), windows) if found else now.checks
+    return Settled((*repairs, *found), checks, dropped=dropped)
 
 
 def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:

@@ -200,7 +200,7 @@ def by_thrust(checks: Sequence[PairCheck]) -> list[PairCheck]:
 
 
 def _checked(pair: Pair, flights: Sequence[Signals], windows: Windows) -> PairCheck | None:
-    rows = [(signals, row) for signals in flights if (row := _row(pair, signals, windows)) is not None]
+    rows = [(signals, row) for signals in flights if (row := compared(pair, signals, windows)) is not None]
     if not rows:
         return None
     first, second, change = (np.concatenate(part) for part in zip(*(row for _, row in rows), strict=True))
@@ -225,7 +225,7 @@ def _checked(pair: Pair, flights: Sequence[Signals], windows: Windows) -> PairCh
     return replace(check, problems=problems, agrees=together and not problems)
 
 
-def _row(pair: Pair, signals: Signals, windows: Windows) -> tuple[Array, Array, Array] | None:
+def compared(pair: Pair, signals: Signals, windows: Windows) -> tuple[Array, Array, Array] | None:
     """Average both channels over windows, and the derivative of one that is averaged as it is."""
     first, second = _reading(pair.first, signals), _reading(pair.second, signals)
     if first is None or second is None or not windows.count(len(signals)):
