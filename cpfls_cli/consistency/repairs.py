@@ -90,10 +90,11 @@ class ChannelRepair:
         to_body = signals.rotation.swapaxes(1, 2)
         if self.channel == "specific_force":
             derivative, to_body = _turned(to_body, derivative + signals.vehicle.gravity_m_s2 * UP), np.eye(3)[None]
-        axes = np.array([axis in self.offset for axis in "xyz"])
-        if not self.offset_in_body:
-            return np.asarray(axes * (values - derivative).mean(axis=0))
-        return _turned(to_body.swapaxes(1, 2), axes * _turned(to_body, values - derivative).mean(axis=0))
+        apart = _turned(to_body, values - derivative) if self.offset_in_body else values - derivative
+        # The mean of a derivative would be the noise of two samples at the ends.
+        weight = np.hanning(len(apart))
+        mean = [axis in self.offset for axis in "xyz"] * (weight @ apart) / weight.sum()
+        return _turned(to_body.swapaxes(1, 2), mean) if self.offset_in_body else np.asarray(mean)
 
 
 def _turned(rotation: Array, values: Array) -> Array:

@@ -211,6 +211,14 @@ def test_an_offset_of_one_flight_is_taken_off_that_one_alone(flights):
         assert np.abs((found.repaired(given).velocity - true.velocity).mean(axis=0)).max() < 0.01
 
 
+def test_the_noise_of_its_last_sample_is_no_change_of_a_velocity(flights):
+    ends = [replace(s, velocity=s.velocity + (s.time == s.time[-1])[:, None]) for s in flights]
+    wrong = [replace(s, acceleration=s.acceleration + 0.4 * EAST) for s in ends]
+    found = audit(wrong, WINDOWS)
+    for given, true in zip(wrong, flights, strict=True):
+        assert np.abs((found.repaired(given).acceleration - true.acceleration).mean(axis=0)).max() < 0.015
+
+
 def test_what_no_usual_mistake_explains_is_left_out(flights):
     broken = [replace(signals, acceleration=signals.acceleration[::-1].copy()) for signals in flights]
     found = audit(broken, WINDOWS)
