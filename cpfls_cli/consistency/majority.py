@@ -18,9 +18,11 @@ from cpfls_cli.consistency.motion import (
     LATEST_S,
     TINY,
     TURNED_RAD,
+    Offset,
     PairCheck,
     by_thrust,
     checked,
+    offsets,
 )
 from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
@@ -119,7 +121,22 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
             break
         repairs = (*repairs, *found)
         now = _Compared.of(now.repaired(*found), windows)
-    return Settled(repairs, now.checks, dropped=dropped)
+    found = tuple(_taken_off(offset) for offset in offsets(now.checks, now.flights, windows))
+    checks = checked(now.repaired(*found), windows) if found else now.checks
+    return Settled((*repairs, *found), checks, dropped=dropped)
+
+
+def _taken_off(found: Offset) -> ChannelRepair:
+    unit, along = ("m/s" if found.pair.first == "position" else "m/s^2"), f"along {'body ' if found.in_body else ''}"
+    words = joined(f"{size:+.2f} {unit} {along}{AXES[i]}" for i, size in found.sizes.items())
+    of = "" if len(found.flights) == len(found.names) else f" in {joined(found.flights)}"
+    channel, witness = CHANNELS[found.pair.second], CHANNELS[found.pair.first].words
+    what = f"the {channel.words} has a constant offset of {words}{of}, judged by the {witness}"
+    finding = Finding(what, f"check {channel.keys}", found.pair.channels, contradiction=False, repairable=True)
+    repair = ChannelRepair(
+        found.pair.second, offset="".join(AXES[i] for i in found.sizes), offset_in_body=found.in_body
+    )
+    return repair.with_finding(finding, f"In each flight it is taken off by the {witness}")
 
 
 def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:

@@ -7,13 +7,22 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import BLOCK_S, half_width, jackknife_error
+from cpfls_cli.blocks import (
+    BLOCK_S,
+    ENOUGH_BLOCKS,
+    block_length,
+    contiguous,
+    half_width,
+    jackknife_error,
+    serial_error,
+)
 from cpfls_cli.consistency.channels import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.consistency.repairs import UP
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import Ground, first_derivative, fit_lean, second_derivative
-from cpfls_cli.rounding import largest
+from cpfls_cli.rotations import cross
+from cpfls_cli.rounding import largest, less
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.resampling import blocks_of, folds
 from cpfls_cli.weak_form.windows import Windows
@@ -37,6 +46,11 @@ LATEST_S = 0.3  # Longest delay of an estimator or of telemetry.
 _COULD_BE_LATE, _LEAVES_LESS, _PER_HOP = 0.5, 0.5, 4
 """Share of a turn that a delay could be, share of what a delay leaves that a turn has to leave at most, and delays that
 are tried from one window to the next."""
+
+_LEAST = {"velocity": 0.1, "acceleration": 0.2, "specific_force": 0.2}
+"""Offsets that calibrated sensors do not have, m/s and m/s^2: of an accelerometer 2 % of gravity."""
+_CHANCE = 1e-5  # That scatter of blocks makes one: a dozen are looked at, and slow errors scatter less than others.
+_APART = 0.5  # Share of an offset by which that of a half of the flight, or against the thrust, may be another.
 
 _QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])
 TINY = 1e-100  # Square of what does not move.
@@ -155,6 +169,38 @@ class PairCheck:
     def visible(self) -> BoolArray:
         """The axes along which one of the two moves by more than noise, shape (3,)."""
         return np.asarray(self.moving | (self.second.std(axis=0) > self.pair.floor))
+
+
+class Offset(NamedTuple):
+    """A constant by which the second of a pair exceeds the first."""
+
+    pair: Pair
+    in_body: bool  # Whether it is one in axes of the body.
+    values: Array  # Shape (flight, axis).
+    sure: BoolArray  # Alike: which are no chance, and nothing that looks like a constant.
+    names: Sequence[str]
+
+    @property
+    def sizes(self) -> dict[int, float]:
+        """The largest along each axis that has one."""
+        return {i: largest(self.values[own, i].tolist(), abs) for i, own in enumerate(self.sure.T) if own.any()}
+
+    @property
+    def flights(self) -> list[str]:
+        """Names of the flights that have one."""
+        least = {i: _APART * abs(size) for i, size in self.sizes.items()}
+        known = zip(self.names, self.values, strict=True)
+        return [name for name, own in known if any(abs(own[i]) > size for i, size in least.items())]
+
+
+class _Constant(NamedTuple):
+    """By how much a channel exceeds another in one flight, each shape (axis,)."""
+
+    value: Array
+    error: Array
+    halves: Array  # Shape (half, axis).
+    mean: Array  # Of what is compared.
+    unexplained: float
 
 
 _PAIRS = (
@@ -299,6 +345,73 @@ def _turned(a: Array, b: Array, slope: Array, block: IntArray) -> Sure:
         return _NOT_KNOWN
     fits = _regressed(columns, b[:, :2], block)
     return _sure(fits[:, 1] / np.where(fits[:, 0], fits[:, 0], TINY))
+
+
+def offsets(checks: Sequence[PairCheck], flights: Sequence[Signals], windows: Windows) -> Iterator[Offset]:
+    """Find channels with a constant that the derivative of position or velocity does not have.
+
+    It is a number of each flight, in axes of the world or of the body, whichever leaves less; fitted jointly with
+    scales and axes that are off, a delay, and a lever from the centre of mass. In blocks of an eighth of a flight slow
+    errors count. A velocity that is rotated a little, and an attitude that leans, make one as well: the first is
+    bounded by the mean velocity, and of the second the thrust knows.
+
+    `checks`: of these flights.
+    """
+    long = [each for each in flights if len(each) * each.period >= ENOUGH_BLOCKS * block_length(0.0)]
+    if any(each.attitude is None for each in long):
+        return
+    for check in checks:
+        pair, wrong = check.pair, any(each.contradiction for each in check.problems)
+        known = [each for each in long if _row(pair, each, windows) is not None]
+        if wrong or not known or pair.first not in ("position", "velocity"):
+            continue
+        fits = [_constants(pair, each, windows) for each in known]
+        left = {body: sum(fit[body].unexplained for fit in fits) for body in fits[0]}
+        body = bool(less(left[True], left.get(False, np.inf)))
+        judged = zip(fits, known, strict=True)
+        sure = np.array([_is_sure(pair, fit[body], each, windows, in_body=body) for fit, each in judged])
+        if sure.any():
+            yield Offset(pair, body, np.array([fit[body].value for fit in fits]), sure, [each.name for each in known])
+
+
+def _constants(pair: Pair, signals: Signals, windows: Windows) -> dict[bool, _Constant]:
+    """Fit the constant of one flight in axes of the world and, true, of the body."""
+    rows = _row(pair, signals, windows)
+    assert rows is not None, "both are logged"
+    first, second, slope = rows
+    turn, spin = signals.rotation, cross(signals.body_rate[:, None], np.eye(3)).swapaxes(1, 2)
+    own = np.broadcast_to(np.eye(3), (len(first), 3, 3))
+    if pair.second == "specific_force":
+        frames, lever = {True: own}, windows.balance(spin @ spin, spin)
+    else:
+        frames = {False: own, True: windows.average(turn)}
+        lever = (windows.average if pair.first == "position" else windows.derivative)(turn @ spin)
+    # What is compared holds no error of the channel, which would explain itself.
+    scale = np.einsum("ij,wk->wijk", np.eye(3), first - first.mean(axis=0)).reshape(len(first), 3, 9)
+    columns = np.concatenate([scale, slope[:, :, None], lever, *frames.values()], axis=2)
+    blocks, halves = (folds(columns, second - first, contiguous(len(first), n)) for n in (ENOUGH_BLOCKS, 2))
+    found = {}
+    for body, last in zip(frames, range(columns.shape[2] - 3 * len(frames), columns.shape[2], 3), strict=True):
+        chosen = np.r_[:13, last : last + 3]
+        value, left = blocks.fit(chosen)
+        without, halved = (each.solve(chosen)[0][:, -3:, 0] for each in (blocks, halves))
+        found[body] = _Constant(value[-3:, 0], serial_error(without), halved, first.mean(axis=0), float(left.sum()))
+    return found
+
+
+def _is_sure(pair: Pair, fit: _Constant, signals: Signals, windows: Windows, *, in_body: bool) -> BoolArray:
+    """Check which constants are large, significant, and those of both halves and against the thrust, shape (axis,)."""
+    size = np.abs(fit.value)
+    least = _LEAST[pair.second] + TURNED_RAD * np.linalg.norm(fit.mean) * (pair.first == "position")
+    sure = size > np.maximum(least, half_width(fit.error, ENOUGH_BLOCKS, 1 - _CHANCE))
+    sure &= np.abs(fit.halves - fit.value).max(axis=0) < _APART * size
+    if pair.first == "velocity" and sure[:2].any():
+        thrust = Pair("thrust", *pair[1:])
+        known = _row(thrust, signals, windows) is not None
+        shared = _constants(thrust, signals, windows)[in_body].value if known else np.zeros(3)
+        # Along the thrust its own size is not known so well, and no lean shows.
+        sure[:2] &= (np.abs(shared - fit.value) < _APART * size)[:2]
+    return np.asarray(sure)
 
 
 def _problems(check: PairCheck) -> Iterator[Finding]:

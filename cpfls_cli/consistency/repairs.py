@@ -23,7 +23,7 @@ _SCALED = 0.1
 
 @dataclass(frozen=True)
 class ChannelRepair:
-    """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z``, or nothing."""
+    """How a channel becomes what it should be: ``matrix @ reading(t + delay) + gravity e_z - offset``, or nothing."""
 
     channel: str = about("that is corrected or left out; of rotor_speed the delay alone counts")
     dropped: bool = about("1 where it is left out, and nothing else counts", default=False)
@@ -33,7 +33,12 @@ class ChannelRepair:
         default_factory=lambda: np.eye(3),
         metadata={"about": About("unit and axes, after the turn to world axes", ("axis", "axis"))},
     )
-    gravity_m_s2: float = about("added along the vertical, last", unit="m/s^2", default=0.0)
+    gravity_m_s2: float = about("added along the vertical", unit="m/s^2", default=0.0)
+    offset: str = about(
+        "axes along which, last, its mean over a flight becomes that of the derivative of position or velocity",
+        default="",
+    )
+    offset_in_body: bool = about("1 where these are axes of the body", default=False)
     sentence: str = about(
         "what is wrong, what shows it, and what to correct; empty for a channel that goes with another", default=""
     )
@@ -74,7 +79,26 @@ class ChannelRepair:
         if self.gravity_m_s2:
             sensed = self.channel == "specific_force"
             truth = truth + self.gravity_m_s2 * (signals.rotation[:, 2] if sensed else UP)
-        return np.asarray(truth)
+        return np.asarray(truth - self._offset(truth, signals) if self.offset else truth)
+
+    def _offset(self, values: Array, signals: Signals) -> Array:
+        """Compute the mean error of a velocity or an acceleration along the axes of the offset, in those of values."""
+        integral = signals.position if self.channel == "velocity" else signals.velocity
+        if integral is None or signals.attitude is None:
+            return np.zeros(3)
+        derivative = np.gradient(integral, signals.period, axis=0)
+        to_body = signals.rotation.swapaxes(1, 2)
+        if self.channel == "specific_force":
+            derivative, to_body = _turned(to_body, derivative + signals.vehicle.gravity_m_s2 * UP), np.eye(3)[None]
+        apart = _turned(to_body, values - derivative) if self.offset_in_body else values - derivative
+        # The mean of a derivative would be the noise of two samples at the ends.
+        weight = np.hanning(len(apart))
+        mean = [axis in self.offset for axis in "xyz"] * (weight @ apart) / weight.sum()
+        return _turned(to_body.swapaxes(1, 2), mean) if self.offset_in_body else np.asarray(mean)
+
+
+def _turned(rotation: Array, values: Array) -> Array:
+    return np.asarray((rotation @ values[..., None])[..., 0])
 
 
 def accelerated(signals: Signals) -> Array | None:

@@ -8,18 +8,22 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt, lfilter
+from scipy.spatial.transform import Rotation
 
 from cpfls_cli import store
 from cpfls_cli.artifacts.diagnosis import Extended
 from cpfls_cli.consistency.check import audit
+from cpfls_cli.consistency.repairs import accelerated
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.rotations import euler_angles
 from cpfls_cli.weak_form.windows import windows
 from tests.builders import gap_artifacts
 from tests.builders.closed_loop_flights import COARSE, PERIOD, flown, signals_of
 
 WINDOWS = windows(PERIOD, 0.4, 0.5)
 UP = np.array([0.0, 0.0, 9.81])
+EAST, NORTH = np.eye(3)[:2]
 DRAG = 2e-3
 NOISE = {
     "attitude": 0.003,
@@ -112,6 +116,13 @@ WRONG = {
     "velocity of another north": (of_velocity(lambda _, v: v @ turned(30).T), "The velocity is rotated by"),
     "velocity late": (of_velocity(lambda _, v: late(v, 0.1)), "The velocity is late by"),
     "velocity in km/h": (of_velocity(lambda _, v: 3.6 * v), "The velocity is in km/h"),
+    "velocity with an offset": (of_velocity(lambda _, v: v - 0.3 * NORTH), "of -0.30 m/s along y, judged by"),
+    "velocity with one in the body": (
+        of_velocity(lambda s, v: v + 0.3 * s.rotation[:, :, 0]),
+        "m/s along body x, judged by",
+    ),
+    "acceleration with an offset": (of_acceleration(lambda _, a: a + 0.4 * EAST), "m/s^2 along x, judged by"),
+    "sensed with an offset": (of_accelerometer(lambda _, f: f + 0.4 * (NORTH - UP / 9.81)), "along body y and -0.4"),
     "attitude late": (lambda s: replace(s, attitude=late(s.attitude, 0.03)), "The attitude is late by"),
 }
 
@@ -147,6 +158,65 @@ def test_channels_that_agree_are_left_alone(flights):
             found = audit(part, WINDOWS)
             assert (found.repairs, found.warnings, found.filtered) == ((), (), ())
             assert found.repaired(part[0]) is part[0]
+
+
+def levered(signals, arm):
+    """Move the accelerometer off the centre of mass."""
+    at = np.cross(signals.body_rate, arm)
+    rise = np.gradient(low_passed(np.einsum("tij,tj->ti", signals.rotation, at), 10.0), PERIOD, axis=0)
+    return replace(signals, acceleration=signals.acceleration + rise)
+
+
+def leaning(signals, *, felt):
+    """Turn the attitude about body y, and with it what an accelerometer feels."""
+    sensed, turn = sensing(signals), Rotation.from_euler("y", 0.03).as_matrix()
+    lean = replace(sensed, attitude=euler_angles(signals.rotation @ turn))
+    return lean if felt else replace(lean, acceleration=accelerated(lean), specific_force=None)
+
+
+def slow_error(signals, seed):
+    """Draw errors that are forgotten after 2 s, each a standard deviation of 1."""
+    kept, noise = np.exp(-PERIOD / 2.0), np.random.default_rng(seed).normal(size=(len(signals), 3))
+    return lfilter([np.sqrt(1 - kept**2)], [1, -kept], noise, axis=0)
+
+
+NO_OFFSET = {
+    "accelerometer above the centre of mass": lambda s: levered(s, [0.0, 0.0, 0.1]),
+    "accelerometer ahead of it": lambda s: levered(s, [0.1, 0.0, 0.0]),
+    "attitude leans": lambda s: leaning(s, felt=False),
+    "attitude leans above an accelerometer": lambda s: leaning(s, felt=True),
+    "scales": lambda s: replace(s, velocity=1.01 * s.velocity, acceleration=1.01 * (s.acceleration + UP) - UP),
+    "a little rotated in steady flight": lambda s: replace(
+        s,
+        position=s.position + 4.0 * np.outer(s.time, EAST),
+        velocity=(s.velocity + 4.0 * EAST) @ turned(2.0).T,
+    ),
+    "slow errors": lambda s: replace(
+        s, velocity=s.velocity + 0.2 * slow_error(s, 1), acceleration=s.acceleration + 0.3 * slow_error(s, 2)
+    ),
+}
+
+
+@pytest.mark.parametrize("like", NO_OFFSET)
+def test_what_looks_like_a_constant_offset_is_none(flights, like):
+    assert [each.channel for each in audit([NO_OFFSET[like](s) for s in flights], WINDOWS).repairs if each.offset] == []
+
+
+def test_an_offset_of_one_flight_is_taken_off_that_one_alone(flights):
+    first, other = flights
+    wrong = replace(first, velocity=first.velocity + 0.3 * EAST, name="first")
+    found = audit([wrong, other], WINDOWS)
+    assert "offset of +0.30 m/s along x in first, judged by the position" in found.settled[0]
+    for given, true in ((wrong, first), (other, other)):
+        assert np.abs((found.repaired(given).velocity - true.velocity).mean(axis=0)).max() < 0.01
+
+
+def test_the_noise_of_its_last_sample_is_no_change_of_a_velocity(flights):
+    ends = [replace(s, velocity=s.velocity + (s.time == s.time[-1])[:, None]) for s in flights]
+    wrong = [replace(s, acceleration=s.acceleration + 0.4 * EAST) for s in ends]
+    found = audit(wrong, WINDOWS)
+    for given, true in zip(wrong, flights, strict=True):
+        assert np.abs((found.repaired(given).acceleration - true.acceleration).mean(axis=0)).max() < 0.015
 
 
 def test_what_no_usual_mistake_explains_is_left_out(flights):
@@ -236,7 +306,10 @@ SEVERAL = {
         lambda s: WRONG["velocity in km/h"][0](WRONG["in g"][0](s)),
     ),
     "axes": (("velocity has y, x, -z",), WRONG["velocity in NED"][0]),
-    "offset": ((), of_acceleration(lambda _, a: a + np.array([0.3, -0.2, 0.4]))),
+    "offset": (
+        ("acceleration has a constant offset of",),
+        of_acceleration(lambda _, a: a + np.array([0.3, -0.2, 0.4])),
+    ),
 }
 
 
