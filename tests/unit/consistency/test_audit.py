@@ -198,7 +198,8 @@ def test_a_torque_that_moves_nothing_tells_no_delay(turning):
 
 def test_rotors_that_hold_one_speed_are_named(turning):
     speed = np.full((len(turning), 4), 348.0)
-    assert body_wrench(turning.vehicle, speed).thrust.std() == 0
+    # But for the rounding of a sum, which is not the same in all rows on every processor.
+    assert body_wrench(turning.vehicle, speed).thrust.std() < 1e-12
     result = audit([replace(turning, rotor_speed=speed)], WINDOWS).warnings
     assert sum("rotor speed" in sentence for sentence in result) == 4
 
