@@ -70,8 +70,12 @@ def of_small(flown):
     @cache
     def found(setpoints):
         asked, recordings = [], recorded(flown["small"], TRUE.vehicle, setpoints=setpoints)
+
+        def remembered(*given):
+            asked.append(given)
+            return small_effects(*given)
+
         with pytest.MonkeyPatch.context() as monkeypatch:
-            remembered = lambda *given: asked.append(given) or small_effects(*given)  # noqa: E731
             monkeypatch.setattr("cpfls_cli.gap.diagnose.small_effects", remembered)
             return diagnosed(recordings).diagnosis, asked[-1]
 
