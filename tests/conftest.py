@@ -59,9 +59,10 @@ def read_once():
 
 @pytest.fixture(scope="session", autouse=True)
 def spare():
-    """Leave pictures away, but where a test looks at them; draw trends for a rate of 0.005; read a file once."""
+    """Leave pictures away, but where a test looks at them; draw chance for a rate of 0.005; read a file once."""
     with command_line.undrawn(), pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setattr("cpfls_cli.changes.trend._DRAWS", 300)
+        monkeypatch.setattr("cpfls_cli.changes.judge._DRAWS", 600)
         monkeypatch.setattr(store, "examine", read_once())
         yield
 

@@ -172,7 +172,7 @@ def judged(
         )
 
     of_starts = [held(today[start:], len(starts)) for start in starts]
-    drawn = drawn_by_chance(rng, kinds, reference.freedom, [len(today) - start for start in starts])
+    drawn = drawn_by_chance(rng, kinds, reference.freedom, [len(today) - start for start in starts], _DRAWS)
     most = np.array([own.space.strongest(rows) for own, rows in zip(of_starts, drawn, strict=True)])
     chance, alone = np.sort(most.max(axis=0)), np.sort(most[-1])
     best = max(range(len(starts)), key=lambda at: (-of_starts[at].p_value(chance), of_starts[at].evidence))
@@ -201,7 +201,7 @@ def judged(
 
 
 def drawn_by_chance(
-    rng: np.random.Generator, kinds: Sequence[str], freedom: Array, counts: Sequence[int] = (1,), draws: int = _DRAWS
+    rng: np.random.Generator, kinds: Sequence[str], freedom: Array, counts: Sequence[int], draws: int
 ) -> Array:
     """Draw means of so many of the last flights of an unchanged day, whitened, shape (count, number, draw).
 

@@ -1,9 +1,10 @@
 """Settings of sweeps with runs of given errors."""
 
 import numpy as np
+import pytest
 
+from benchmarks.paper import searches
 from benchmarks.paper.replicates import Replicate, Setting, Sweep
-from benchmarks.paper.searches import Compared, main
 
 
 def setting_of(mse, structure="cpfls", samples=5487, size=(40, 10), seeds=None, **more):
@@ -42,7 +43,10 @@ def sweep_of(*settings):
 
 
 def searched(folder, name, seed, seeds):
-    """Search 30 samples in two sizes, from a seed on."""
-    given = (folder / "study.yaml", folder / "flight.h5", Compared.LARGER, folder / name)
-    main(*given, seed, seeds, population=8, generations=1, samples=[30])
+    """Search 30 samples in two sizes, from a seed on; both are small."""
+    given = (folder / "study.yaml", folder / "flight.h5", searches.Compared.LARGER, folder / name)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setitem(searches._SMALLER, "identification.population", 10)
+        monkeypatch.setitem(searches._SMALLER, "identification.generations", 2)
+        searches.main(*given, seed, seeds, population=8, generations=1, samples=[30])
     return folder / name

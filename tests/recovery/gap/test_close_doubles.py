@@ -57,9 +57,12 @@ class Waves:
         return (np.exp(1j * time[:, None] * self.turn.T) @ (answer(1j * self.turn) * self.size)).real
 
 
-def turned(torque, share=0.0, natural=1.0, damping=0.0):
-    """Integrate the rates of a body a share of whose inertia is on springs, by the classical Runge-Kutta method."""
-    moments = np.diag(INERTIA)
+def turned(torques, share=0.0, natural=1.0, damping=0.0):
+    """Integrate the rates of a body a share of whose inertia is on springs, by the classical Runge-Kutta method.
+
+    Several flights at once, shape (flight, time, 3).
+    """
+    torque, moments = np.stack(torques, axis=1), np.diag(INERTIA)
 
     def rate(state, driven):
         turning, angle, swing = state
@@ -68,7 +71,7 @@ def turned(torque, share=0.0, natural=1.0, damping=0.0):
         spun = (stiff + share * spring) / (1 - share)
         return np.array([spun, swing, -spun - spring])
 
-    state, rates = np.zeros((3, 3)), []
+    state, rates = np.zeros((3, *torque.shape[1:])), []
     # Torques stand at every half step.
     for start in range(0, len(torque) - 2, 2):
         rates.append(state[0])
@@ -77,7 +80,7 @@ def turned(torque, share=0.0, natural=1.0, damping=0.0):
         third = rate(state + PERIOD / 2 * second, torque[start + 1])
         fourth = rate(state + PERIOD * third, torque[start + 2])
         state = state + PERIOD / 6 * (first + 2 * second + 2 * third + fourth)
-    return np.array(rates)
+    return np.stack(rates, axis=1)
 
 
 HALVES = np.arange(2 * len(TIME) + 1) * PERIOD / 2
@@ -96,23 +99,26 @@ def logged(rates, speed, seed, gyro=0.003, **known):
     )
 
 
-def on_springs(seed, gyro=0.003, **spring):
-    waves = Waves(seed)
-    speed = rotor_demand(VEHICLE, THRUST, waves.at(TIME)).speed
-    return logged(turned(waves.at(HALVES), **spring), speed, seed, gyro)
+def on_springs(seeds, gyro=0.003, **spring):
+    waves = [Waves(seed) for seed in seeds]
+    rates = turned([own.at(HALVES) for own in waves], **spring)
+    return [
+        logged(rate, rotor_demand(VEHICLE, THRUST, own.at(TIME)).speed, seed, gyro)
+        for rate, own, seed in zip(rates, waves, seeds, strict=True)
+    ]
 
 
-def late(seed, answer):
-    """Log the command of rotors that answer it by a filter, in speed."""
-    waves = Waves(seed)
+def late(seeds, answer):
+    """Log the commands of rotors that answer them by a filter, in speed."""
+    waves = [Waves(seed) for seed in seeds]
     mix = rotor_demand(VEHICLE, THRUST[:1], np.zeros((1, 3))).speed[0]
     lever = np.array([[0, 1, -1], [-1, 0, 1], [0, -1, -1], [1, 0, 1]]) * 8.0
 
-    def speed(time, own=lambda s: np.ones_like(s)):
-        return mix + waves.at(time, own) @ lever.T
-
-    torque = body_wrench(VEHICLE, speed(HALVES, answer)).body_torque
-    return logged(turned(torque), speed(TIME), seed, commanded=True)
+    rates = turned([body_wrench(VEHICLE, mix + own.at(HALVES, answer) @ lever.T).body_torque for own in waves])
+    return [
+        logged(rate, mix + own.at(TIME) @ lever.T, seed, commanded=True)
+        for rate, own, seed in zip(rates, waves, seeds, strict=True)
+    ]
 
 
 def lag(s):
@@ -129,7 +135,7 @@ def low_pass(s, damping=0.7, natural=2 * np.pi * 3.0):
 
 def test_a_part_on_springs_is_named_with_its_frequency_and_share():
     spring = {"share": 0.3, "natural": 2 * np.pi * 2.65, "damping": 0.1}
-    chosen = found([on_springs(seed, **spring) for seed in (1, 2, 3)], STILL)
+    chosen = found(on_springs((1, 2, 3), **spring), STILL)
     assert names_of(chosen) == {"flexible_mount"}
     assert shape_of(chosen, "flexible_mount")["frequency_hz"] == pytest.approx(2.65, rel=0.02)
     assert shape_of(chosen, "flexible_mount")["damping"] == pytest.approx(0.1, rel=0.1)
@@ -137,7 +143,7 @@ def test_a_part_on_springs_is_named_with_its_frequency_and_share():
 
 def test_noise_of_the_gyroscope_takes_nothing_off_the_share_on_springs():
     """The column amplifies it at its own frequency, and least squares make its numbers too small."""
-    flights = [on_springs(seed, 0.02, share=0.3, natural=2 * np.pi * 2.65, damping=0.1) for seed in (4, 5, 6)]
+    flights = on_springs((4, 5, 6), 0.02, share=0.3, natural=2 * np.pi * 2.65, damping=0.1)
     own = candidate("flexible_mount", frequency_hz=2.65, damping=0.1)
     squares = fitted(flights, [own], best_floor(system(flights, [own])), SETTINGS)
     likely = with_noisy_rate(squares)
@@ -151,7 +157,7 @@ def test_noise_of_the_gyroscope_takes_nothing_off_the_share_on_springs():
 
 def test_a_short_flight_takes_nothing_from_long_ones_and_gives_no_numbers_alone():
     spring = {"share": 0.3, "natural": 2 * np.pi * 2.65, "damping": 0.1}
-    whole = [on_springs(seed, **spring) for seed in (4, 5, 6)]
+    whole = on_springs((4, 5, 6), **spring)
     short = weak(stretch_of(whole[2].signals, slice(0, round(2.0 / PERIOD))))
     own = candidate("flexible_mount", frequency_hz=2.65, damping=0.1)
 
@@ -166,12 +172,12 @@ def test_a_short_flight_takes_nothing_from_long_ones_and_gives_no_numbers_alone(
 
 
 def test_a_stiff_body_has_no_springs():
-    assert not found([on_springs(seed) for seed in (1, 2)], STILL)
+    assert not found(on_springs((1, 2)), STILL)
 
 
 def test_a_notch_is_named_and_lag_and_delay_beside_it_are_rivals():
     """Of lag and delay beside a notch the width of the notch takes what tells them apart."""
-    flights = [late(seed, lambda s: lag(s) * notch(s)) for seed in (1, 2)]
+    flights = late((1, 2), lambda s: lag(s) * notch(s))
     chosen = found(flights, STILL)
     (beside,) = names_of(chosen) - {"notch_filter"}
     assert beside in ("motor_lag", "command_delay")
@@ -191,7 +197,7 @@ def rivals_of(flights, chosen, name):
 
 
 def test_a_lag_and_a_delay_are_no_notch_and_no_low_pass():
-    flights = [late(seed, lambda s: lag(s) * np.exp(-0.03 * s)) for seed in (1, 2)]
+    flights = late((1, 2), lambda s: lag(s) * np.exp(-0.03 * s))
     chosen = found(flights, (*STILL, "low_pass_filter"))
     assert names_of(chosen) == {"motor_lag", "command_delay"}
     assert "notch_filter" not in rivals_of(flights, chosen, "command_delay")
@@ -199,7 +205,7 @@ def test_a_lag_and_a_delay_are_no_notch_and_no_low_pass():
 
 
 def test_a_low_pass_is_no_lag_and_delay():
-    flights = [late(seed, low_pass) for seed in (1, 2)]
+    flights = late((1, 2), low_pass)
     (chosen,) = found(flights, (*STILL, "low_pass_filter"))
     assert chosen.effect.name == "low_pass_filter"
     assert chosen.shape == {"frequency_hz": pytest.approx(3.0, rel=0.05), "damping": pytest.approx(0.7, rel=0.05)}
@@ -207,7 +213,7 @@ def test_a_low_pass_is_no_lag_and_delay():
 
 def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
     """Slow waves cannot tell it from a low-pass; neither lag nor delay would do alone."""
-    flights = [late(seed, lambda s: lag(s) * np.exp(-0.012 * s)) for seed in (1, 2)]
+    flights = late((1, 2), lambda s: lag(s) * np.exp(-0.012 * s))
     low = Candidate(CATALOGUE["low_pass_filter"], {"frequency_hz": 6.0, "damping": 1.2})
     effects = [CATALOGUE[each] for each in (*STILL, "low_pass_filter")]
     step = rank_effects(flights, (), effects, SETTINGS, None, also=(low,))
@@ -220,7 +226,7 @@ def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
 
 
 def test_a_notch_and_a_lag_are_no_low_pass_with_what_fills_in_beside_it():
-    flights = [late(seed, lambda s: lag(s) * notch(s, 0.8, 2 * np.pi * 6.5)) for seed in (1, 2, 3, 4)]
+    flights = late((1, 2, 3, 4), lambda s: lag(s) * notch(s, 0.8, 2 * np.pi * 6.5))
     chosen = found(flights, (*STILL, "low_pass_filter"))
     assert names_of(chosen) == {"motor_lag", "notch_filter"}
     assert shape_of(chosen, "notch_filter")["frequency_hz"] == pytest.approx(6.5, rel=0.1)
@@ -228,7 +234,7 @@ def test_a_notch_and_a_lag_are_no_low_pass_with_what_fills_in_beside_it():
 
 
 def test_a_delay_that_is_not_there_is_chance_beside_a_lag():
-    flights = [late(seed, lag) for seed in (1, 2)]
+    flights = late((1, 2), lag)
     lagging = {"time_constant_s": 0.05}
     chosen = [Candidate(CATALOGUE["motor_lag"], lagging), Candidate(CATALOGUE["command_delay"], {"delay_s": 0.004})]
     of_lag, of_delay = chances(flights, chosen)

@@ -2,6 +2,7 @@
 
 import tracemalloc
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -62,6 +63,25 @@ def flown():
     return {name: [each.pop(0) for _ in range(count)] for name, count in parts.items()}
 
 
+@pytest.fixture(scope="module")
+def of_small(flown):
+    """What a small damping is found as, with or without setpoints, and what is asked of samples for it; each once."""
+
+    @cache
+    def found(setpoints):
+        asked, recordings = [], recorded(flown["small"], TRUE.vehicle, setpoints=setpoints)
+
+        def remembered(*given):
+            asked.append(given)
+            return small_effects(*given)
+
+        with pytest.MonkeyPatch.context() as monkeypatch:
+            monkeypatch.setattr("cpfls_cli.gap.diagnose.small_effects", remembered)
+            return diagnosed(recordings).diagnosis, asked[-1]
+
+    return found
+
+
 def recorded(flights, vehicle, *, setpoints, commanded=False):
     known = [each if setpoints else replace(each, setpoints={}) for each in flights]
     return [logged(each, vehicle, commanded=commanded).parts[0] for each in known]
@@ -82,12 +102,16 @@ def tells_sizes(found):
 
 
 def in_what_is_left(recordings):
+    found = air_in(recordings)
+    assert found is not None
+    return found
+
+
+def air_in(recordings):
     windows, model = common_windows(recordings, FEW), plain(None)
     hypothesis = model.system([weak_flight(each, windows, None, force=True) for each in recordings])
     block = block_index(hypothesis, FEW)
-    found = air(hypothesis, model.linear, block, known_motion(recordings), FEW)
-    assert found is not None
-    return found
+    return air(hypothesis, model.linear, block, known_motion(recordings), FEW)
 
 
 @pytest.mark.parametrize(("kind", "setpoints"), [("asked", True), ("again", False)])
@@ -168,10 +192,9 @@ def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
 
 
 @pytest.mark.parametrize("setpoints", [True, False])
-def test_what_is_small_against_gusts_is_found_by_samples(flown, setpoints):
+def test_what_is_small_against_gusts_is_found_by_samples(of_small, setpoints):
     """Both of a damping's rivals do without it, and it without them, so that they are listed."""
-    recordings = recorded(flown["small"], TRUE.vehicle, setpoints=setpoints)
-    found = diagnose(recordings[:3], recordings[3:], FEW, np.random.default_rng(1)).diagnosis
+    found, _ = of_small(setpoints)
     (effect,) = found.effects
     assert (found.verdict, effect.name) == (GapVerdict.AMBIGUOUS, "linear_damping")
     assert "rotor_plane_damping" in {each.name for each in found.alternatives}
@@ -184,7 +207,7 @@ def test_what_is_small_against_gusts_is_found_by_samples(flown, setpoints):
 @pytest.mark.parametrize("setpoints", [True, False])
 def test_noise_of_rotors_that_no_loop_sees_is_no_small_effect(flown, setpoints):
     recordings = recorded(flown["noisy"], TRUE.vehicle, setpoints=setpoints)
-    run = diagnose(recordings[:3], recordings[3:], FEW, np.random.default_rng(1))
+    run = diagnosed(recordings)
     assert run.air is not None
     assert run.air.split.all()
     assert run.diagnosis.verdict is GapVerdict.NO_GAP
@@ -274,7 +297,7 @@ def test_where_instruments_know_too_little_what_was_before_tells(flown, monkeypa
     assert found.found.instrument_kind == "past"
     assert found.gusts_only.all()
     monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats",)})
-    assert diagnosed(recordings).air is None
+    assert air_in(recordings) is None
 
 
 def test_an_axis_that_other_runs_do_not_size_is_told_by_what_was_before(flown, monkeypatch):
@@ -337,7 +360,7 @@ def test_what_the_vehicle_does_is_not_called_gusts(flown, kind, turning):
 def test_flights_of_which_some_lack_a_signal_are_tried_by_what_all_have(flown):
     recordings = recorded(flown["small"], TRUE.vehicle, setpoints=True)
     lacking = replace(recordings[2], velocity=None)
-    for held in (recordings[3:], [recordings[3], replace(recordings[4], velocity=None)]):
+    for held in (recordings[3:4], [recordings[3], replace(recordings[4], velocity=None)]):
         run = diagnose([*recordings[:2], lacking], held, FEW, np.random.default_rng(1))
         assert {each.name for each in run.diagnosis.effects} <= {"linear_damping"}
 
@@ -392,12 +415,8 @@ def test_products_are_made_in_little_memory(flown, monkeypatch):
     assert peak < 300e6 * 5 * 30 / 1000
 
 
-def test_a_copy_of_an_effect_is_no_second_one(flown, monkeypatch):
-    asked = []
-    monkeypatch.setattr("cpfls_cli.gap.diagnose.small_effects", lambda *given: asked.append(given) or [])
-    recordings = recorded(flown["small"], TRUE.vehicle, setpoints=True)
-    diagnose(recordings[:3], recordings[3:], FEW, np.random.default_rng(1))
-    found, held, candidates, gusty = asked[-1]
+def test_a_copy_of_an_effect_is_no_second_one(of_small):
+    _, (found, held, candidates, gusty) = of_small(True)
     one = next(each for each in candidates if each.effect.name == "linear_damping")
     copy = one._replace(effect=replace(one.effect, name="copy"))
     (effect,) = small_effects(found, held, [one, copy], gusty)

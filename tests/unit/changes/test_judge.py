@@ -138,7 +138,8 @@ def test_unchanged_flights_seldom_look_changed():
     rng = np.random.default_rng(5)
     reference = Reference.of(flights(6, rng), NAMES, QUAD)
     own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD), kinds_of(NAMES))
-    chance, again = (own.strongest(drawn_by_chance(rng, kinds_of(NAMES), reference.freedom)[0]) for _ in range(2))
+    drawn = partial(drawn_by_chance, rng, kinds_of(NAMES), reference.freedom, [1], 2000)
+    chance, again = (own.strongest(drawn()[0]) for _ in range(2))
     assert 0.002 < np.mean(again > np.quantile(chance, 1 - FALSE_ALARM)) < 0.025
 
 
@@ -216,9 +217,9 @@ def test_what_shows_does():
     size = smallest(changed(before[:1], before[1:], QUAD, rng))["rotor M3"]
     reference = Reference.of(before[1:], NAMES, QUAD)
     own = _Space(reference.covariance, reference.freedom, causes(NAMES, QUAD), kinds_of(NAMES))
-    drawn = partial(drawn_by_chance, kinds=kinds_of(NAMES), freedom=reference.freedom)
-    threshold = np.quantile(own.strongest(drawn(rng)[0]), 1 - FALSE_ALARM)
-    rows = drawn(rng, draws=400)[0] + own.whitened(-np.log(1 - size) * np.eye(10)[2])[:, None]
+    drawn = partial(drawn_by_chance, rng, kinds_of(NAMES), reference.freedom, [1])
+    threshold = np.quantile(own.strongest(drawn(2000)[0]), 1 - FALSE_ALARM)
+    rows = drawn(400)[0] + own.whitened(-np.log(1 - size) * np.eye(10)[2])[:, None]
     assert np.mean(own.strongest(rows) >= threshold) > 0.8
 
 
@@ -333,8 +334,9 @@ def test_a_number_beyond_its_limit_is_never_unchanged(names, monkeypatch):
     assert seen > 5
 
 
-def test_a_larger_change_does_not_count_less():
+def test_a_larger_change_does_not_count_less(monkeypatch):
     """Of a rotor that lacks 30 to 99 % of its thrust, far beyond what is usual of a damaged one."""
+    monkeypatch.setattr("cpfls_cli.changes.judge._DRAWS", 2000)
     for lost in (0.3, 0.6, 0.9, 0.99):
         rng = np.random.default_rng(17)
         change = changed(flights(1, rng, -np.log(1 - lost) * np.eye(10)[2]), flights(3, rng), QUAD, rng)
