@@ -34,7 +34,7 @@ def flown(own, folder):
 
 
 def said(today, before, vehicle):
-    """Say what is judged, as cells of a table: names with belief, mass of the load beside the vehicle's, its cable."""
+    """Say what is judged, as cells of a table: names with belief, mass of the load next to the vehicle's, its cable."""
     change = changed(today, before, vehicle, np.random.default_rng(0))
     names = ", ".join(f"{each.name} {100 * each.belief:.0f} %" for each in change.causes) or "no change"
     loads = [each.sizes[0] for each in change.causes if each.name == "load on a cable"]

@@ -1,4 +1,4 @@
-"""Vehicles exported for simulators and libraries: flown along flights beside the library, and what a step takes.
+"""Vehicles exported for simulators and libraries: flown along flights next to the library, and what a step takes.
 
 Parts, both if none is named: playback and steps. Flights: the example's kind (a vehicle with lag, damping, drag and
 flapping, noise in its log), RotorPy's with its own hidden effects, and a real Crazyflie with motor commands and a
@@ -77,7 +77,7 @@ def playback() -> None:
 
 
 def steps() -> None:
-    """One step of 1 ms of the vehicle of the example in each target, beside one in C."""
+    """One step of 1 ms of the vehicle of the example in each target, next to one in C."""
     model = truth()
     flight = flown(model, ("multisine",), hold="linear", duration_s=2.0, rate_hz=1000.0)[0]
     course = Course(flight, np.array([0]), 400)

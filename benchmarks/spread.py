@@ -150,7 +150,7 @@ def fleet(
 
 
 class Air(NamedTuple):
-    """Torque and force that act on vehicles beside those of their models: gusts and what the model lacks."""
+    """Torque and force that act on vehicles next to those of their models: gusts and what the model lacks."""
 
     flying: Fleet
     keep: Any

@@ -27,7 +27,7 @@ class Case:
     ``esc_speed`` logs rotor speeds as a controller believes them, without the loss of voltage;
     ``ideal_command`` logs a command that the rotors follow exactly; ``attack`` is what the logger does to the log;
     ``only`` the role of the flights that the effects are in, if not all; ``gusts`` the level of the air, ``air`` its
-    numbers, and ``instruments`` what tells it from the vehicle.
+    numbers, and ``instruments`` what separates it from the vehicle.
     """
 
     name: str

@@ -149,7 +149,7 @@ def write(flights: Flights, folder, noise_level, kind, rng) -> list[Path]:
 def write_key(flights: Flights, folder) -> Path:
     """Write what is hidden, with the size of its residual torque, as ``key.json``.
 
-    In gusts the residual torque is that without them; how large both are in averages over windows stands beside it.
+    In gusts the residual torque is that without them; how large both are in averages over windows stands next to it.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

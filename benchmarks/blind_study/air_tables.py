@@ -1,4 +1,4 @@
-"""What was said in gusts: each measure by the level of the gusts and by what tells them from the vehicle."""
+"""What was said in gusts: each measure by the level of the gusts and by what separates them from the vehicle."""
 
 from __future__ import annotations
 

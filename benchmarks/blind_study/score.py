@@ -1,4 +1,4 @@
-"""What the judge said beside what was hidden."""
+"""What the judge said next to what was hidden."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ class Scored:
 
     @property
     def air(self):
-        """The level of the gusts, and what tells them from the vehicle."""
+        """The level of the gusts, and what separates them from the vehicle."""
         return f"gusts {self.key.get('gusts', 0)}, {self.key.get('instruments', 'none')}"
 
     @property
@@ -143,7 +143,7 @@ class Scored:
 
 @dataclass(frozen=True)
 class Number:
-    """A coefficient of a rightly named effect beside the hidden one."""
+    """A coefficient of a rightly named effect next to the hidden one."""
 
     effect: str
     name: str
@@ -225,7 +225,7 @@ def _nothing_named(key, said):
 
 
 def _with_rivals(said, names, truth):
-    """Tell whether a listed rival, with what it needs beside it, makes the answer right in the place of a name."""
+    """Tell whether a listed rival, with what it needs next to it, makes the answer right in the place of a name."""
     return any(
         names - {rival["instead_of"]} | {rival["name"], rival.get("jointly_with") or rival["name"]} == truth
         for rival in said["alternatives"]

@@ -1,4 +1,4 @@
-"""The sections of a report with what the paper prints beside them: Tables 3, 4 and 5, and the peaks of the path."""
+"""The sections of a report with what the paper prints next to them: Tables 3, 4 and 5, and the peaks of the path."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _SAMPLES, _QUANTITY = 1, 0
 
 
 def with_the_paper(section: Section, sources: PaperSources) -> Section:
-    """Put beside a section what the paper prints of it."""
+    """Put next to a section what the paper prints of it."""
     blocks: list[Block] = list(_blocks(section.blocks, sources))
     if section.name == "summary" and not sources.sweeps:
         blocks.append(_LACKS_SWEEP)
@@ -105,7 +105,7 @@ def _table_4(table: Table) -> Table:
 
 
 def _all_columns(table: Table) -> Table:
-    """Put all columns of Table 5 beside the models, where no sweep repeats them."""
+    """Put all columns of Table 5 next to the models, where no sweep repeats them."""
     columns = [_printed(column) for column in TABLE_5]
     rows = [[*row, *(column[index] for column in columns)] for index, row in enumerate(table.rows)]
     header = [*table.header, *["Paper"] * len(columns)]

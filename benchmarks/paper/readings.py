@@ -1,4 +1,4 @@
-"""The paper in all the ways that its text can be read: each reading's numbers and claims beside what is printed."""
+"""The paper in all the ways that its text can be read: each reading's numbers and claims next to what is printed."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Reading:
 
     @cached_property
     def numbers(self) -> list[tuple[str, float, float]]:
-        """Its numbers on all samples and on the fewest beside the printed ones, each with what it is."""
+        """Its numbers on all samples and on the fewest next to the printed ones, each with what it is."""
         return [number for number in self._numbers() if np.isfinite(number[1])]
 
     @property

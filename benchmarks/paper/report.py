@@ -1,4 +1,4 @@
-"""The report on the paper: the page of `cpfls report`, the paper's figures beside ours, and its claims one by one."""
+"""The report on the paper: the page of `cpfls report`, the paper's figures next to ours, and its claims one by one."""
 
 from __future__ import annotations
 

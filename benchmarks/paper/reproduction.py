@@ -1,4 +1,4 @@
-"""The reproduction of the paper: its claims one by one, and its figures beside those of the page."""
+"""The reproduction of the paper: its claims one by one, and its figures next to those of the page."""
 
 from __future__ import annotations
 

@@ -150,7 +150,7 @@ def _of_searches(
 
 
 def _reduced_claim(column: PrintedColumn) -> Claim:
-    """Fewer samples, each set of them beside all samples."""
+    """Fewer samples, each set of them next to all samples."""
 
     def pairs(settings: Settings) -> Iterator[tuple[Setting, Setting]]:
         for full in settings:
@@ -176,7 +176,7 @@ REDUCED_CLAIMS = tuple(map(_reduced_claim, _REDUCED))
 
 
 _TIMES_LARGER = 10.0
-"""A search that is not ten times the other one tells nothing about the paper's, which is 53 times."""
+"""A search that is not ten times the other one shows nothing about the paper's, which is 53 times."""
 
 
 def _alike(one: Setting, other: Setting) -> bool:

@@ -92,7 +92,7 @@ class Body(NamedTuple):
     """s."""
     air: float
     gusts: float
-    """Beside those of the type."""
+    """Next to those of the type."""
     wind: Array
     """Along x and y, m/s."""
     turn_bias: Array

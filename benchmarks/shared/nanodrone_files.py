@@ -136,7 +136,7 @@ def _flight(
 
 
 def rotor_speed(logged: Mapping[str, Array]) -> Array:
-    """Convert electric revolutions per minute to rad/s, with samples beside a spike taken from the next, (time, 4)."""
+    """Convert electric revolutions per minute to rad/s, with samples next to a spike taken from the next, (time, 4)."""
     spikes = np.zeros(len(logged["m1_erpm"]), dtype=bool)
     for values in (logged[name] for motor in _MOTORS for kind in _SPIKY if (name := f"{motor}_{kind}") in logged):
         around = (np.flatnonzero(np.abs(np.diff(values)) > _JUMP)[:, None] + [-1, 0, 1]).ravel()

@@ -119,7 +119,7 @@ def test_rotor_torque_alone_turns_a_craft_that_hides_nothing(flown, name):
         time, speed, rate = flight.table[:, 0], flight.table[:, places(flight.table)["rotor"]], flight.table[:, 4:7]
         torque = speed**2 @ group.vehicle.allocation()[1:].T - np.cross(rate, rate * inertia)
         turned_by = CubicSpline(time, torque / inertia).antiderivative()(time)
-        # Rotors are told a new speed every 4 ms, so a spline through 100 Hz samples is good to about 1e-3 rad/s.
+        # Rotors get a new speed every 4 ms, so a spline through 100 Hz samples is good to about 1e-3 rad/s.
         np.testing.assert_allclose(rate - rate[0], turned_by, atol=2e-3)
 
 

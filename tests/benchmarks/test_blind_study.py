@@ -101,7 +101,7 @@ def test_what_no_catalogue_lists_is_never_called_found(judged):
         ([], "PARTIAL", ["inflow"], WRONG),
     ],
 )
-def test_answers_are_told_apart(truth, verdict, names, expected):
+def test_answers_are_distinguished(truth, verdict, names, expected):
     torque = 1.0 if "com_offset" in truth else 0.01
     key = {
         "truth": truth,

@@ -1,4 +1,4 @@
-"""Claims of the paper, and figures beside them."""
+"""Claims of the paper, and figures next to them."""
 
 import statistics
 from dataclasses import replace
@@ -108,7 +108,7 @@ def test_a_seed_without_a_model_is_a_failure_of_its_setting_of(failed):
     assert f"No model in {len(failed)} of them with the one beside it" in beside.why
 
 
-def test_a_seed_without_a_model_in_both_is_told_and_decides_nothing():
+def test_a_seed_without_a_model_in_both_is_said_and_decides_nothing():
     lost = np.where(np.arange(10) == 4, np.nan, NOISE)
     judged = measured(sweep_of(setting_of(lost), setting_of(lost, samples=685)))[2]
     assert judged.verdict == ClaimVerdict.PASS
@@ -140,7 +140,7 @@ def test_one_seed_decides_nothing_and_unequal_searches_are_not_compared():
     assert claims() == [ClaimVerdict.NOT_MEASURED] * 5
 
 
-def test_a_smaller_search_needs_a_much_larger_one_beside_it():
+def test_a_smaller_search_needs_a_much_larger_one_next_to_it():
     small = setting_of(1.05 * NOISE, samples=685, size=(75, 25))
     assert claims(small, setting_of(NOISE, samples=685, size=(40, 10)))[3] == ClaimVerdict.NOT_MEASURED
     assert claims(small, setting_of(NOISE, samples=685, size=(500, 200)))[3] == ClaimVerdict.PASS
@@ -262,7 +262,7 @@ def test_a_search_has_converged_where_its_last_fifth_brings_nothing():
     assert "The random start is there already" in at_once.why
 
 
-def test_ranking_by_quantity_beside_a_classical_one():
+def test_ranking_by_quantity_next_to_a_classical_one():
     quantity, pareto = setting_of(NOISE, samples=685), replace(setting_of(NOISE, samples=685), ranking="pareto-fronts")
     assert verdict(RANKING_CLAIM, quantity, pareto) == ClaimVerdict.PASS
     assert verdict(RANKING_CLAIM, with_runs(quantity, mse=2 * quantity.of("mse")), pareto) == ClaimVerdict.FAIL

@@ -40,7 +40,7 @@ def done(*words):
 
 
 def summary(*words):
-    """Give what a command that ends well tells machines."""
+    """Give what a command that ends well shows machines."""
     return json.loads(done(*words, "--json").stdout)
 
 

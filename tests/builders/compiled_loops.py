@@ -1,6 +1,6 @@
 """Loops compiled once, before two processes of tests compile each: `python -m tests.builders.compiled_loops`.
 
-What is compiled lies beside the package, where numba looks for it; it is made again where the source is newer.
+What is compiled lies next to the package, where numba looks for it; it is made again where the source is newer.
 """
 
 import subprocess

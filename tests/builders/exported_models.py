@@ -81,7 +81,7 @@ def model_of(case: Case, seed: int = 0) -> InertiaFunctions:
 
 
 def states(model: InertiaFunctions, count: int, seed: int = 0) -> Motion:
-    """Draw states over several turns; a quarter of the angles are seams, breakpoints, zeros, or beside them."""
+    """Draw states over several turns; a quarter of the angles are seams, breakpoints, zeros, or next to them."""
     rng = np.random.default_rng(seed)
     attitude = rng.uniform(-20, 20, (count, 3))
     turns = 2 * np.pi * rng.integers(-3, 4, (count, 2))

@@ -52,7 +52,7 @@ class Forked:
             os._exit(code)
 
     def poll(self):
-        """Give the exit code as `subprocess` tells it, None while it runs."""
+        """Give the exit code as `subprocess` shows it, None while it runs."""
         if self._status is None:
             pid, status = os.waitpid(self._pid, os.WNOHANG)
             self._status = status if pid else None

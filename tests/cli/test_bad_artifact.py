@@ -398,7 +398,7 @@ def test_a_name_with_spaces_can_be_pasted(refuse, log, tmp_path):
     assert line.endswith(f": cpfls import CONFIG '{spaced}' -o 'my log.h5'")
 
 
-def test_what_needs_no_import_is_told_so(refuse, pipeline, study, log_study, tmp_path):
+def test_what_needs_no_import_is_said_so(refuse, pipeline, study, log_study, tmp_path):
     (line,) = refuse("import", log_study, pipeline.flight, "-o", tmp_path / "out.h5")
     assert line == (
         f"{pipeline.flight}: is a cpfls/flight, not a log: it needs no import; `cpfls info {pipeline.flight}` shows it"

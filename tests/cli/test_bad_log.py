@@ -90,7 +90,7 @@ def changed(column, value, row=slice(None)):
     return "\n".join(",".join(line) for line in lines) + "\n"
 
 
-def test_one_value_that_no_flight_has_is_missing_and_told(cpfls, log_study, write, tmp_path):
+def test_one_value_that_no_flight_has_is_missing_and_said(cpfls, log_study, write, tmp_path):
     flight = tmp_path / "flight.h5"
     result = cpfls.done("import", log_study, write(changed("mx", "1e308", slice(40, 41))), "-o", flight, "--json")
     assert json.loads(result.stdout)["missing"] == {"mx": 1}

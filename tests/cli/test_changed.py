@@ -46,7 +46,7 @@ def test_of_few_reference_flights_it_is_said_that_what_they_differ_by_is_assumed
     assert "NO CHANGE SEEN" in (folder / "out" / "report.html").read_text()
 
 
-def test_where_no_load_would_have_shown_it_cannot_be_told(changed):
+def test_where_no_load_would_have_shown_it_cannot_be_said(changed):
     """That far more vibration would have shown says nothing of rotors and weights."""
     result = changed("same.csv", before=(1,), options=["--fail-on-change"])
     said = " ".join(result.stdout.split())
@@ -72,7 +72,7 @@ def test_a_weak_rotor_is_named_with_its_loss(changed, folder):
     assert np.mean(load["today"]) - load["reference"] == pytest.approx(-np.log(0.8), abs=0.03)
 
 
-def test_the_flight_that_it_began_with_is_told(changed, folder):
+def test_the_flight_that_it_began_with_is_said(changed, folder):
     # As weak that each flight shows it alone.
     for number in (3, 4, 5):
         save(folder / f"weak{number}.csv", flight_table(20 + number, (1.0, 1.0, 0.65, 1.0)), HEADER)
@@ -303,7 +303,7 @@ def test_logs_of_different_vehicles_are_refused_unless_asked(cpfls, stated):
     assert "are of different vehicles" in compared(cpfls, stated, "other.h5").stderr
 
 
-def test_without_attitude_gravity_tells_the_unit_of_the_accelerometer(cpfls, by_torque):
+def test_without_attitude_gravity_shows_the_unit_of_the_accelerometer(cpfls, by_torque):
     result = compared(cpfls, by_torque, "same.csv", "--set", "import.signals.acceleration.unit=g")
     assert result.exit_code == 3, result.output
     said = " ".join(result.stdout.split())

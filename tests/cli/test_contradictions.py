@@ -258,7 +258,7 @@ def test_speeds_of_rotors_in_a_unit_in_which_nothing_flies_are_refused(logs, com
 
 @pytest.mark.parametrize("known", [True, False])
 @pytest.mark.parametrize(("factor", "meant"), [(1.0, None), (9.549, "rpm"), (1 / 9.549, "rad/s"), (0.159, "Hz")])
-def test_the_unit_that_carries_the_vehicle_is_told_where_the_declared_one_does_not(known, factor, meant):
+def test_the_unit_that_carries_the_vehicle_is_said_where_the_declared_one_does_not(known, factor, meant):
     declared = "rpm" if meant == "rad/s" else "rad/s"
     flight = signals_of(flown(8.0, seed=1, integration_rate_hz=COARSE))
     vehicle = VEHICLE if known else replace(VEHICLE, unknown=("thrust_factor",))

@@ -129,7 +129,7 @@ def test_a_refusal_names_both_ways_and_each_of_them_works(cpfls, refuse, command
     (said,) = cpfls.summary(*command(name), "--accept-guesses")["cautions"]
     assert said.startswith(GUESSED)
     assert "inertia 0.8 to 4" in said
-    # A gap is told from a body alone.
+    # A gap is distinguished from a body alone.
     found = cpfls.done(*command(name), "--model", heavy if name == "gap" else vehicle, "--json", "--force")
     first, *others = json.loads(found.stdout)["cautions"]
     assert first == f"vehicle.h5: {HEADLINE}"
@@ -144,7 +144,7 @@ def test_found_numbers_stand_in_for_open_ones(cpfls, config, command, vehicle, t
     cpfls.done("report", config, tmp_path / "out", "-o", tmp_path / "page.html")
 
 
-def test_no_gap_is_told_from_an_inertia_of_no_body(refuse, command, vehicle):
+def test_no_gap_is_distinguished_from_an_inertia_of_no_body(refuse, command, vehicle):
     (line,) = refuse(*command("gap"), "--model", vehicle)
     assert line == (
         f"{vehicle}: no body has this inertia: its largest principal moment, 0.05, exceeds the sum of the other two, "
@@ -349,7 +349,7 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, open_fold
     assert "The values of what the config leaves open are guesses: drag factor, inertia and thrust factor." in page
 
 
-def test_an_added_mass_is_found_beside_what_is_shared(cpfls, flights, open_folder):
+def test_an_added_mass_is_found_next_to_what_is_shared(cpfls, flights, open_folder):
     config = heavier(flights, open_folder, same_vehicle, "groups.yaml")
     answer = cpfls.summary(
         "vehicle", config, open_folder / "flight.csv", open_folder / "loaded.csv", "-o", open_folder / "g.h5"

@@ -17,7 +17,7 @@ def test_table_lists_every_effect(cpfls):
     assert [line.split()[0] for line in lines[1 : 1 + len(CATALOGUE)]] == list(CATALOGUE)
 
 
-def test_one_effect_tells_its_range_and_its_rivals(cpfls):
+def test_one_effect_shows_its_range_and_its_rivals(cpfls):
     text = cpfls("effects", "wind", "-v").stdout
     assert "W_x from -15 to 15 m/s" in text
     assert "default, 6 kg with 4 rotors" in text

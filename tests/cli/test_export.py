@@ -204,7 +204,7 @@ def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):
 
 
 @pytest.mark.parametrize("form", ENDINGS)
-def test_the_suffix_tells_the_form(cpfls, pipeline, tmp_path, form):
+def test_the_suffix_shows_the_form(cpfls, pipeline, tmp_path, form):
     output = tmp_path / f"m.{ENDINGS[form]}"
     result = cpfls("export", pipeline.model, "-o", output, "--json")
     assert json.loads(result.stdout)["format"] == form
@@ -214,7 +214,7 @@ def test_the_suffix_tells_the_form(cpfls, pipeline, tmp_path, form):
     assert answer.read_bytes() == output.read_bytes()
 
 
-def test_a_suffix_that_tells_no_form(refuse, pipeline, tmp_path):
+def test_a_suffix_that_shows_no_form(refuse, pipeline, tmp_path):
     (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.h")
     assert line == (
         f"{tmp_path / 'm.h'}: its suffix names no form; give the name one of the suffixes .json (json), .c (c), "
@@ -243,7 +243,7 @@ def test_a_module_that_nobody_could_import(cpfls, refuse, pipeline, tmp_path, st
 
 
 @pytest.mark.parametrize("form", ENDINGS)
-def test_a_model_without_verdict_is_told(cpfls, model, tmp_path, form):
+def test_a_model_without_verdict_is_said(cpfls, model, tmp_path, form):
     change(model, verdict=None)
     output = tmp_path / f"m.{ENDINGS[form]}"
     result = cpfls.done("export", model, "-o", output)

@@ -53,7 +53,7 @@ def test_check_finds_nothing_in_what_the_program_writes(cpfls, pipeline, stage):
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_info_tells_origin_and_content(cpfls, pipeline, stage):
+def test_info_shows_origin_and_content(cpfls, pipeline, stage):
     path = pipeline.paths[stage]
     summary = cpfls.summary("info", path)
     assert (summary["format"], summary["seed"]) == (format_of(stage), 1)
@@ -137,7 +137,7 @@ def test_check_says_what_is_wrong_and_ends_with_1(cpfls, pipeline, tmp_path, nam
     assert (quiet.exit_code, quiet.output) == (1, "")
 
 
-# What a process has held at most since it began; what wait() tells of it counts its parent's memory as well.
+# What a process has held at most since it began; what wait() shows of it counts its parent's memory as well.
 PEAK = """
 import atexit, runpy, sys
 atexit.register(lambda: print("peak", open("/proc/self/status").read().split("VmHWM:")[1].split()[0]))

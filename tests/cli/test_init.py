@@ -272,7 +272,7 @@ def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tm
     assert "The log has no columns of rotors" in text
 
 
-def test_rotors_that_nothing_tells_are_asked_for(proposed, tmp_path, own):
+def test_rotors_that_nothing_shows_are_asked_for(proposed, tmp_path, own):
     noise = np.random.default_rng(2).normal(500, 3, own.speed.shape)
     speed = named(noise, "rotor1", "rotor2", "rotor3", "rotor4")
     result, text, data = proposed(
@@ -345,7 +345,7 @@ def test_bad_logs_are_refused_with_one_message(refuse, tmp_path, own):
     assert line.startswith(f"{cut}: a broken ULog file")
 
 
-def test_a_stamp_a_year_off_takes_no_memory_and_is_told(refuse, tmp_path, own):
+def test_a_stamp_a_year_off_takes_no_memory_and_is_said(refuse, tmp_path, own):
     """One bit of a log is enough."""
     log = flat_log(own)
     columns = log.topics[""]
@@ -494,7 +494,7 @@ def test_what_a_log_does_not_state_is_marked_a_guess_in_the_config(proposed, tmp
     assert "# A guess: called motor[*], up to" in text
 
 
-def test_an_arm_beside_places_that_a_log_states_is_asked_for(cpfls, refuse, tmp_path, own):
+def test_an_arm_next_to_places_that_a_log_states_is_asked_for(cpfls, refuse, tmp_path, own):
     log = tmp_path / "log.ulg"
     log.write_bytes(ulog_of_flight(own))
     (line,) = refuse("init", log, "-o", tmp_path / "study.yaml", "--arm", "0.3")

@@ -95,7 +95,7 @@ def test_signal_while_a_model_is_judged(pipeline, study, tmp_path, tmp_path_fact
     result = finished(words, tmp_path_factory.mktemp("printed"), patch=signalling)
     assert (result.returncode, said in result.stderr) == (128 + number, True), result.stderr
     assert "Traceback" not in result.stderr
-    # What goes on with --resume is there, and beside it the model, where it was found.
+    # What goes on with --resume is there, and next to it the model, where it was found.
     found = ["model.h5"] if number == signal.SIGTERM else []
     assert sorted(path.name for path in tmp_path.iterdir()) == [*found, "model.h5.checkpoint"]
 

@@ -235,7 +235,7 @@ def test_attitudes_not_visited_are_trusted_to_one_rule_with_known_coefficients(c
 
 @pytest.mark.parametrize(("structure", "least", "most"), [("seesaw", 0.05, float("inf")), ("harmonic", 0.0, 1e-8)])
 def test_a_structure_is_chosen_on_one_flight_and_judged_on_another(cpfls, flights, tmp_path, structure, least, most):
-    """As `make full-circle` fits each: of two structures beside each other one is exact."""
+    """As `make full-circle` fits each: of two structures next to each other one is exact."""
     first, kept, other = flights
     products, functions = ("additive", 3) if structure == "seesaw" else ("tensor", 1)
     keys = {"consequents": structure, "products": products, "membership_functions": functions, "choice": "held-out"}

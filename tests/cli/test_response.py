@@ -108,7 +108,7 @@ def summary(cpfls, folder):
     return call
 
 
-def test_json_tells_curves_and_costs(cpfls, summary, folder):
+def test_json_shows_curves_and_costs(cpfls, summary, folder):
     answer, output, _ = summary(folder / "light.csv")
     assert answer["model"] == "vehicle"
     assert answer["flights"] == ["light.csv"]
@@ -142,7 +142,7 @@ def test_a_body_that_is_heavier_than_stated(summary, folder):
     assert answer["responses"]["thrust"]["cost"] < 5.0
 
 
-def test_the_table_holds_what_json_tells(summary, folder):
+def test_the_table_holds_what_json_shows(summary, folder):
     answer, _, table = summary(folder / "light.csv")
     with table.open() as file:
         rows = list(csv.DictReader(file))

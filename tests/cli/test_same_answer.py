@@ -42,7 +42,7 @@ def said(cpfls, *words):
     result = cpfls.done(*words, "--force")
     text = result.stdout + result.stderr
     for word in words:
-        # The same flight stands in two folders, and what comes next is told with its place.
+        # The same flight stands in two folders, and what comes next is said with its place.
         text = text.replace(str(word), str(word).rsplit("/", 1)[-1])
     return NUMBER.sub("#", text), text
 

@@ -168,7 +168,7 @@ NAMES = (
 )
 """Runs by name."""
 OF_MODELS = ("replay", "report", "export", "spread")
-"""Of these the words are held beside their flights."""
+"""Of these the words are held next to their flights."""
 OF_OPEN_NUMBERS = (
     *("open: trajectory", "guessed: trajectory", "guessed: simulate", "guessed: compare", "guessed: gap"),
     *("found: compare", "found: response", "found: diagnose", "wide: compare"),

@@ -39,7 +39,7 @@ def test_init_says_what_to_set(slow):
     assert f"log them at 100 Hz or more ({CURE}" in slow[-1].stderr
 
 
-def test_vehicle_says_it_first_and_fits_only_what_can_be_told(cpfls, slow):
+def test_vehicle_says_it_first_and_fits_only_what_can_be_said(cpfls, slow):
     config, first, second, _ = slow
     output = config.with_name("vehicle.h5")
     result = cpfls.done("vehicle", config, first, "--held-out", second, "-o", output)

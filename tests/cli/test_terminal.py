@@ -367,7 +367,7 @@ def test_held_out_part_and_other_flights_are_judged_by_name(cpfls, pipeline, stu
     assert {"mse", "relative_error", "baselines"} <= set(held_out["held-out rest"])
 
 
-def test_an_import_tells_in_json_and_in_lines_what_it_read_and_what_it_did_about_it(cpfls, tmp_path):
+def test_an_import_shows_in_json_and_in_lines_what_it_read_and_what_it_did_about_it(cpfls, tmp_path):
     time = np.delete(np.arange(0.0, 4.0, 0.02), [50, 51, 52])
     angles = [0.2 * np.sin((2 + axis) * time) for axis in range(3)]
     angles[1][120] += 1

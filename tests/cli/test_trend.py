@@ -34,7 +34,7 @@ DAYS = 86400.0
 
 
 def write_log(path, seed, lacks=0.0):
-    """Write a flight of eight seconds; M3 is told to make up for what it lacks."""
+    """Write a flight of eight seconds; M3 is said to make up for what it lacks."""
     rng = np.random.default_rng(seed)
     time = np.arange(800) / 100
     force = np.array([0, 0, 9.81]) + rng.normal(0, 0.3, (800, 3))

@@ -97,13 +97,13 @@ def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
         assert figure in page
 
 
-def test_info_tells_the_answer_again(gains, cpfls, folder):
+def test_info_shows_the_answer_again(gains, cpfls, folder):
     said = cpfls("info", folder / "px4.h5").stdout
     assert gains["px4"].stdout.splitlines()[0] in said
     assert cpfls("info", folder / "px4.h5", "-v").stdout.count("MC_ROLLRATE_P") == 1
 
 
-def test_rotors_in_another_order_are_told(gains):
+def test_rotors_in_another_order_are_said(gains):
     assert "mixer: rotors" not in gains["px4"].output
     assert (
         "mixer: rotors 1, 2, 3 and 4 of the config are not where those of Betaflight are" in gains["betaflight"].output
@@ -210,7 +210,7 @@ def test_without_a_mapping_a_log_gives_parameters_alone(cpfls, folder, tmp_path)
     assert any("the config has no import.signals.body_rate" in words for words in found.warnings)
 
 
-def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_told(cpfls, folder, tmp_path):
+def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_said(cpfls, folder, tmp_path):
     (tmp_path / "study.yaml").write_text(STUDY + LOGGED)
     rows = [("IMU", (1_000_000 + 2500 * step, 0.1 * step, 0.2, 0.3)) for step in range(20)]
     (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows))

@@ -64,7 +64,7 @@ def test_it_finds_what_was_put_in(found):
 
 
 @pytest.mark.decides
-def test_json_tells_verdict_structures_and_what_was_held_out(found):
+def test_json_shows_verdict_structures_and_what_was_held_out(found):
     summary = found.summary
     assert summary["verdict"] == "good-for-simulation"
     assert summary["complete"] is True

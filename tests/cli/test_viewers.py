@@ -83,7 +83,7 @@ def messages_of(path):
     return found, units
 
 
-def test_columns_stand_beside_the_log_at_its_own_stamps(cpfls, logged, tmp_path):
+def test_columns_stand_next_to_the_log_at_its_own_stamps(cpfls, logged, tmp_path):
     said = exported(cpfls, logged / "flight.h5", tmp_path / "flight.csv")
     assert "on the clock of the log" in said
     assert "take the column stamp for the time" in said
@@ -175,7 +175,7 @@ def test_a_log_before_zero_has_no_stamp_in_mcap(cpfls, refuse, logged, tmp_path)
     assert columns_of(tmp_path / "flight.csv")["__time"][0] == -5.0
 
 
-def test_a_model_that_is_called_as_the_vehicle_is_told_from_it():
+def test_a_model_that_is_called_as_the_vehicle_is_distinguished_from_it():
     found = twin_found()
     first, second = found.vehicles.values()
     view = view_of(Path("twin.h5"), replace(found, vehicles={"vehicle": first, "vehicle.h5": second}), VEHICLE)

@@ -263,7 +263,7 @@ def written_log(flight, tmp_path):
 def test_a_torque_that_was_logged_is_what_a_prediction_is_held_against(
     cpfls, config, vehicle, flight, written_log, tmp_path
 ):
-    """A log of the true torque, which no rotor of the config tells, beside the measured rotor speeds."""
+    """A log of the true torque, which no rotor of the config shows, next to the measured rotor speeds."""
     torque = cpfls_cli.load_model(vehicle).predict(flight).body_torque
     log, settings = written_log(body_torque=("N m", torque))
     settings["torque_source"] = "column"
@@ -356,7 +356,7 @@ def test_gusts_that_nobody_knows_are_refused(refuse, config, path, folder, vehic
     assert "gusts are flown in closed loop only" in message
 
 
-def test_gusts_are_told_by_info_and_exported(cpfls, gusty, folder):
+def test_gusts_are_said_by_info_and_exported(cpfls, gusty, folder):
     held = cpfls.summary("info", gusty)["result"]["model"]["gusts"]
     assert held["size"] == [0.02, 0.03, 0.01, 0.2, 0.2, 0.2]
     cpfls.done("export", gusty, "-o", folder / "gusty.json")

@@ -40,13 +40,13 @@ def test_the_delay_is_the_one_that_was_found_by_hand(study):
 
 
 @pytest.mark.parametrize("name", ["log119", "log149"])
-def test_the_pause_of_the_logger_is_told_and_no_spike_is_invented(study, name):
+def test_the_pause_of_the_logger_is_said_and_no_spike_is_invented(study, name):
     imported = study.imported[name]
     assert (imported["gaps"], imported["spikes"], imported["suspected_spikes"]) == (1, {}, {})
     assert 0.05 < imported["longest_gap_s"] < 0.07
 
 
-def test_the_file_tells_what_was_done_about_the_gap(study):
+def test_the_file_shows_what_was_done_about_the_gap(study):
     with h5py.File(study.flight) as file:
         assert float(file["longest_gap_s"][()]) == pytest.approx(0.0595, abs=5e-5)
         assert int(file["gaps"][()]) == 1
@@ -54,7 +54,7 @@ def test_the_file_tells_what_was_done_about_the_gap(study):
 
 
 @pytest.mark.usefixtures("drawn")
-def test_the_page_tells_it_too(study):
+def test_the_page_shows_it_too(study):
     page = study.flight.with_name("page.html")
     run.done("report", CONFIG, study.flight, "-o", page)
     assert "gaps in the time stamps, up to 0.0595 s: interpolated" in page.read_text()

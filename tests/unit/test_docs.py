@@ -69,7 +69,7 @@ OPTIONS = {
 
 
 def commands(page):
-    """Commands in the code of a page, with the options that stand beside them."""
+    """Commands in the code of a page, with the options that stand next to them."""
     text = page.read_text(encoding="utf-8").replace("\\\n", " ")
     blocks = re.findall(r"^```(?:sh)?\n(.*?)^```|^((?:    .*\n)+)", text, re.MULTILINE | re.DOTALL)
     lines = [line for block in blocks for line in "".join(block).splitlines() if line.strip().startswith("cpfls ")]

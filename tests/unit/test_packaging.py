@@ -1,4 +1,4 @@
-"""What is told of the package beside it: its version, its extras, and what hosts run to check it."""
+"""What is said of the package next to it: its version, its extras, and what hosts run to check it."""
 
 import os
 import re

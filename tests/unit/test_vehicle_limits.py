@@ -37,7 +37,7 @@ def test_mass_and_arm_in_small_units_are_both_named():
     assert "0.05 m? 50 is an arm in mm" in arm.why
 
 
-def test_a_mass_in_g_is_told_by_what_is_too_heavy_for_the_arm_that_is_meant():
+def test_a_mass_in_g_is_said_by_what_is_too_heavy_for_the_arm_that_is_meant():
     """1200 kg on arms of 225 m are too light for their discs, which no smaller mass mends."""
     mass, arm = beyond_any_vehicle(of_quadrotor(1200.0, 225.0))
     assert mass.why.startswith("with the others right, the disc loading between its hubs is 3.7e+04 N/m^2, and no ")
@@ -45,7 +45,7 @@ def test_a_mass_in_g_is_told_by_what_is_too_heavy_for_the_arm_that_is_meant():
     assert "0.225 m? 225 is an arm in mm" in arm.why
 
 
-def test_another_vehicle_that_explains_it_as_well_is_told_too():
+def test_another_vehicle_that_explains_it_as_well_is_said_too():
     """27 and 39.6 are a Crazyflie in g and mm, and a vehicle of 27 kg with arms in cm."""
     (arm,) = beyond_any_vehicle(of_quadrotor(27.0, 39.6))
     assert "0.396 m? 39.6 is an arm in cm; or " in arm.why

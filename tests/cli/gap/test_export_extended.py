@@ -43,7 +43,7 @@ def test_it_is_exported(cpfls, extended, tmp_path):
     assert force[2] == pytest.approx(thrust, rel=0.02)
 
 
-def test_what_a_table_does_not_hold_is_told_with_numbers_and_size(cpfls, extended, tmp_path):
+def test_what_a_table_does_not_hold_is_said_with_numbers_and_size(cpfls, extended, tmp_path):
     record = read(extended, Extended)[0]
     size, ends = np.array([0.0, 0.4, 0.0, 0.0, 0.0, 0.0]), np.array([0.1, 0.2, 0.3, 0.4])
     sag = ModelEffect("battery_sag", {"exponent": 1.5}, np.zeros(0))

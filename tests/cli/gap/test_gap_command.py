@@ -129,7 +129,7 @@ def test_people_read_the_verdict_first(found, shifted):
     assert words[3:5] == [str(folder / "extended.h5"), str(shifted[0])]
 
 
-def test_a_rival_that_could_not_be_tried_is_told_with_the_signal_that_is_missing(cpfls, gap_config, shifted, tmp_path):
+def test_a_rival_that_could_not_be_tried_is_said_with_the_signal_that_is_missing(cpfls, gap_config, shifted, tmp_path):
     said = cpfls("gap", gap_config, *shifted, "-o", tmp_path / "x", "--set", "gap.ignore=[]").stdout
     assert "AMBIGUOUS: These flights cannot separate offset of the centre of mass from steady wind." in said
     assert "To separate steady wind from offset of the centre of mass: log attitude and velocity" in said

@@ -21,7 +21,7 @@ def test_artifacts_carry_the_model(answer, pipeline):
         assert (file["base/fuzzy/coefficients"][()] == functions).all()
 
 
-def test_offset_is_found_beside_the_model(answer):
+def test_offset_is_found_next_to_the_model(answer):
     _, summary = answer
     effects = {effect["name"]: effect for effect in [*summary["effects"], *summary["closest"]]}
     assert effects["com_offset"]["coefficients"]["c_x"]["value"] == pytest.approx(0.008, rel=0.1)

@@ -34,7 +34,7 @@ def of_vehicle(replayed, with_attitude):
     return replayed("vehicle", *with_attitude)
 
 
-def test_json_tells_every_prediction_by_signal_and_horizon(of_vehicle):
+def test_json_shows_every_prediction_by_signal_and_horizon(of_vehicle):
     answer, _ = of_vehicle
     assert answer["horizon_s"] == pytest.approx(0.01 * np.arange(1, 51))
     assert answer["windows"] == 2 * len(range(0, 2400 - 50, 7))

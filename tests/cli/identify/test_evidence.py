@@ -133,7 +133,7 @@ def test_an_interrupt_while_evidence_is_gathered_leaves_the_whole_model(
     assert [path.name for path in tmp_path.iterdir()] == ["model.h5"]
 
 
-def test_use_of_a_model_that_was_judged_unfit_is_told(validated, cpfls, study, pipeline, tmp_path):
+def test_use_of_a_model_that_was_judged_unfit_is_said(validated, cpfls, study, pipeline, tmp_path):
     for number, (label, answer) in enumerate((("do-not-use", "do not use"), ("good-for-control", None))):
         model, output = tmp_path / f"{number}.h5", tmp_path / f"replay-{number}.h5"
         write_changed(validated[0], model, verdict__label=label)

@@ -1,4 +1,4 @@
-"""Models beside each other, from artifacts with known numbers."""
+"""Models next to each other, from artifacts with known numbers."""
 
 import json
 import re
@@ -147,7 +147,7 @@ def test_another_split_of_one_flight_is_other_data(compared, write):
     assert keys["rows"] == [["identification.training_share", "1.0", "0.9"]]
 
 
-def test_rigid_bodies_that_differ_are_told_apart_by_their_models(compared, write, bare):
+def test_rigid_bodies_that_differ_are_distinguished_by_their_models(compared, write, bare):
     mse = bare[0].judged.mse.copy()
     mse[bare[0].judged.models.index("rigid-body")] = 1.0
     _, blocks = compared(write("one.h5"), write("two.h5", **{"judged/mse": mse}))
@@ -155,7 +155,7 @@ def test_rigid_bodies_that_differ_are_told_apart_by_their_models(compared, write
     assert [row[0] for row in table(blocks, "Model")["rows"]] == names
 
 
-def test_what_only_rounding_tells_apart_is_marked_alike(compared, write):
+def test_what_only_rounding_separates_is_marked_alike(compared, write):
     _, blocks = compared(write("one.h5", (1e-14, 1e-14, 1e-14)), write("two.h5", (3e-14, 3e-14, 3e-14)))
     assert all("◂" in cell for row in table(blocks, "Model", 1)["rows"] for cell in row[1:])
 

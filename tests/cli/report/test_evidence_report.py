@@ -106,7 +106,7 @@ def test_the_verdict_comes_first_and_with_its_reasons(report, model, label, shor
         assert f"{sign}: {reason[0].upper()}{reason[1:]}." in f"{summary} {evidence}"
 
 
-def test_an_incomplete_search_is_told_in_the_summary(report, model):
+def test_an_incomplete_search_is_said_in_the_summary(report, model):
     stopped = {"stop_reason": "time-limit"}
     assert "stopped (time limit), go on with" in section(report(model(**stopped)), "summary")
     assert "stopped" not in section(report(model()), "summary")
@@ -170,7 +170,7 @@ def test_residuals_that_are_rounding_are_not_drawn(report, model):
     assert not set(FIGURES[:3]) & set(page.figures)
 
 
-def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipeline):
+def test_bands_of_the_inertia_stand_next_to_the_stated_values(report, model, pipeline):
     value = read(pipeline.model, IdentifiedModel)[0].rigid_body
     spread = np.tile([-1.0, 1.0], 30)[:, None] * np.array([1.0, 1e-9, 1.0, 1.0, 1.0, 1.0])
     moved = value + np.array([0.0, 1.0, 0, 0, 0, 0])
@@ -182,7 +182,7 @@ def test_bands_of_the_inertia_stand_beside_the_stated_values(report, model, pipe
     assert last["Iyy"] == "◂"
 
 
-def test_the_round_trip_is_told_with_its_share(page, report, model):
+def test_the_round_trip_is_said_with_its_share(page, report, model):
     assert "D22 96.0 %, D33 96.0 %, D11 96.0 %" in section(page, "identify")
     without = report(model(**{"round_trip/inertia": None, "round_trip/inside": None}))
     assert "Round trip" not in section(without, "identify")
@@ -223,7 +223,7 @@ STAGES = {Diagnosis: "diagnose", Disagreement: "compare", Extended: "extend"}
 
 
 def written(path, given):
-    """Write a result that is sound; an extended model as if it came of the diagnosis beside it."""
+    """Write a result that is sound; an extended model as if it came of the diagnosis next to it."""
     assert store.findings(given) == []
     source = path.with_name("diagnosis.h5")
     inputs = {"diagnosis": input_file(source)} if isinstance(given, Extended) and source.exists() else {}

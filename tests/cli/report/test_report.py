@@ -196,7 +196,7 @@ def test_the_tables_show_the_numbers_of_the_artifacts(study, full):
         assert f"{number:.5g}" in full.page.text
 
 
-def test_the_paper_s_numbers_stand_beside_those_of_its_own_report_alone(study, full):
+def test_the_paper_s_numbers_stand_next_to_those_of_its_own_report_alone(study, full):
     text = Page(paper_page(study.config, full.given).text).text
     for printed in ("56254", "59771", "+22.54 %", "5506.4", "0.1531", "121.5 × 10⁻⁶", "Paper"):
         assert printed in text
@@ -231,7 +231,7 @@ def test_the_provenance_names_hashes_and_no_folder(study, full):
     assert read(study.model, IdentifiedModel)[1].config in full.page.text
 
 
-def test_a_file_given_twice_counts_once_and_equal_names_are_told_apart(study, tmp_path):
+def test_a_file_given_twice_counts_once_and_equal_names_are_distinguished(study, tmp_path):
     (tmp_path / "other").mkdir()
     copy, other = tmp_path / "copy.h5", tmp_path / "other" / "flight.h5"
     shutil.copy(study.flight, copy)

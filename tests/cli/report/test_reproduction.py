@@ -153,7 +153,7 @@ def with_settings(parted, name, **values):
     return name
 
 
-def test_paper_stands_beside_settings_of_equal_structure_and_samples(parted):
+def test_paper_stands_next_to_settings_of_equal_structure_and_samples(parted):
     claimed = with_settings(parted, "paper.h5", samples=[685, 5487], structure=["cpfls", "fls"])
     _, html = page(parted, claimed)
     rows = table_cells(html, "searches-1-table")

@@ -33,7 +33,7 @@ def mission(cpfls, config, tmp_path_factory):
     return output, cpfls.summary("trajectory", config, *HOVER, "-o", output)
 
 
-def test_the_summary_tells_runs_and_excitation(mission):
+def test_the_summary_shows_runs_and_excitation(mission):
     output, summary = mission
     assert [run["begin"] for run in summary["runs"]] == pytest.approx([0.0, 12.0, 24.0, 36.0])
     assert summary["duration_s"] == pytest.approx(44.0)
@@ -74,7 +74,7 @@ def test_an_excitation_is_made_smaller_with_the_limit_that_it_reaches(cpfls, con
     )
 
 
-def test_files_for_autopilots_stand_beside_the_path(cpfls, config, tmp_path):
+def test_files_for_autopilots_stand_next_to_the_path(cpfls, config, tmp_path):
     home = ("--format", "px4", "--format", "csv", "--home", "47.3977,8.5456,10")
     cpfls.done("trajectory", config, "--repeat", "2", *home, "-o", tmp_path / "m.h5", "--json")
     items = json.loads((tmp_path / "m.plan").read_text())["mission"]["items"]
@@ -182,7 +182,7 @@ def test_the_flight_keeps_to_the_box_and_starts_and_ends_at_rest(planned):
         np.testing.assert_allclose(values[[0, -1]], 0, atol=1e-6)
 
 
-def test_each_question_is_answered_both_ways_and_beside_other_flights(planned):
+def test_each_question_is_answered_both_ways_and_next_to_other_flights(planned):
     first, second = planned[1]["questions"]
     assert (first["true"], first["rival"]) == ("com_offset", "torque_bias") == (second["rival"], second["true"])
     for row in (first, second):
@@ -213,7 +213,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(cpfls, nex
         assert (output.read_bytes() == planned[0].read_bytes()) is same
 
 
-def test_it_flies_like_any_other_and_its_page_says_what_it_tells(cpfls, next_config, planned, tmp_path):
+def test_it_flies_like_any_other_and_its_page_says_what_it_shows(cpfls, next_config, planned, tmp_path):
     cpfls.done("simulate", next_config, planned[0], "-o", tmp_path / "flight.h5")
     cpfls.done("report", next_config, planned[0], "-o", tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text().replace("\\_", "_")

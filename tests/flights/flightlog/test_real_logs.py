@@ -38,7 +38,7 @@ def maps(recognition):
 
 
 @pytest.mark.parametrize("name", ["none", "drag", "com"])
-def test_everything_in_a_flight_of_rotorpy_is_told_by_the_data_or_its_name(name):
+def test_everything_in_a_flight_of_rotorpy_is_said_by_the_data_or_its_name(name):
     recognition = seen(path_of_log("rotorpy", name))
     assert maps(recognition) == {
         "attitude": ("phi", "rad", None),
@@ -60,7 +60,7 @@ def test_everything_in_a_flight_of_rotorpy_is_told_by_the_data_or_its_name(name)
 
 
 @pytest.mark.parametrize("name", ["log10_35_65s", "log15_55_90s", "log16_32_49s"])
-def test_the_motion_of_a_real_crazyflie_tells_its_rotors(name):
+def test_the_motion_of_a_real_crazyflie_shows_its_rotors(name):
     recognition = seen(path_of_log("real/arpl_crazyflie_1khz", name))
     assert maps(recognition) == {
         "body_rate": ("wx", "rad/s", None),

@@ -33,7 +33,7 @@ def test_an_offset_of_the_centre_of_mass_is_found_to_five_percent(answer_of, coe
     assert answer["gap_after"]["torque_n_m"][1] < 0.01 * answer["gap_before"]["torque_n_m"][1]
 
 
-def test_aerodynamics_are_told_apart_by_the_forces_to_ten_percent(answer_of, coefficients_of):
+def test_aerodynamics_are_distinguished_by_the_forces_to_ten_percent(answer_of, coefficients_of):
     answer = answer_of("rotorpy", "rotorpy", "drag")
     stated = {
         ("rotor_drag", "k_d"): 1.19e-4,

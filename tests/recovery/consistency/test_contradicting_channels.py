@@ -43,7 +43,7 @@ def flights():
 
 @pytest.fixture(scope="module")
 def lively():
-    """The same with fast swings beside the slow ones: of one swing drag and damping explain any delay."""
+    """The same with fast swings next to the slow ones: of one swing drag and damping explain any delay."""
     return dragged(0.05)
 
 

@@ -175,8 +175,8 @@ def test_a_stiff_body_has_no_springs():
     assert not found(on_springs((1, 2)), STILL)
 
 
-def test_a_notch_is_named_and_lag_and_delay_beside_it_are_rivals():
-    """Of lag and delay beside a notch the width of the notch takes what tells them apart."""
+def test_a_notch_is_named_and_lag_and_delay_next_to_it_are_rivals():
+    """Of lag and delay next to a notch the width of the notch takes what shows them apart."""
     flights = late((1, 2), lambda s: lag(s) * notch(s))
     chosen = found(flights, STILL)
     (beside,) = names_of(chosen) - {"notch_filter"}
@@ -225,7 +225,7 @@ def test_a_lag_with_a_short_delay_is_a_rival_as_the_pair_that_it_is():
     assert pairs == {frozenset(("motor_lag", "command_delay"))}
 
 
-def test_a_notch_and_a_lag_are_no_low_pass_with_what_fills_in_beside_it():
+def test_a_notch_and_a_lag_are_no_low_pass_with_what_fills_in_next_to_it():
     flights = late((1, 2, 3, 4), lambda s: lag(s) * notch(s, 0.8, 2 * np.pi * 6.5))
     chosen = found(flights, (*STILL, "low_pass_filter"))
     assert names_of(chosen) == {"motor_lag", "notch_filter"}
@@ -233,7 +233,7 @@ def test_a_notch_and_a_lag_are_no_low_pass_with_what_fills_in_beside_it():
     assert shape_of(chosen, "motor_lag")["time_constant_s"] == pytest.approx(0.05, rel=0.15)
 
 
-def test_a_delay_that_is_not_there_is_chance_beside_a_lag():
+def test_a_delay_that_is_not_there_is_chance_next_to_a_lag():
     flights = late((1, 2), lag)
     lagging = {"time_constant_s": 0.05}
     chosen = [Candidate(CATALOGUE["motor_lag"], lagging), Candidate(CATALOGUE["command_delay"], {"delay_s": 0.004})]

@@ -138,7 +138,7 @@ def test_two_that_would_have_to_cancel_are_no_names():
     assert all("what is possible" in refusal.sentence for refusal in refusals)
 
 
-def test_what_is_there_beside_another_is_no_bend_of_it():
+def test_what_is_there_next_to_another_is_no_bend_of_it():
     known = flights(DRAG, (candidate("parasitic_drag"), [0.05, 0.05, 0.05, 0.0, 0.0, 0.0]), force=True)
     found, refusals = of(known, "rotor_drag", "parasitic_drag")
     assert kept(found) == ["rotor_drag", "parasitic_drag"]

@@ -98,7 +98,7 @@ def test_shapes_and_coefficients_of_unit_stand_in_their_places():
     assert [len(own) for own in found.of_effect] == [2, 0, 3]
 
 
-def test_wind_is_told_as_wind_with_an_interval_of_its_own():
+def test_wind_is_said_as_wind_with_an_interval_of_its_own():
     drag = 1.5e-3
     truth = [(candidate("wind"), [drag, 4.0 * drag, -3.0 * drag])]
     found = estimated([noisy(fly(seed, truth), np.random.default_rng(seed)) for seed in (1, 2)], [truth[0][0]])
@@ -145,7 +145,7 @@ def test_no_coupling_is_larger_than_three_moments_of_inertia_allow(axis, name):
     assert coupling[axis] == pytest.approx(moments[axis])
 
 
-def test_a_log_with_reversed_yaw_is_told_and_not_built_into_the_model():
+def test_a_log_with_reversed_yaw_is_said_and_not_built_into_the_model():
     rotors = tuple(replace(rotor, spin=-rotor.spin) for rotor in VEHICLE.rotors)
     reversed_yaw = replace(VEHICLE, rotors=rotors)
     found = estimated([replace(fly(seed), vehicle=reversed_yaw) for seed in (1, 2)], [])
@@ -169,7 +169,7 @@ def test_rotors_that_are_logged_rarely_accuse_no_log_of_reversed_yaw(slow, accus
     assert any("inertia about z" in each for each in found.contradictions) is accused
 
 
-def test_a_lag_moves_when_a_damping_comes_beside_it():
+def test_a_lag_moves_when_a_damping_comes_next_to_it():
     """Alone the lag takes what the damping does; a shape that stays there would halve it."""
     flight = signals_of(flown(8.0, effects={"motor_lag": [0.05], "linear_damping": [0.1, 0.1, 0.05]}))
     found = refit([flight], [candidate("motor_lag", time_constant_s=0.04), candidate("linear_damping")], force=True)

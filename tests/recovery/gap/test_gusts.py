@@ -1,4 +1,4 @@
-"""Gusts called gusts where instruments tell, names and numbers beside them, in flights of known truth."""
+"""Gusts called gusts where instruments tell, names and numbers next to them, in flights of known truth."""
 
 import tracemalloc
 from dataclasses import replace
@@ -127,7 +127,7 @@ def test_a_wrong_inertia_is_named_in_gusts_with_its_number(flown, kind, setpoint
     assert number.low < 1 / HEAVY - 1 < number.high < 0
 
 
-def test_a_centre_of_mass_is_told_from_a_constant_torque_in_gusts(flown):
+def test_a_centre_of_mass_is_distinguished_from_a_constant_torque_in_gusts(flown):
     at = np.array([0.002, -0.0015])
     rotors = [replace(each, position_m=(*np.add(each.position_m[:2], at), 0.0)) for each in TRUE.vehicle.rotors]
     aside = recorded(flown["asked"], replace(TRUE.vehicle, rotors=tuple(rotors)), setpoints=True)
@@ -158,7 +158,7 @@ def test_an_inertia_is_not_wrong_where_rotors_that_accelerate_do_as_much(flown, 
 
 
 @pytest.mark.parametrize(("heavy", "extends"), [(HEAVY, False), (1.25, True)])
-def test_an_inertia_that_nothing_was_asked_of_is_told_by_what_was_before(flown, heavy, extends):
+def test_an_inertia_that_nothing_was_asked_of_is_said_by_what_was_before(flown, heavy, extends):
     """A model is extended where the gap shrinks by 0.3 floors; 15 % of this inertia are 0.29 of the gusts'."""
     x, y, z = TRUE.vehicle.inertia_kg_m2[:3]
     stated = replace(TRUE.vehicle, inertia_kg_m2=(x, heavy * y, z, *TRUE.vehicle.inertia_kg_m2[3:]))
@@ -179,7 +179,7 @@ def test_an_inertia_that_nothing_was_asked_of_is_told_by_what_was_before(flown, 
         assert numbers["inertia_y"].low < 1 / heavy - 1 < numbers["inertia_y"].high
 
 
-def test_a_lag_is_told_from_a_delay_and_from_the_loop_by_what_was_before(flown):
+def test_a_lag_is_distinguished_from_a_delay_and_from_the_loop_by_what_was_before(flown):
     recordings = recorded(flown["late"], TRUE.vehicle, setpoints=True, commanded=True)
     run = diagnosed(recordings)
     assert run.diagnosis.verdict is GapVerdict.NAMED
@@ -281,7 +281,7 @@ def test_gusts_alone_are_no_gap(flown, setpoints, instrument_kind):
 
 @pytest.mark.parametrize(("kind", "setpoints"), [("asked", True), ("again", False)])
 @pytest.mark.filterwarnings("error")
-def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setpoints):
+def test_gusts_about_axes_are_said_of_flights_without_velocity(flown, kind, setpoints):
     known = recorded(flown[kind], TRUE.vehicle, setpoints=setpoints)
     found = in_what_is_left([replace(each, velocity=None) for each in known])
     assert found.gusts_only.tolist() == [True] * 3 + [False] * 3
@@ -289,7 +289,7 @@ def test_gusts_about_axes_are_told_of_flights_without_velocity(flown, kind, setp
     assert np.isnan(found.found.size[3:]).all()
 
 
-def test_where_instruments_know_too_little_what_was_before_tells(flown, monkeypatch):
+def test_where_instruments_know_too_little_what_was_before_shows(flown, monkeypatch):
     recordings = recorded(flown["asked"], TRUE.vehicle, setpoints=False)
     # No path comes again.
     monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats", "past")})
@@ -300,7 +300,7 @@ def test_where_instruments_know_too_little_what_was_before_tells(flown, monkeypa
     assert air_in(recordings) is None
 
 
-def test_an_axis_that_other_runs_do_not_size_is_told_by_what_was_before(flown, monkeypatch):
+def test_an_axis_that_other_runs_do_not_size_is_said_by_what_was_before(flown, monkeypatch):
     def without_pitch(sides, given, instrument_kind):
         found = gusts_in(sides, given, instrument_kind)
         if instrument_kind == "repeats":
@@ -315,7 +315,7 @@ def test_an_axis_that_other_runs_do_not_size_is_told_by_what_was_before(flown, m
     tells_sizes(found.found)
 
 
-def test_what_does_not_come_again_is_noise_beside_what_does(flown):
+def test_what_does_not_come_again_is_noise_next_to_what_does(flown):
     # Half of the inertia is missed about x, which comes again; nothing is about the other axes.
     vehicle = replace(TRUE.vehicle, inertia_kg_m2=(2 * INERTIA[0], *INERTIA[1:]))
     found = in_what_is_left(recorded(flown["again"], vehicle, setpoints=False))

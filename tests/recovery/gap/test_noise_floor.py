@@ -136,5 +136,5 @@ def test_the_pair_of_spectra_leaves_as_little_as_scipy_finds(seed):
     left = np.array([nnls(relative[:, [2 * i, 2 * j + 1]], np.ones(16))[1] ** 2 for i in range(6) for j in range(6)])
     chosen = _best_pair(relative)
     assert (chosen == 0) == (left[0] <= 1.5 * left.min())
-    # Where one spectrum alone is best, whatever stands beside it leaves the same.
+    # Where one spectrum alone is best, whatever stands next to it leaves the same.
     assert chosen == 0 or left[chosen] == pytest.approx(left.min(), rel=1e-9)

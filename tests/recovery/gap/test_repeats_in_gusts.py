@@ -45,7 +45,7 @@ def split(flown):
 
 
 def test_the_repeatable_share_is_that_of_the_effects(found):
-    """In still air all of the gap is theirs; in gusts the same comes again, beside what does not."""
+    """In still air all of the gap is theirs; in gusts the same comes again, next to what does not."""
     gusty, calm = found["gusts"], found["calm"]
     rest = gusty.total - gusty.repeatable
     off = (

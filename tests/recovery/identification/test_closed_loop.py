@@ -50,7 +50,7 @@ def off(found):
     return np.log(found[:2] / SMALL.inertia[:2])
 
 
-def test_what_comes_again_tells_the_body_in_gusts(sources):
+def test_what_comes_again_shows_the_body_in_gusts(sources):
     """Least squares misses roll and pitch by 3 to 4 %, the instruments by 1 to 2 %."""
     found = freed_torque(sources["gusts"], sources["gusts"])
     assert (np.abs(off(found.rigid_body)) < np.minimum(found.half[:2], 0.05)).all()
@@ -70,7 +70,7 @@ def test_in_still_air_repeats_tell_the_body_to_half_a_per_cent(sources):
     assert np.abs(off(found.rigid_body)).max() < 0.005
 
 
-def test_where_nothing_repeats_what_was_before_tells_roll_and_pitch(identified):
+def test_where_nothing_repeats_what_was_before_shows_roll_and_pitch(identified):
     """Least squares finds Ixx 10 % too small; the flights go on showing the loop, so that no verdict is good."""
     result = identified["unlike"]
     freed = result.freed
@@ -84,7 +84,7 @@ def test_where_nothing_repeats_what_was_before_tells_roll_and_pitch(identified):
     assert "Izz not determined because past windows do not identify it" in finding
 
 
-def test_what_was_before_tells_no_body_in_a_quarter_of_a_minute(sources):
+def test_what_was_before_shows_no_body_in_a_quarter_of_a_minute(sources):
     source = sources["unlike"].flights[0][:1500]
     result = identify(source, source, {}, IdentificationSettings(), np.random.default_rng(1))
     assert result.freed is None
@@ -132,7 +132,7 @@ def test_a_flight_that_none_repeats_teaches_nothing_in_gusts(sources):
     assert len(found.training) <= sum(len(flight) for flight in sources["gusts"].flights)
 
 
-def test_what_was_asked_for_tells_the_body_of_flights_that_repeat_none(identified):
+def test_what_was_asked_for_shows_the_body_of_flights_that_repeat_none(identified):
     """Behind a slow loop in a storm least squares finds Ixx 20 % too small, the setpoint of the position within 3 %."""
     result = identified["asked"]
     freed = result.freed
@@ -145,8 +145,8 @@ def test_what_was_asked_for_tells_the_body_of_flights_that_repeat_none(identifie
     assert "Izz not determined because too little of yaw follows" in finding
 
 
-def test_gusts_of_a_flight_do_not_leak_into_what_its_setpoint_foretells():
-    """A setpoint that moves nothing tells nothing of a flight, however many columns predict."""
+def test_gusts_of_a_flight_do_not_leak_into_what_its_setpoint_predicts():
+    """A setpoint that moves nothing shows nothing of a flight, however many columns predict."""
     rng = np.random.default_rng(4)
     gusts, asked = rng.standard_normal((2000, 1)).cumsum(axis=0) * 0.1, rng.standard_normal((2000, 60))
     answer = first_stage_fit(asked, gusts - gusts.mean())

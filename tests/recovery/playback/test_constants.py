@@ -32,7 +32,7 @@ def flights():
 
 @pytest.fixture(scope="module")
 def constants(flights):
-    """What each set tells, from moments of inertia twice too large."""
+    """What each set shows, from moments of inertia twice too large."""
     begun = replace(
         SMALL.vehicle, inertia_kg_m2=(*(2 * moment for moment in SMALL.inertia), 0.0, 0.0, 0.0), unknown=("inertia",)
     )
@@ -83,7 +83,7 @@ def _by_what_was_before(truth, leave_out=()):
 
 
 @pytest.mark.parametrize("truth", [SMALL, LARGE], ids=["45 g", "1.5 kg"])
-def test_in_gusts_what_was_before_tells_the_body(truth):
+def test_in_gusts_what_was_before_shows_the_body(truth):
     """Least squares finds twice the true moments and more."""
     found = _by_what_was_before(truth)
     off, half = _moments(found)
@@ -93,7 +93,7 @@ def test_in_gusts_what_was_before_tells_the_body(truth):
     assert (np.abs(off) < 2 * half).all()
 
 
-def test_what_was_before_tells_no_body_whose_damping_is_missing():
+def test_what_was_before_shows_no_body_whose_damping_is_missing():
     """At 1 Hz damping takes as much as the rotation; without it no moment about roll explains what is predicted."""
     damped = SMALL._replace(damping=2e-4)
     assert not _by_what_was_before(damped, tuple(CATALOGUE)).identified

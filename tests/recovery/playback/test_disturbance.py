@@ -114,7 +114,7 @@ def alone(known):
     return replace(known, setpoints=tuple(None for _ in known.runs), names=(), repeats=nothing)
 
 
-def test_without_instruments_what_was_before_tells_them(flights):
+def test_without_instruments_what_was_before_shows_them(flights):
     """What the model lacks of the motion goes on as it was, and is no gust."""
     known, model = flights["45 g", "setpoints"], VehicleModel(vehicle=SMALL.vehicle)
     found, result = find_gusts(model, alone(known)), find_gusts(model, known)
@@ -130,13 +130,13 @@ def test_without_instruments_what_was_before_tells_them(flights):
     assert (bound.high[:3] > found.size[:3]).all()
 
 
-def test_without_instruments_nothing_is_told_in_still_air(flights):
+def test_without_instruments_nothing_is_said_in_still_air(flights):
     found = find_gusts(VehicleModel(vehicle=SMALL.vehicle), alone(flights["still", "setpoints"]))
     assert found.instrument_kind == "none"
     assert found.gusts is None
 
 
-def test_beside_a_body_that_is_not_known_nothing_is(flights):
+def test_next_to_a_body_that_is_not_known_nothing_is(flights):
     found = find_gusts(
         VehicleModel(vehicle=SMALL.vehicle), flights["45 g", "setpoints"], {"inertia.Ixx": True, "inertia.Izz": False}
     )

@@ -32,7 +32,7 @@ def flights():
 
 @pytest.fixture(scope="module")
 def bounds(flights):
-    """Bounds beside the true model."""
+    """Bounds next to the true model."""
     return {key: loop_bounds(VehicleModel(vehicle=TRUTHS[key[0]].vehicle), flown) for key, flown in flights.items()}
 
 

@@ -1,4 +1,4 @@
-"""Responses of a quadrotor that is flown through gusts by dynamics of its own, beside models right and wrong."""
+"""Responses of a quadrotor that is flown through gusts by dynamics of its own, next to models right and wrong."""
 
 from dataclasses import replace
 
@@ -94,7 +94,7 @@ def test_specific_force_of_velocity_is_that_of_an_accelerometer(flights):
 
 
 def test_speeds_follow_their_commands(flights):
-    """A lag of 50 ms behind the commands is found whatever the gusts, and that of the model stands beside it."""
+    """A lag of 50 ms behind the commands is found whatever the gusts, and that of the model stands next to it."""
     part = flights[0].parts[0]
     behind = RotorResponse(lag_s=0.05)
     speed = behind.terms_at_samples(part.rotor_speed, part.period, "linear")[:, 1:5]

@@ -151,7 +151,7 @@ def test_unknown_parts_of_an_instrument_are_cut_out(flown):
     assert np.abs(mean(ratio, error) - 1) < 0.01
 
 
-def test_what_is_too_short_tells_nothing():
+def test_what_is_too_short_shows_nothing():
     short = Stretch(np.ones(50), Channel(np.ones(50)))
     assert frequency_response([short], 0.01) is None
     assert frequency_response([short._replace(instrument=np.full((50, 1), np.nan))], 0.01) is None

@@ -60,7 +60,7 @@ def test_with_noise_it_comes_back_within_the_bands(base, every):
     np.testing.assert_array_equal(again.inside, again.inside.T)
 
 
-def test_it_tells_where_it_leaves_the_bands():
+def test_it_shows_where_it_leaves_the_bands():
     narrow = {"low": 1.0, "high": 1.0}
     _, again = tripped("none", 0.05, changed=lambda c: {name: c.inertia * share for name, share in narrow.items()})
     assert np.nanmax(again.inside) < 0.5

@@ -280,7 +280,7 @@ def test_one_cell_without_a_body_is_enough_to_refuse(better):
     assert "worst at roll and pitch of 30 and -10 degrees" in judged.reasons[0][0]
 
 
-def test_what_does_not_decide_is_told(better):
+def test_what_does_not_decide_is_said(better):
     stopped = replace(better.identification, stop_reason="time-limit")
     lost = better.steps.lost + np.array([[3], [0], [0]])
     evidence = replace(with_replayed(better, lost=lost), identification=stopped, band=np.array([0.2, 1.4, 0.3]))
@@ -292,7 +292,7 @@ def test_what_does_not_decide_is_told(better):
     assert said(verdict(replace(better, band=np.array([0.2, 0.4, 0.3]))), "widest 95 % band") == 1
 
 
-def test_coloured_errors_are_told_and_speak_neither_way(better):
+def test_coloured_errors_are_said_and_speak_neither_way(better):
     residuals = replace(better.residuals, ljung_box=np.array([0.5, 1e-9, 0.4]))
     assert said(verdict(replace(better, residuals=residuals)), "torque errors about pitch are not white") == 0
 

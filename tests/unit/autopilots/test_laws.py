@@ -116,7 +116,7 @@ def test_what_a_log_lacks_is_as_it_was_before_it_existed():
     assert (values["MC_YAWRATE_P"], values["MC_YAW_TQ_CUTOFF"], values["MC_ROLLRATE_P"]) == (0.3, 0.0, 0.15)
 
 
-def test_a_header_of_betaflight_tells_what_is_off():
+def test_a_header_of_betaflight_shows_what_is_off():
     named = {"rollPID": "45,80,40", "d_min": "30,0,0", "pitchPID": "47,84,46", "yawPID": "45,80,0"}
     filters = {"gyro_lpf1_static_hz": 0.0, "gyro_lpf1_dyn_hz": "0,0", "dterm_lpf1_static_hz": 90.0}
     found = AUTOPILOTS["betaflight"].in_log(named | filters | {"dterm_lpf1_dyn_hz": "0,0", "levelPID": "55,50,75"})

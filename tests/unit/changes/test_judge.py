@@ -1,4 +1,4 @@
-"""The statistic of changes beside other formulas: densities by quadrature and by SciPy, a hover solved for loads."""
+"""The statistic of changes next to other formulas: densities by quadrature and by SciPy, a hover solved for loads."""
 
 from dataclasses import replace
 from functools import partial
@@ -269,7 +269,7 @@ def flown(count, rng, agility):
 
 
 def test_flights_that_are_flown_otherwise_are_no_change():
-    """Where the reference is flown alike delays tell little; where it is flown in many ways it tells how they go."""
+    """Where the reference is flown alike delays show little; where it is flown in many ways it shows how they go."""
     rng = np.random.default_rng(12)
     slow, fast = np.full(8, 0.5), np.array([3.0])
     alike, many = flown(8, rng, slow), flown(8, rng, np.geomspace(0.3, 5.0, 8))
@@ -291,7 +291,7 @@ def test_flights_that_are_flown_otherwise_are_said_to_be():
 
 
 def test_two_changes_at_once_hide_each_other_and_are_found():
-    """A lighter vehicle and a torque about z beside two reference flights: neither explains the loads by itself."""
+    """A lighter vehicle and a torque about z next to two reference flights: neither explains the loads by itself."""
     rng = np.random.default_rng(15)
     both = np.concatenate([np.log(0.75) + 0.15 * np.array([1.0, -1.0, 1.0, -1.0]), np.zeros(6)])
     change = changed(flights(1, rng, both), flights(2, rng), QUAD, rng)
@@ -355,7 +355,7 @@ def test_a_ratio_that_is_reversed_today_is_a_change_and_one_that_is_missing_is_n
 
 
 def test_a_ratio_that_may_be_zero_is_undetermined_where_it_is_nearer_to_that_than_to_the_reference():
-    """In a quiet hover a flight tells ratios badly, which is no sign of a gyroscope that is mirrored."""
+    """In a quiet hover a flight shows ratios badly, which is no sign of a gyroscope that is mirrored."""
     rng = np.random.default_rng(19)
     before, (today,) = flights(4, rng), flights(1, rng)
     usual = float(np.exp(np.mean([flight.values["delay yaw"] for flight in before])))

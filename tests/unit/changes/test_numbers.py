@@ -1,4 +1,4 @@
-"""Numbers of a flight in closed loop beside the truth it was flown with."""
+"""Numbers of a flight in closed loop next to the truth it was flown with."""
 
 from dataclasses import replace
 
@@ -69,7 +69,7 @@ def test_a_weak_rotor_is_asked_for_more(usual):
 
 
 def test_a_load_on_a_cable():
-    """Mass and length of a load, beside three flights without, each of a day of its own."""
+    """Mass and length of a load, next to three flights without, each of a day of its own."""
     rng = np.random.default_rng(4)
 
     def of_a_day(seed, **closed_loop):
@@ -108,7 +108,7 @@ def test_an_unbalanced_rotor_above_half_of_the_rate():
     assert shaken[[0, 2, 3]].max() < 0.5 * shaken[1]
 
 
-def test_rotors_that_turn_nearly_alike_are_told_apart():
+def test_rotors_that_turn_nearly_alike_are_distinguished():
     """Speeds 1.5 Hz apart, of which one shakes: alone it would be felt by the other too."""
     signals = without_velocity()
     speed = 2 * np.pi * np.array([105.0, 106.5, 111.0, 118.0]) * np.ones((len(signals), 1))
@@ -143,7 +143,7 @@ def test_too_short_and_without_rotors():
 
 
 def test_the_ground_is_no_flight():
-    """Five seconds of idling before: not flown, nor half a second beside it."""
+    """Five seconds of idling before: not flown, nor half a second next to it."""
     signals = recorded()
     idle = signals.rotor_speed.copy()
     idle[:500] *= 0.2
@@ -163,7 +163,7 @@ def test_throttle_cuts_of_acrobatic_flight_are_flight():
 
 
 def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():
-    """Of a cross M3 does half of the pitch; what it lacks of thrust and yaw pitches the body beside that."""
+    """Of a cross M3 does half of the pitch; what it lacks of thrust and yaw pitches the body next to that."""
 
     def follows(*does):
         time, *columns = flight_table(3, does).T
@@ -179,7 +179,7 @@ def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():
 
 
 def test_a_lean_against_wind_is_no_fault_of_the_accelerometer():
-    """It feels gravity along its own axes however it leans; what it feels beside is its own, ahead and to the left."""
+    """It feels gravity along its own axes however it leans; what it feels next to is its own, ahead and to the left."""
     signals = without_velocity()
     leans = np.array([0.1, -0.15, 2.0]) + np.zeros((len(signals), 3))
     tilted = replace(signals, attitude=leans)
@@ -204,7 +204,7 @@ def test_how_late_a_rotor_answers():
 
 
 def test_a_gyroscope_of_another_scale(usual):
-    """Beside an attitude that is right; about one axis."""
+    """Next to an attitude that is right; about one axis."""
     flight = recorded()
     rates = flight.body_rate * [1.1, 1.0, 1.0]
     result = flight_numbers(replace(flight, body_rate=rates, name="flight.h5"))

@@ -31,7 +31,7 @@ def test_rows_of_an_unchanged_vehicle_seldom_look_changed(monkeypatch):
 
 
 def test_rows_that_are_drawn_scatter_by_the_freedom_of_each_kind():
-    """A lone number is off by a t of few degrees of freedom, loads beside it by one of more: ends of 2 % of each."""
+    """A lone number is off by a t of few degrees of freedom, loads next to it by one of more: ends of 2 % of each."""
     rng = np.random.default_rng(2)
     names, given = NAMES[:5], flights(8, rng)
     row = module.Row.of(given, Reference.of(given, names, QUAD), QUAD)

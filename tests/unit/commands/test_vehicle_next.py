@@ -30,7 +30,7 @@ def test_a_vehicle_that_nobody_should_use_is_flown_for_and_not_handed_over(trust
     record.trust = Trust.LOOP
     _, (*mission, _) = next_commands(coarse, record, [Path("f.h5")], ())
     assert "trajectory.sample_time_s=0.02" in mission
-    # No flight tells more before its log is faster.
+    # No flight shows more before its log is faster.
     slow = SimpleNamespace(complete=True, trust=trust, logged_slowly=True)
     assert next_commands(job, slow, [Path("f.h5")], ()) == (page,)
 

@@ -60,7 +60,7 @@ def test_too_short_a_flight_is_not_tested():
 
 
 @pytest.mark.parametrize("seed", [3, 5, 6])
-def test_a_flight_that_rests_for_most_of_its_time_is_told_to_hardly_turn(seed):
+def test_a_flight_that_rests_for_most_of_its_time_hardly_turns(seed):
     """Without the few seconds in which it turns noise is all there is, which may tell of mirrored axes."""
     rng = np.random.default_rng(seed)
     flight = faulty_flight(rng, Faults(), LEVELS["high"], duration=12.0)
@@ -81,13 +81,13 @@ def integrated(signals):
     return replace(signals, attitude=np.unwrap(Rotation.concatenate(turned).as_euler("ZYX")[:, ::-1], axis=0))
 
 
-def test_an_attitude_integrated_from_the_gyroscope_tells_no_scale(turning):
+def test_an_attitude_integrated_from_the_gyroscope_shows_no_scale(turning):
     found = audit([integrated(turning)], WINDOWS)
     assert {"gyro_scale", "imu_misalignment"} <= set(found.untested)
     assert found.named == ()
 
 
-def test_an_attitude_integrated_from_the_corrected_gyroscope_still_tells_the_bias(turning):
+def test_an_attitude_integrated_from_the_corrected_gyroscope_still_shows_the_bias(turning):
     estimated = integrated(turning)
     found = audit([replace(estimated, body_rate=estimated.body_rate + np.array([0.02, 0, 0]))], WINDOWS)
     assert [finding.name for finding in found.named] == ["gyro_bias"]
@@ -190,7 +190,7 @@ def test_the_motion_follows_the_torque(turning, commanded, whom):
     assert not any("follows" in note for note in audit([measured], WINDOWS).notes)
 
 
-def test_a_torque_that_moves_nothing_tells_no_delay(turning):
+def test_a_torque_that_moves_nothing_shows_no_delay(turning):
     noise = np.random.default_rng(4).normal(size=turning.body_rate.shape)
     for torque in (noise, np.zeros_like(noise)):
         assert audit([replace(turning, stated_torque=torque)], WINDOWS).notes == ()
@@ -205,7 +205,7 @@ def test_rotors_that_hold_one_speed_are_named(turning):
 
 
 def test_of_a_part_of_a_flight_the_rotors_are_held_against_the_whole():
-    """A third of a flight may leave open what all of it tells; `cpfls vehicle` looks at all of it."""
+    """A third of a flight may leave open what all of it shows; `cpfls vehicle` looks at all of it."""
     signals = signals_of(flown(12.0, integration_rate_hz=COARSE))
     swapped = replace(signals, rotor_speed=signals.rotor_speed[:, [1, 0, 2, 3]])
     part = stretch_of(swapped, slice(0, 300))
@@ -326,14 +326,14 @@ def gentle(noise):
 
 @pytest.mark.parametrize("noise", [0.0, 1.5, 2.5])
 @pytest.mark.parametrize(("degrees", "words"), [(180 / np.pi, "about 180/pi"), (np.pi / 180, "about pi/180")])
-def test_a_unit_of_a_gyroscope_is_told_beneath_noise_that_hides_its_motion(noise, degrees, words):
+def test_a_unit_of_a_gyroscope_is_said_beneath_noise_that_hides_its_motion(noise, degrees, words):
     seen, read = gentle(noise)
     _, scaled = gyroscope_apart(seen, degrees * read)
     assert [words in each.what for each in scaled] == [True] * 3
     assert gyroscope_apart(seen, read)[1] == ()
 
 
-def test_what_does_not_follow_the_attitude_tells_no_unit():
+def test_what_does_not_follow_the_attitude_shows_no_unit():
     seen, _ = gentle(0.0)
     other = 0.04 * np.random.default_rng(5).standard_normal(seen.shape)
     assert gyroscope_apart(seen, other * np.pi / 180) == ((), ())

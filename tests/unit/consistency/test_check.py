@@ -249,7 +249,7 @@ def test_each_stretch_is_looked_at(flight):
     assert "km/h" in " ".join(finding.what for finding in check(faulty, SETTINGS))
 
 
-def test_rotors_that_one_stretch_tells_clearly_are_told_of_all(flight):
+def test_rotors_that_one_stretch_shows_clearly_are_said_of_all(flight):
     swapped = FAULTS["rotors in another order"][0](flight)
     steady = replace(flight, rotor_speed=np.full_like(flight.rotor_speed, flight.rotor_speed.mean()))
     longer = [steady, cut(swapped, slice(0, len(flight) - 100))]
@@ -276,7 +276,7 @@ def test_axes_signs_and_units_are_contradictions_and_clocks_and_numbers_are_not(
     assert found.remedy
 
 
-def test_a_delay_of_the_velocity_is_told_and_contradicts_nothing(flight):
+def test_a_delay_of_the_velocity_is_said_and_contradicts_nothing(flight):
     late = replace(flight, velocity=np.roll(flight.velocity, 3, axis=0))
     assert not any(finding.contradiction for finding in check([late], SETTINGS))
 

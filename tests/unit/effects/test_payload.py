@@ -108,7 +108,7 @@ def test_swing_under_a_hook_that_tumbles_with_the_vehicle(flight, depth, acceler
 
 
 def test_noise_of_the_accelerometer_moves_the_swing_no_more_than_without_its_steps(flight):
-    """Beside an integration that takes each sample, at a hundredth of a second, in its turn."""
+    """Next to an integration that takes each sample, at a hundredth of a second, in its turn."""
     signals, step = tumbling(flight.vehicle), 0.01
     coarse, fine = [], []
     for seed in range(8):
@@ -188,13 +188,13 @@ def test_a_load_that_swings_from_the_start_shows_in_the_balance_of_forces(flight
 
 
 def test_a_large_swing_is_followed_all_flight_long(flight):
-    """Slower than a small one, so that it is not the driven swing and a free one beside it."""
+    """Slower than a small one, so that it is not the driven swing and a free one next to it."""
     long = tumbling(flight.vehicle, np.arange(0.0, 25.0, 0.01))
     level, cable = balanced(long, (0.4, -0.35, 0.8, 0.7), damping=0.02)
     assert off(settled_swing(level, 1.5, 0.02)[:, :2], cable) < 0.02
 
 
-def test_in_gusts_all_of_a_flight_tells_the_start(flight):
+def test_in_gusts_all_of_a_flight_shows_the_start(flight):
     """In gusts of a hundredth of the weight that last a second: two swings alone leave twice as much."""
     long = tumbling(flight.vehicle, np.arange(0.0, 25.0, 0.01))
     level, cable = balanced(long, (0.12, -0.15, 0.3, 0.2))

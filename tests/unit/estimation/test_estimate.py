@@ -82,7 +82,7 @@ def test_a_number_that_is_not_linear_settles_where_the_score_is_zero():
     np.testing.assert_allclose(found.values, [np.log(2.0), 0.7], atol=0.02)
 
 
-def test_strength_tells_a_weak_instrument():
+def test_strength_shows_a_weak_instrument():
     rng = np.random.default_rng(6)
     strong, weak = (fit(*closed_loop(rng, instrument=size)).strength for size in (1.0, 0.0))
     assert strong.min() > 50

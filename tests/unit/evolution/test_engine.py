@@ -160,7 +160,7 @@ def test_rates_set_the_numbers_of_offspring_bred_and_inserted():
 
 
 def test_migration_waits_for_its_interval_and_subpopulations_stay_apart_before():
-    # Every gene tells its subpopulation; without mutation only migration brings another value.
+    # Every gene shows its subpopulation; without mutation only migration brings another value.
     settings = replace(PAPER, population=20, generations=5, subpopulations=4, mutated_individuals=0.0)
     labels = np.repeat(np.arange(4), 5)
     generations = run(zdt1, settings=settings, initial=np.repeat(labels[:, np.newaxis] * 1000, 6, axis=1))

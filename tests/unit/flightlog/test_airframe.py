@@ -22,7 +22,7 @@ def px4(hubs):
 
 
 @pytest.mark.parametrize("order", list(permutations(range(4))))
-def test_motion_tells_every_numbering(order):
+def test_motion_shows_every_numbering(order):
     own = flight(seconds=20.0, noise=3.0)
     found = airframe_from_motion(own.rate, own.speed[:, list(order)], 100.0, False)
     assert found.clear
@@ -59,7 +59,7 @@ def test_what_is_fast_of_late_motors_puts_no_rotor_opposite():
     assert airframe_from_motion(rate, np.roll(own.speed, -5, axis=0), 100.0, True) is None
 
 
-def test_noise_tells_no_rotors():
+def test_noise_shows_no_rotors():
     noise = np.random.default_rng(1)
     found = airframe_from_motion(noise.normal(size=(3000, 3)), noise.normal(500, 5, (3000, 4)), 100.0, False)
     assert found is None or not found.clear

@@ -146,7 +146,7 @@ def test_euler_rates_without_the_attitude_that_the_log_lacks_are_refused():
         imported(log("attitude_rate", "rotor_command"), mapped("attitude", "attitude_rate", "rotor_command"))
 
 
-def test_a_log_that_tells_neither_of_the_rotation_nor_of_the_rotors_is_refused():
+def test_a_log_that_shows_neither_of_the_rotation_nor_of_the_rotors_is_refused():
     with pytest.raises(InputError, match=r"a flight needs one of attitude, .*no columns of body_rate, rotor_speed"):
         imported(log("position"), mapped("position", "body_rate", "rotor_speed"))
     with pytest.raises(InputError, match=r"no columns of body_rate$"):
@@ -169,7 +169,7 @@ def test_what_goes_into_a_mixer_becomes_the_share_of_each_rotor():
     np.testing.assert_allclose(flight.rotor_command, expected, atol=1e-12)
 
 
-def test_columns_of_other_lengths_than_the_stamps_are_told():
+def test_columns_of_other_lengths_than_the_stamps_are_said():
     log = columns(np.zeros((50, 3)))
     log["pitch"] = np.zeros(100)
     settings = ImportSettings(signals={"attitude": SignalMap(columns=NAMES, unit="rad")}, torque_source=None)

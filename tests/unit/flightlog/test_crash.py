@@ -201,7 +201,7 @@ def test_what_only_shakes_on_a_bench_does_not_fly(own, known):
 
 
 def test_height_of_an_autopilot_that_counts_downward(own):
-    """Without an accelerometer only the height tells that rotors stop in the air."""
+    """Without an accelerometer only the height shows that rotors stop in the air."""
     topics = ardupilot(ended.stops_in_the_air(own))
     topics = {name: fields for name, fields in topics.items() if not name.startswith("ESC")}
     topics["IMU"] = {name: values for name, values in topics["IMU"].items() if not name.startswith("Acc")}

@@ -83,7 +83,7 @@ def test_idling_in_flips_is_part_of_the_flight():
     assert any("it also flies at" in reason for reason in quiet.reasons)
 
 
-def test_height_alone_tells_a_flight():
+def test_height_alone_shows_a_flight():
     flown = flown_by(None, between(10, 30, 1.0), turning(10, 30))
     assert flown.span_s == (pytest.approx(10.5, abs=0.1), pytest.approx(29.5, abs=0.1))
 

@@ -59,7 +59,7 @@ def test_without_attitude_the_accelerometer_stays_and_no_acceleration_is_made_up
     np.testing.assert_allclose(flight.specific_force, expected, atol=1e-9)
 
 
-def test_with_attitude_the_acceleration_in_the_world_comes_beside_it():
+def test_with_attitude_the_acceleration_in_the_world_comes_next_to_it():
     flight = imported(more=ATTITUDE)
     roll, pitch, yaw = flight.attitude.T
     fx, fy, fz = flight.specific_force.T

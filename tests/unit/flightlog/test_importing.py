@@ -288,7 +288,7 @@ def test_a_clock_that_no_sensor_has_asks_for_the_unit_of_time(factor, said):
     assert asked == (["1e+05 rows a second, which no sensor of a vehicle gives: is import.time_unit = s right"] * said)
 
 
-def test_a_slow_column_in_a_fast_log_is_told_from_a_wrong_clock():
+def test_a_slow_column_in_a_fast_log_is_distinguished_from_a_wrong_clock():
     columns = log()
     columns["r"][np.arange(201) % 20 != 0] = np.nan
     with pytest.raises(InputError, match=r"a mapped column has a value only every 0\.2 s"):

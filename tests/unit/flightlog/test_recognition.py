@@ -106,7 +106,7 @@ def test_angles_of_either_unit_and_of_reversed_axes_are_put_right(own, sign, uni
 
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
 @pytest.mark.parametrize("inverse", [False, True])
-def test_quaternions_of_either_order_and_direction_are_told_apart(own, order, inverse):
+def test_quaternions_of_either_order_and_direction_are_distinguished(own, order, inverse):
     rotation = own.rotation.inv() if inverse else own.rotation
     attitude = named(quaternion(rotation, order), "q[0]", "q[1]", "q[2]", "q[3]")
     recognition = assert_the_flight_comes_back(flat_log(own, attitude=attitude), own)
@@ -120,7 +120,7 @@ def test_a_gyroscope_with_other_axes_does_not_hide_the_order_of_a_quaternion(own
     assert recognition.choice("quaternion_order") == "xyzw"
 
 
-def test_frd_in_ned_is_told_from_flu_in_enu(own):
+def test_frd_in_ned_is_distinguished_from_flu_in_enu(own):
     turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
     log = flat_log(
         own,
@@ -156,7 +156,7 @@ def test_gravity_logged_in_place_of_what_carries_is_turned_round(own):
     assert recognition.signal("acceleration").columns.sign == (-1.0, -1.0, -1.0)
 
 
-def test_an_acceleration_of_the_world_is_told_from_what_is_sensed(own):
+def test_an_acceleration_of_the_world_is_distinguished_from_what_is_sensed(own):
     recognition = seen(flat_log(own, force=named(own.acceleration, *ACC)))
     assert recognition.choice("acceleration_frame") == "world"
     with_gravity = seen(flat_log(own, force=named(own.acceleration + np.array([0.0, 0.0, 9.81]), *ACC)))
@@ -164,7 +164,7 @@ def test_an_acceleration_of_the_world_is_told_from_what_is_sensed(own):
     assert "an acceleration in world axes that includes gravity" in with_gravity.left_out[0]
 
 
-def test_an_acceleration_of_the_world_in_thousandths_is_told_by_the_motion(own):
+def test_an_acceleration_of_the_world_in_thousandths_is_said_by_the_motion(own):
     """As a Crazyflie estimates it: without gravity it is taken, with it there is no word for it."""
     thousandths = {"position": named(1e3 * own.position, *PLACE), "velocity": named(1e3 * own.velocity, *SPEED)}
     log = flat_log(own, force=named(1e3 * own.acceleration, "ax", "ay", "az"), **thousandths)
@@ -214,7 +214,7 @@ def test_of_two_positions_that_fit_the_velocity_the_first_by_name_is_taken(own):
     assert recognition.left_out == ("mocap_x, mocap_y, mocap_z: also position by name; not used",)
 
 
-def test_lengths_in_millimetres_are_told_by_what_the_lean_does(own):
+def test_lengths_in_millimetres_are_said_by_what_the_lean_does(own):
     log = flat_log(own, position=named(1000 * own.position, *PLACE), velocity=named(1000 * own.velocity, *SPEED))
     recognition = assert_the_flight_comes_back(log, own)
     assert recognition.signal("position").columns.unit == "mm"
@@ -229,7 +229,7 @@ def test_lengths_in_millimetres_are_told_by_what_the_lean_does(own):
         (lambda speed: 65.536 * speed, "1", 1 / 65536, 0.0),
     ],
 )
-def test_the_range_of_a_command_tells_its_unit(own, values, unit, scale, offset):
+def test_the_range_of_a_command_shows_its_unit(own, values, unit, scale, offset):
     speed = named(values(own.speed), "cmd1", "cmd2", "cmd3", "cmd4")
     columns = seen(flat_log(own, speed=speed)).signal("rotor_command").columns
     assert (columns.unit, columns.scale, columns.offset) == (unit, pytest.approx(scale), pytest.approx(offset))

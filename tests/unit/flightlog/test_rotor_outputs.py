@@ -31,7 +31,7 @@ def copter(own, pulses, field="C"):
 
 
 def pulses(own, *others, low=1000.0, high=2000.0):
-    """Outputs of four motors, of 1000 rad/s at full command, and others beside them."""
+    """Outputs of four motors, of 1000 rad/s at full command, and others next to them."""
     return np.column_stack([low + (high - low) * np.clip(own.speed / 1000, 0, 1), *others])
 
 
@@ -62,7 +62,7 @@ def test_the_outputs_of_an_older_copter_are_rotors_in_the_form_of_its_frame(own,
         ({}, "no motor"),
     ],
 )
-def test_a_camera_beside_the_motors_is_no_rotor(own, extra, parameters, why):
+def test_a_camera_next_to_the_motors_is_no_rotor(own, extra, parameters, why):
     values = pulses(own, extra(own), gimbal(own)) if "RC6_FUNCTION" in parameters else pulses(own, extra(own))
     proposal = proposed(copter(own, values), "ArduCopter 3.4", parameters)
     assert maps(proposal)["rotor_command"].columns == ("RCOU.C1", "RCOU.C2", "RCOU.C3", "RCOU.C4")

@@ -134,7 +134,7 @@ def test_the_clock_is_named_or_that_of_the_fastest_mapped_topic():
         on_one_clock({"other": topics["other"]}, {}, settings)
 
 
-def test_a_flat_log_is_on_one_clock_and_must_be_told_which_column_it_is():
+def test_a_flat_log_is_on_one_clock_and_must_be_said_which_column_it_is():
     flat = {"": {"t": np.array([1.0, 2.0]), "v": np.array([3.0, 4.0])}}
     settings = ImportSettings(time_unit="ms", torque_source=None, signals=signals(voltage=("v",), body_rate=RATE))
     assert on_one_clock(flat, {}, settings)[0]["t"].tolist() == [1.0, 2.0]
@@ -160,7 +160,7 @@ def test_the_first_map_is_taken_whose_columns_are_all_there():
     assert chosen(gyro=partly) == mapped["body_rate"]
 
 
-def test_it_is_told_which_columns_stand_in():
+def test_it_is_said_which_columns_stand_in():
     old = ColumnMap(columns=("old.x", "old.y", "old.z"), unit="deg/s")
     mapped = {"body_rate": SignalMap(columns=RATE, unit="rad/s", otherwise=(old,))}
     settings = ImportSettings(time_column=None, torque_source=None, signals=mapped)

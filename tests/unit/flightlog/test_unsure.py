@@ -135,7 +135,7 @@ def test_a_quaternion_that_needs_much_explaining_is_a_guess_and_so_is_all_that_h
         ("_deg_s", "deg/s", 1.0, np.degrees(1.0)),
     ],
 )
-def test_a_unit_in_a_name_tells_more_than_a_range(ending, unit, scale, factor):
+def test_a_unit_in_a_name_shows_more_than_a_range(ending, unit, scale, factor):
     names = [f"m{number}{ending}" for number in range(1, 5)]
     guess = signal(proposed(speed=named(OWN.speed * factor, *names)), "rotor_speed")
     assert (guess.columns.unit, guess.columns.scale, guess.sure) == (unit, pytest.approx(scale), "named")
@@ -186,7 +186,7 @@ def test_a_unit_is_read_however_it_is_written(name, part, columns, unit, scale):
         ),
     ],
 )
-def test_a_unit_that_is_stated_wrong_is_told_by_the_motion_and_said(name, changed, unit, said):
+def test_a_unit_that_is_stated_wrong_is_said_by_the_motion_and_said(name, changed, unit, said):
     proposal = proposed(**changed)
     assert signal(proposal, name).columns.unit == unit
     assert any(said in warning for warning in proposal.warnings)
@@ -334,7 +334,7 @@ def test_six_rotors_of_a_hexarotor_in_hover_are_all_rotors():
 
 
 def test_angles_that_jump_by_a_full_turn_are_in_rad():
-    """Who rolls over leans beyond a quarter turn, which else tells degrees."""
+    """Who rolls over leans beyond a quarter turn, which else shows degrees."""
     (angles,) = (own for own in named_signals(column_groups(("roll", "pitch", "yaw"))) if own.signal == "attitude")
     time = np.linspace(0, 10, 1001)
     rolls = np.column_stack([np.angle(np.exp(1j * 3 * time)), 0.2 * np.sin(time), 0.1 * time])

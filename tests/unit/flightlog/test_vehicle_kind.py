@@ -79,7 +79,7 @@ def test_a_vtol_hovers(system, parameters, topics):
     assert found.what == VTOL
 
 
-def test_forward_flight_is_told_by_states_and_modes():
+def test_forward_flight_is_said_by_states_and_modes():
     grid = np.array([0.5, 1.5, 2.5])
     by_type = forward_flight(status(vehicle_type=[1, 2, 1]), grid)
     assert by_type.tolist() == [False, True, False]

@@ -130,7 +130,7 @@ def test_rotors_of_unknown_factors_are_asked_for_nothing(unknown, speed):
     assert not notes
 
 
-def test_torque_without_thrust_tells_no_commands(speed):
+def test_torque_without_thrust_shows_no_commands(speed):
     signals, _ = read(VehicleSettings(), speed, thrust=None)
     assert signals.rotor_speed is None
     assert signals.stated_torque is not None

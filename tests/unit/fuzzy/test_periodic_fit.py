@@ -239,7 +239,7 @@ def test_a_single_point_gives_a_single_value():
         one(np.zeros((3, 2)))
 
 
-def test_the_share_that_samples_determine_is_told():
+def test_the_share_that_samples_determine_is_said():
     assert fit_periodic(samples(3000), np.zeros(3000)).quality.determined == 1.0
     quality = fit_periodic(np.full((400, 2), 0.5), np.full(400, 3.0)).quality
     assert (quality.rank, quality.coefficients) == (1, 81)

@@ -65,7 +65,7 @@ def apart(monkeypatch, own, left, sizes=None):
     ],
     ids=["it is the lag", "it is the delay", "the usual one of two"],
 )
-def test_what_is_needed_beside_the_other_is_named_whatever_was_found(own, together, names, rivals, monkeypatch):
+def test_what_is_needed_next_to_the_other_is_named_whatever_was_found(own, together, names, rivals, monkeypatch):
     left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
     found, alike, result, tried = apart(monkeypatch, own, left, {BOTH: together})
     assert (found, alike) == (names, rivals)
@@ -89,11 +89,11 @@ def test_a_delay_alone_has_to_show_that_rotors_do_not_lag(together, names, monke
     assert apart(monkeypatch, DELAY, left, {BOTH: together})[0] == names
 
 
-def test_a_lag_that_is_surely_not_0_stands_however_little_what_is_left_without_it_tells(monkeypatch):
+def test_a_lag_that_is_surely_not_0_stands_however_little_what_is_left_without_it_shows(monkeypatch):
     assert apart(monkeypatch, LAG, {(): LITTLE, LAG: LITTLE[::-1]})[0] == LAG
 
 
-def test_both_stand_where_each_is_surely_not_0_beside_the_other_though_one_alone_leaves_nothing(monkeypatch):
+def test_both_stand_where_each_is_surely_not_0_next_to_the_other_though_one_alone_leaves_nothing(monkeypatch):
     left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
     assert apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})[:2] == (BOTH, set())
 

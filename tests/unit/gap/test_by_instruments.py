@@ -59,7 +59,7 @@ def test_alone_it_is_a_test_of_means():
 
 
 @pytest.mark.parametrize(("apart", "result"), [(0.6, [True, True, False]), (0.02, [True, False, False])])
-def test_of_numbers_that_instruments_hardly_tell_apart_the_weaker_is_not_told(apart, result):
+def test_of_numbers_that_instruments_hardly_separate_the_weaker_is_not_said(apart, result):
     """A load and a wrong thrust, which in hover do the same; and one of which nothing is known."""
     rng = np.random.default_rng(5)
     known = rng.standard_normal((BLOCKS, WINDOWS, 3))
@@ -72,7 +72,7 @@ def test_of_numbers_that_instruments_hardly_tell_apart_the_weaker_is_not_told(ap
 
 
 def result(true, found, reach, rng):
-    """What a source knows of three numbers, found where they are not: `reach` of what they move, beside gusts."""
+    """What a source knows of three numbers, found where they are not: `reach` of what they move, next to gusts."""
     known = rng.standard_normal((BLOCKS, WINDOWS, 3)) * reach
     gust = rng.standard_normal((BLOCKS, WINDOWS, 1))
     moved = known + gust * [0.7, -0.5, 0.3]

@@ -1,4 +1,4 @@
-"""Wrong numbers of the vehicle are told where they are sure, matter, and nothing named accounts for them."""
+"""Wrong numbers of the vehicle are said where they are sure, matter, and nothing named accounts for them."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def result(*numbers, effects=(), share=0.5):
     return () if effect is None else tuple(each.name for each in effect.numbers)
 
 
-def test_sure_numbers_are_told():
+def test_sure_numbers_are_said():
     assert result(SURE, number("inertia_y", -0.1, 0.02)) == ("inertia_x", "inertia_y")
 
 
@@ -50,7 +50,7 @@ def test_others_are_not(quiet):
     assert result(quiet) == ()
 
 
-def test_a_refit_that_takes_nothing_off_the_gap_tells_nothing():
+def test_a_refit_that_takes_nothing_off_the_gap_shows_nothing():
     assert result(SURE, share=0.04) == ()
 
 

@@ -212,7 +212,7 @@ def test_extension_that_does_not_help_is_refused():
 
 
 def test_turned_gyroscope_is_repaired_before_anything_is_compared():
-    """An attitude tells the audit that the gyroscope has a constant error, which no torque gets."""
+    """An attitude shows the audit that the gyroscope has a constant error, which no torque gets."""
 
     def seen(seed):
         signals = recording_of_sines(seed)

@@ -1,4 +1,4 @@
-"""The numbers that `gap` has beside settings and ranges of effects: few, and each with its reason on a page."""
+"""The numbers that `gap` has next to settings and ranges of effects: few, and each with its reason on a page."""
 
 import ast
 import re

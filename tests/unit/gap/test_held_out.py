@@ -59,7 +59,7 @@ def test_numbers_remove_a_gap_only_where_one_stands_above_the_noise(before, take
 
 @pytest.mark.parametrize(("before", "own", "closed"), [(8, 0.7, True), (8, 2, False), (1.2, 0.7, False)])
 def test_numbers_close_a_gap_that_was_clear(before, own, closed):
-    """Names beside them then take their share of the gap as given, for of the other there is none."""
+    """Names next to them then take their share of the gap as given, for of the other there is none."""
     found = judged((before, 1, 1), (own, 1, 1))
     assert found.closed_by_numbers == closed
     assert found.shares()["torque"] == 0

@@ -75,7 +75,7 @@ def thrusts(path):
     return through.average(VEHICLE.mass_kg * (9.81 + signals.acceleration[:, 2]))
 
 
-def test_an_offset_is_told_from_a_bias_by_changes_of_thrust_alone():
+def test_an_offset_is_distinguished_from_a_bias_by_changes_of_thrust_alone():
     """The bias takes the mean of the torque ``c F``, an offset of the best length the part of ``M`` along ``F``."""
     path = path_of(2, 0.15)
     thrust = thrusts(path)
@@ -88,7 +88,7 @@ def test_an_offset_is_told_from_a_bias_by_changes_of_thrust_alone():
     assert result(bias, path) == pytest.approx(expected, rel=1e-6)
 
 
-def test_hovering_tells_nothing_of_the_two_whatever_the_yaw():
+def test_hovering_shows_nothing_of_the_two_whatever_the_yaw():
     for path in (path_of(2, 0.0), path_of(3, 0.3, 1)):
         assert result(question("com_offset", [LEVER, LEVER], "torque_bias"), path) < 1e-6
 
@@ -133,7 +133,7 @@ def evidence(*left, off=0.0):
     return Evidence(np.array(left)[:, None, None], np.zeros(0, dtype=int), (np.zeros(0, dtype=int),), False, off)
 
 
-def test_where_nothing_tells_all_sets_stay_as_likely_as_before():
+def test_where_nothing_shows_all_sets_stay_as_likely_as_before():
     answers = answered([evidence(0.0, 0.0, 0.0)] * 2)
     assert [answer.likely for answer in answers] == pytest.approx([1 / 3] * 2)
     assert [answer.sure for answer in answers] == pytest.approx([0.0] * 2, abs=0.01)
@@ -157,7 +157,7 @@ def test_formulas_that_are_off_leave_more_doubt():
 
 
 def test_flights_tell_how_much_formulas_are_off_by():
-    """A bias beside the named offset is taken for what the offset's formula is off by, a tenth of it at most."""
+    """A bias next to the named offset is taken for what the offset's formula is off by, a tenth of it at most."""
     named, size = candidate("com_offset"), np.array([0.004, 0.0])
     floor = np.full(6, 0.01)
     alone, beside = (
@@ -305,14 +305,14 @@ def test_flights_without_the_signal_of_a_rival_say_nothing():
     assert known.answers(along(path_of(0, 1.0, 3)))[1].evidence.left.sum() > 0
 
 
-def test_a_special_case_is_not_told_from_what_holds_it():
+def test_a_special_case_is_not_distinguished_from_what_holds_it():
     drag, wind = CATALOGUE["rotor_drag"], CATALOGUE["wind"]
     (only,) = questions_between([drag, wind], VEHICLE)
     assert only.true.candidate.effect is wind
 
 
 @pytest.mark.parametrize("names", [("gyro_bias",), ("motor_lag", "channel_delay")])
-def test_what_no_flight_tells_is_refused(names):
+def test_what_no_flight_shows_is_refused(names):
     with pytest.raises(InputError, match=names[0]):
         require_visible([CATALOGUE[name] for name in names], "--separate", VEHICLE)
 
@@ -382,7 +382,7 @@ def test_noise_of_the_sensors_makes_the_floors():
     np.testing.assert_allclose(loud[3:] / quiet[3:], 2.0, rtol=0.15)
 
 
-def test_in_closed_loop_the_flight_tells_about_as_much(asked):
+def test_in_closed_loop_the_flight_shows_about_as_much(asked):
     path = room().drawn(np.random.default_rng(11))
     planned = room().planned(path, 0.01)
     true = asked.questions[0].true

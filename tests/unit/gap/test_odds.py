@@ -40,7 +40,7 @@ def test_alone_a_set_is_certain():
     assert likely([]).tolist() == [1.0]
 
 
-def test_what_foretells_every_block_alike_is_as_likely():
+def test_what_predicts_every_block_alike_is_as_likely():
     assert likely([np.zeros(12), np.zeros(12)]) == pytest.approx([1 / 3] * 3)
 
 

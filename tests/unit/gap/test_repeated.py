@@ -87,7 +87,7 @@ def test_each_band_holds_what_its_windows_see(of_two_paths, band):
     assert of_two_paths.repeatable[0, band] == pytest.approx(truth, abs=max(3 * error, 0.1 * truth))
 
 
-def test_the_noise_of_the_gyroscope_is_told_apart():
+def test_the_noise_of_the_gyroscope_is_distinguished():
     """Runs without anything else: what does not come again is what white noise leaves of it."""
     runs = [run(0, draw) for draw in range(2)]
     still = [sines(1000 + draw, OWN)[0] + missing(0) for draw in range(2)]

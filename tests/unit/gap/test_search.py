@@ -1,4 +1,4 @@
-"""What cannot be told apart, on a system of hand-made effects."""
+"""What cannot be distinguished, on a system of hand-made effects."""
 
 from dataclasses import replace
 
@@ -126,7 +126,7 @@ def test_a_number_more_has_to_explain_something(less, wins):
 
 
 @pytest.mark.parametrize(("less", "wins"), [(0.5, "usual"), (1.0, "best")])
-def test_what_no_number_tells_apart_is_what_is_usual(less, wins):
+def test_what_no_number_separates_is_what_is_usual(less, wins):
     to_and_fro = 20.0 * (-1.0) ** np.arange(BLOCKS)
     best = with_errors("best", 1e4, OWN.block_error)
     effect = replace(hand_made("usual", (1.3, 0)), order=SPECIAL.order - 1)

@@ -57,7 +57,7 @@ def test_what_is_left_is_the_wrench_of_the_effects_and_their_rows():
 
 
 def test_what_is_kept_of_a_flight_is_that_of_the_formula_that_was_asked_for():
-    """A bend over speed takes the usual one of all flights, and a flight may be judged beside some and then others."""
+    """A bend over speed takes the usual one of all flights, and a flight may be judged next to some and then others."""
     signals = fly(1, EFFECTS)
     flight, faster = weak(signals, force=True), weak(replace(signals, velocity=3 * signals.velocity), force=True)
     assert weak(signals, force=True) is flight

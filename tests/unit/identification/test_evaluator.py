@@ -162,7 +162,7 @@ def test_a_search_can_be_judged_on_what_it_learns_from():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_local_search_ends_in_the_minimum_beside_its_start(seed):
+def test_local_search_ends_in_the_minimum_next_to_its_start(seed):
     """Near the partitions that made the torque both methods end in the same minimum."""
     rng = np.random.default_rng(seed)
     settings = {"input_map": "full-circle", "membership_functions": 4}
@@ -286,7 +286,7 @@ def test_gradient_of_the_reduced_cost(structure, base):
 
 @pytest.mark.parametrize("structure", STRUCTURES)
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
-def test_jacobian_is_that_of_the_residual_beside_what_the_regressor_spans(structure, base):
+def test_jacobian_is_that_of_the_residual_next_to_what_the_regressor_spans(structure, base):
     """Kaufman's approximation leaves out only the part inside the span, which the coefficients follow."""
     evaluator, rng = problem(structure, base)
     local, genes = local_problem(evaluator, rng)

@@ -143,7 +143,7 @@ def test_ridge_holds_the_coefficients_of_columns_divided_by_their_size():
     np.testing.assert_allclose(curve.error, expected.error, rtol=1e-9)
 
 
-def test_errors_that_only_rounding_tells_apart_count_as_equal():
+def test_errors_that_only_rounding_separates_count_as_equal():
     """Exact data, which any small ridge and none at all meet: the fuzzy part is off."""
     rows, right_side, time = problem(share=0.0, noise=0.0)
     curve = cross_validated(*[(rows, right_side)] * 2, contiguous_blocks(time, time, 5, 0.0))
@@ -197,7 +197,7 @@ def test_body_torque_is_judged_where_the_pitch_is_not_vertical():
 
 
 @pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2 + 0.05, 4.7])
-def test_a_flight_at_a_vertical_pitch_tells_nothing_of_body_torque(pitch):
+def test_a_flight_at_a_vertical_pitch_shows_nothing_of_body_torque(pitch):
     torque = np.random.default_rng(8).standard_normal((5, 3))
     judged = score(still_flight(torque, np.tile([0.3, pitch, 0.0], (5, 1))), 0.9 * torque)
     assert np.isnan(judged.r2_body).all()
@@ -314,7 +314,7 @@ def result(data, held_out=None, stated=INERTIA, **changed):
     return " | ".join(found.findings)
 
 
-def test_a_good_flight_is_only_told_that_the_rigid_body_is_enough():
+def test_a_good_flight_is_only_said_that_the_rigid_body_is_enough():
     sentences = result(small_angle_flight())
     assert "fuzzy part off" in sentences
     for word in ("positive definite", "constant torque", "hardly", "times those stated", "explains less"):
@@ -361,7 +361,7 @@ def test_a_wrong_unit_shows_in_the_ratio_to_the_stated_inertia():
     assert "times those stated" not in result(with_torque(data, 57.3 * data.torque), stated=None)
 
 
-def test_another_vehicle_is_told_on_held_out_flights():
+def test_another_vehicle_is_said_on_held_out_flights():
     data, other = small_angle_flight(), small_angle_flight(seed=2)
     assert "other: the model explains less than half" in result(data, {"other": with_torque(other, 5 * other.torque)})
     assert "explains less than half" not in result(data, {"other": other})
@@ -401,7 +401,7 @@ def test_near_a_vertical_pitch_a_matrix_may_dip_below_zero_by_a_hair(pitch, smal
     assert (own[0] < 0.01 * own[2]) == (abs(np.cos(pitch)) < 0.1)
 
 
-def test_a_flight_through_a_vertical_pitch_is_told_what_is_left_out():
+def test_a_flight_through_a_vertical_pitch_is_said_what_is_left_out():
     sentences = result(rotations())
     assert "body torque is judged without the samples closer than 6 degrees to a pitch of +-90 degrees" in sentences
     assert "closer than" not in result(small_angle_flight())
@@ -423,7 +423,7 @@ def test_noise_near_a_vertical_pitch_does_not_make_an_axis_badly_explained():
     assert np.all(evidence.r2 > 0.99)
 
 
-def test_constant_and_inertial_torque_are_told_apart():
+def test_constant_and_inertial_torque_are_distinguished():
     data = small_angle_flight()
     offset = np.tile([0.2, -0.5, 0.1], (300, 1))
     evidence = axis_evidence(with_torque(data, data.torque + generalised_torque(data.motion.attitude, offset)), 1e-10)

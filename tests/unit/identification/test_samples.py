@@ -124,7 +124,7 @@ def test_projected(case, count):
     assert_close(back, A.T @ (y - A @ case.parameters))
 
 
-def test_neighbours_that_fire_other_rules_are_told_apart():
+def test_neighbours_that_fire_other_rules_are_distinguished():
     """Pairs of samples whose intervals of roll and pitch differ by +1 and by -1 to -13, of 14."""
     structure = model_structure(StructureSettings(**SEESAW, membership_functions=(1, 15, 1, 15, 1, 1)))
     interval = np.array([place for down in range(1, 14) for place in ((0, down, 0), (1, 0, 0))])

@@ -339,7 +339,7 @@ def test_model_learned_from_a_selection_is_judged_on_all_of_training():
 
 
 def test_objectives_are_judged_on_all_of_training():
-    """Few samples are met exactly by 25 coefficients; what the front counts is the error beside them too."""
+    """Few samples are met exactly by 25 coefficients; what the front counts is the error next to them too."""
     data, selected = nearly_rigid_flight(noise=0.05), np.arange(0, 100, 8)
     settings = IdentificationSettings(**{**SEARCHED, "base": "none"})
     found = identify(data, data[selected], {}, settings, np.random.default_rng(0))

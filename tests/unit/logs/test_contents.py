@@ -156,7 +156,7 @@ def test_no_format_hides_another():
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.CSV.GZ", "b/a.parquet", "a.b.ULG", "a.BIN", "a.mat"])
-def test_a_log_is_told_by_its_name(name):
+def test_a_log_is_said_by_its_name(name):
     assert is_log(Path(name))
 
 
@@ -166,7 +166,7 @@ def test_other_names_are_no_logs(name):
 
 
 @pytest.mark.parametrize("first", [b"\xbc\x02\x00", b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n"])
-def test_binary_logs_are_told_by_their_first_bytes_whatever_their_name(tmp_path, first):
+def test_binary_logs_are_said_by_their_first_bytes_whatever_their_name(tmp_path, first):
     for name in ("log00", "LOG.TXT", "log.tar.gz", "study.h5", "log.ulg", "log.csv"):
         (tmp_path / name).write_bytes(first)
         assert is_log(tmp_path / name)
@@ -423,7 +423,7 @@ def test_of_betaflight_by_its_header(flown, said):
 
 
 @pytest.mark.parametrize("said", ["0000-01-01T00:00:00.000+00:00", "1970-01-01T00:00:00.000+00:00", "soon"])
-def test_a_clock_that_was_never_set_tells_none(flown, said):
+def test_a_clock_that_was_never_set_shows_none(flown, said):
     lines = blackbox_logs.header() + f"H Log start datetime:{said}\n".encode()
     assert isnan(flown("log.bbl", lines + b"".join(blackbox_logs.frames(blackbox_logs.flight()))))
 
@@ -676,7 +676,7 @@ def test_a_file_that_is_no_log_is_named_with_the_way_to_one(tmp_path, name, cont
     assert way in said
 
 
-def test_messages_of_sdlog2_are_told_from_those_of_dataflash_whatever_the_name(tmp_path):
+def test_messages_of_sdlog2_are_distinguished_from_those_of_dataflash_whatever_the_name(tmp_path):
     kinds = {"TIME": ("Q", "StartTime"), "ATT": ("fff", "Roll,Pitch,Yaw"), "PARM": ("Nf", "Name,Value")}
     path = tmp_path / "log.bin"
     path.write_bytes(dataflash(kinds | {"MSG": ("Z", "Message")}, [("TIME", (5,)), ("ATT", (0.1, 0.2, 0.3))]))

@@ -118,7 +118,7 @@ def test_another_kind_than_the_name_says_is_named(refused, tmp_path, name, held,
 
 
 @pytest.mark.parametrize("name", ["log.parquet", "log.csv"])
-def test_a_binary_log_is_told_by_its_content(refused, tmp_path, name):
+def test_a_binary_log_is_said_by_its_content(refused, tmp_path, name):
     assert refused(tmp_path / name, content=b"ULog\x01\x12\x35\x01").startswith("a broken ULog file: ")
 
 

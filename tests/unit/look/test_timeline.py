@@ -107,7 +107,7 @@ def test_modes_that_change_often_are_one_line():
     assert of(events(logs.ardupilot(HOP, more=more)), "mode") == [(6.0, "the mode changes 9 times: Stabilize, Loiter")]
 
 
-def test_a_crash_tells_its_moments():
+def test_a_crash_shows_its_moments():
     crashed = ended.hits(flight(seconds=40.0))
     found = events(logs.px4(crashed))
     assert [(kind, round(at)) for kind, at in ((e.kind, e.time_s) for e in found) if kind == "impact"] == [

@@ -114,7 +114,7 @@ def test_filters_are_listed_with_what_they_cost():
     assert vibration.delay_ms == pytest.approx(low.delay_ms + notch.delay_ms)
 
 
-def test_a_notch_beside_the_fixed_line_is_moved_to_it():
+def test_a_notch_next_to_the_fixed_line_is_moved_to_it():
     flight, _ = shaking(autopilot="px4", parameters=PX4)
     (change,) = vibration_of(flight).changes
     assert (change.parameter, change.now) == ("IMU_GYRO_NF0_FRQ", 120.0)

@@ -163,7 +163,7 @@ def test_names_that_make_no_forecast_come_with_what_does():
     assert "cpfls vehicle" not in next_steps(diagnosis("PARTIAL", playback=winning))
 
 
-def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tells():
+def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_separates():
     sure, below = (screen(diagnosis("PARTIAL", alternatives=(made.RIVAL,)))[place] for place in (1, 4))
     assert sure["How sure"] == (
         "Of the held-out gap above the noise, 97 % is gone. "
@@ -181,7 +181,7 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_tell
     assert "To separate" not in dict(below)
 
 
-def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_tells_them():
+def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_shows_them():
     pair = (Alternative("motor_lag", "low_pass_filter", 1.0, "log the speeds of the rotors", "command_delay"),)
     answer = diagnosis("AMBIGUOUS", named=("low_pass_filter",), alternatives=pair)
     box, facts, *_ = screen(answer)
@@ -234,7 +234,7 @@ def test_where_nothing_is_above_the_noise_nothing_is_located():
     assert record.where is None
 
 
-def test_the_gap_stands_before_and_after_beside_the_noise():
+def test_the_gap_stands_before_and_after_next_to_the_noise():
     _, _, rows, caption, _ = screen(diagnosis())
     assert texts(rows["gap, roll torque"]) == ["N m", "0.494", "0.0136", "0.0123", "40 → 1.1 floors"]
     assert "gap, yaw torque" not in rows
@@ -245,7 +245,7 @@ def test_the_gap_stands_before_and_after_beside_the_noise():
     assert (worse.text, worse.tone) == ("40 → 60 floors, worse", "warning")
 
 
-def test_playback_stands_before_and_after_beside_what_knows_no_model():
+def test_playback_stands_before_and_after_next_to_what_knows_no_model():
     ends = {"velocity": (0.1, 0.5, 0.3, 0.2), "position": (0.4, 0.3, 0.5, 0.6)}
     _, _, rows, caption, _ = screen(diagnosis(playback=made.played_pair(**ends)))
     assert texts(rows["playback, body rate"]) == ["rad/s", "2.0", "0.10", "1.0", "better than “nothing moves”"]
@@ -310,7 +310,7 @@ def test_flights_held_out_and_why_stand_below():
     assert dict(below)["Why"] == "No flight was held out by name."
 
 
-def test_remarks_are_told_but_those_that_are_told_elsewhere():
+def test_remarks_are_said_but_those_that_are_said_elsewhere():
     notes = ("A note that readers need.", WRONG, *made.AUDIT.notes)
     record = diagnosis("CONTRADICTED", named=(), notes=notes, contradictions=(WRONG,))
     assert remarks(record) == ["A note that readers need."]

@@ -32,7 +32,7 @@ from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights
 from tests.builders.vehicle_models import QUAD, source_of_vehicle, vehicle_of, whole
 
 
-def test_curves_are_told_apart_without_colour():
+def test_curves_are_distinguished_without_colour():
     looks = [(str(style["linestyle"]), style["linewidth"], style.get("marker")) for style in (MEASURED, BEFORE, HELD)]
     looks.append((marked(100)["linestyle"], marked(100)["linewidth"], marked(100)["marker"]))
     assert len(set(looks)) == len(looks)
@@ -139,7 +139,7 @@ def test_every_effect_has_a_title():
     assert effect_title("of_another_version") == "of another version"
 
 
-def test_ends_of_an_interval_can_be_told_apart_and_rounding_makes_no_certainty():
+def test_ends_of_an_interval_can_be_distinguished_and_rounding_makes_no_certainty():
     assert effect_sentence(OFFSET) == (
         "Offset of the centre of mass (com_offset): c_x = 0.01000000 [0.00999950, 0.01000120] m (p < 10⁻⁶, more than "
         "99 % of the gap)."
@@ -195,7 +195,7 @@ def test_errors_of_the_vehicles_numbers_are_per_cent_with_a_sign():
     assert "thrust −9.00 % [−9.11, −8.89] (p" in said("thrust_scale", -0.09, -0.0911, -0.0889)
 
 
-def test_an_effect_stands_once_beside_its_coefficients():
+def test_an_effect_stands_once_next_to_its_coefficients():
     found = made.diagnosis(named=("com_offset", "wind"))
     (table,) = [each for each in tables(found) if each.header[:2] == ["Effect", "Coefficient"]]
     assert [row[0].text for row in table.cells] == ["com_offset", "wind"]
@@ -355,7 +355,7 @@ def test_noise_that_is_larger_than_gusts_is_named():
         ),
     ],
 )
-def test_what_effects_leave_is_told_and_more_is_missing_only_where_that_is_visible(after, gap, left, words):
+def test_what_effects_leave_is_said_and_more_is_missing_only_where_that_is_visible(after, gap, left, words):
     _, sentences = again_box(made.repeatability(PITCH), made.repeatability(after, gap=gap))
     assert sentences[-1].startswith(words)
     assert f"50 % is repeatable from 0.25 to 1.5 Hz, of which {left} remains" in sentences[1]
@@ -371,7 +371,7 @@ def test_the_split_stands_behind_a_verdict_and_before_a_gap():
 
 
 @pytest.mark.parametrize("floors", [2.0, 1.0])
-def test_a_gap_that_does_not_come_again_is_said_beside_the_verdict(floors):
+def test_a_gap_that_does_not_come_again_is_said_next_to_the_verdict(floors):
     """And what to do next is no search for an effect; within the noise nothing is left."""
     given = made.diagnosis("UNEXPLAINED", named=(), gap=made.gap_change(after=np.full(6, floors)))
     groups = {"repeatability_before": made.repeatability(NOTHING), "repeatability_after": made.repeatability(NOTHING)}
@@ -435,7 +435,7 @@ def said(of):
     return " ".join(text for text in texts if text.startswith(("Gusts:", "No gusts")))
 
 
-def test_sizes_are_told_as_accelerations_with_how_long_they_last():
+def test_sizes_are_said_as_accelerations_with_how_long_they_last():
     words = said(found_in())
     assert "Gusts: 3.0 rad/s² about roll (2.5 to 3.6), lasting 0.40 s (0.20 to 0.80); 0.30 m/s² along x" in words
     assert "No gusts above 0.50 rad/s² about pitch, 0.10 m/s² along y and 0.20 m/s² along z." in words
@@ -469,7 +469,7 @@ def test_machines_read_sizes():
     assert plain(vehicle_of(whole()))["disturbance"] is None
 
 
-def test_gusts_stand_on_a_small_screen_beside_however_many_effects():
+def test_gusts_stand_on_a_small_screen_next_to_however_many_effects():
     air = replace(FOUND, alone=np.isfinite(FOUND.size))
     blocks = made.blocks_of(replace(made.diagnosis(named=("com_offset",) * 3), air=air), "diagnose")
     rows = [row for block in blocks if isinstance(block, Facts) for row in block.rows]
@@ -477,7 +477,7 @@ def test_gusts_stand_on_a_small_screen_beside_however_many_effects():
     assert words.startswith("The residual is gusts, ")
 
 
-def test_errors_with_the_past_stand_beside_those_without():
+def test_errors_with_the_past_stand_next_to_those_without():
     (flight,) = gusty_flights([Flight(SMALL, STORM)], seconds=6.0)
     player = player_of(VehicleModel(vehicle=SMALL.vehicle), flight)
     known = replace(player, observer=Observer(rate=np.full(6, 20.0), memory_s=np.full(6, 0.5), past_s=0.5))

@@ -93,7 +93,7 @@ def test_without_instruments_nothing_is_judged():
     assert made.responses["roll"].word == "not-judged"
 
 
-def test_what_no_model_says_is_told_by_its_lag():
+def test_what_no_model_says_is_said_by_its_lag():
     box, said = answer(result_of(roll_rate=estimate(lag_s=0.05, model=False), pitch_rate=estimate(model=False)))
     assert box.title == (
         "vehicle.h5 cannot be judged: the paths that are flown again move no response clearly, and what moves by "
@@ -132,7 +132,7 @@ def test_bode_plots_hold_the_curves():
     assert picture_of(figures["thrust"], "thrust", made) is None
 
 
-def test_a_response_that_one_flight_lacks_is_not_judged_beside_others():
+def test_a_response_that_one_flight_lacks_is_not_judged_next_to_others():
     made = result_of(roll=estimate(), thrust=estimate(2.0, instrumented=False))
     box, said = answer(made)
     assert box.title == "vehicle.h5 answers its rotors as the vehicle does: roll; not judged: thrust."

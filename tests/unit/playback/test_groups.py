@@ -43,7 +43,7 @@ def found(flights):
     return fitted, uncertainty(fitted, windows)
 
 
-def test_shared_numbers_stand_once_and_own_ones_beside_them():
+def test_shared_numbers_stand_once_and_own_ones_next_to_them():
     names = [number.name for number in JOINT.numbers]
     assert len(set(names)) == len(names)
     assert names[: len(JOINT.base.numbers)] == [number.name for number in JOINT.base.numbers]

@@ -77,7 +77,7 @@ def test_what_other_runs_have_at_the_same_place_is_averaged():
     assert np.isnan(repeats.others(0, [flight.motion.rate for flight in [flights[0], *flights[1:]]])[:40]).all()
 
 
-def test_runs_that_are_too_short_to_look_alike_are_told_by_what_was_asked_of_them():
+def test_runs_that_are_too_short_to_look_alike_are_said_by_what_was_asked_of_them():
     """Of six seconds chance makes unlike paths alike; nobody is asked the same place by chance."""
     asked = {late: _flown(1, late=late, seconds=6.0).motion.position for late in (0.0, 0.4)}
     asked[3.0] = 0.7 * asked[0.0]
@@ -105,7 +105,7 @@ def test_setpoints_from_outside_of_the_loops_are_instruments_and_others_are_none
     asked = {"position": position, "velocity": position, "attitude": position, "body_rate": position}
     assert instruments([replace(flight, setpoints=asked)]).names == ("position",)
     assert instruments([replace(flight, setpoints=asked | {"position": still})]).names == ("velocity",)
-    # What does not move tells nothing, and loops ask for attitude and thrust.
+    # What does not move shows nothing, and loops ask for attitude and thrust.
     for others in ({"position": still}, {"attitude": position, "thrust": position[:, :1]}):
         assert instruments([replace(flight, setpoints=others)]).kind == "none"
     found = instruments([replace(flight, setpoints={"sticks": position}), _flown(2)])

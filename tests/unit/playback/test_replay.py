@@ -1,4 +1,4 @@
-"""Playback beside integration by another library, baselines beside their formulas, windows beside their stretches."""
+"""Playback compared with another library, baselines with their formulas, windows with their stretches."""
 
 from dataclasses import replace
 
@@ -176,7 +176,7 @@ def test_rates_fade_as_fast_as_those_of_the_flights_that_train():
     assert fading([fades], 20) == pytest.approx(0.13, rel=0.01)
     stays = replace(flight, motion=flight.motion._replace(rate=np.ones((200, 3))))
     assert fading([stays], 20) == pytest.approx(100 * 20 * 0.01)
-    # A stretch that is shorter than the horizon tells what it can.
+    # A stretch that is shorter than the horizon shows what it can.
     short = replace(fades, stretches=(slice(0, 5), slice(100, 104)))
     assert fading([short], 20) == pytest.approx(0.13, rel=0.01)
 

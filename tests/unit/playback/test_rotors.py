@@ -1,4 +1,4 @@
-"""What acts at the samples beside what acts over the steps between them."""
+"""What acts at the samples next to what acts over the steps between them."""
 
 import numpy as np
 import pytest

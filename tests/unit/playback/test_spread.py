@@ -117,7 +117,7 @@ def test_few_vehicles_are_drawn_where_many_draws_are_impossible():
         assert len(spread_of(found_record(loop=([0.5, 0.5, 0.3], [2, 2, 4]), relative=0.3), 2, seed).models) == 2
 
 
-def test_one_block_tells_no_interval():
+def test_one_block_shows_no_interval():
     with pytest.raises(InputError, match="too short to show how sure its numbers are"):
         spread_of(found_record(blocks=1))
 

@@ -63,7 +63,7 @@ def searched(flights):
     return chosen(flights, lambda judged, total: result.append((judged, total))), result
 
 
-def test_a_search_tells_how_far_it_is(searched):
+def test_a_search_shows_how_far_it_is(searched):
     choice, result = searched
     assert choice.complete
     assert [len(judged) for judged, _ in result] == list(range(1, choice.evaluated + 1))

@@ -1,4 +1,4 @@
-"""Constants that no config states: where their fit begins, and what tells the scale."""
+"""Constants that no config states: where their fit begins, and what shows the scale."""
 
 from dataclasses import replace
 
@@ -58,8 +58,8 @@ def without_velocity(flights, accelerometer):
     return changed
 
 
-def test_an_accelerometer_tells_thrust_where_velocity_is_not_known():
-    # Without velocity nothing tells what the air does to a moving rotor, so this vehicle knows damping alone.
+def test_an_accelerometer_shows_thrust_where_velocity_is_not_known():
+    # Without velocity nothing shows what the air does to a moving rotor, so this vehicle knows damping alone.
     flights = flown(replace(TRUE, effects=TRUE.effects[:1]), noise=MIDDLING, seed=2, hold="linear")
     vehicle, by_name = found(without_velocity(flights, accelerometer=True))
     factor = by_name["thrust_factor"]
@@ -165,7 +165,7 @@ def test_flights_that_show_the_loop_determine_what_carries_the_weight_alone():
     numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in names]
     assert LOOP.shows_loop
     assert [number.name for number in widened_by_loop(numbers, LOOP) if number.determined] == ["thrust_factor"]
-    # A law found beside it carries a part of the weight, and answers with the loop as every effect.
+    # A law found next to it carries a part of the weight, and answers with the loop as every effect.
     numbers.append(FoundNumber("thrust_law.linear", "", -0.3, -0.4, -0.2, np.nan, True, False))
     assert not any(number.determined for number in widened_by_loop(numbers, LOOP))
 

@@ -341,7 +341,7 @@ def test_rounding_by_the_width(numbers, written):
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-8, 1e3), st.floats(0.05, 1))
-def test_ends_are_told_apart_and_right_to_a_tenth_of_the_width(value, width, share):
+def test_ends_are_distinguished_and_right_to_a_tenth_of_the_width(value, width, share):
     low, high = value - share * width, value + width
     _, first, last = (float(text) for text in with_interval(value, low, high))
     assert first < last

@@ -63,7 +63,7 @@ def checkpoint(tmp_path):
     return kept
 
 
-def test_it_lies_beside_the_output(checkpoint, tmp_path):
+def test_it_lies_next_to_the_output(checkpoint, tmp_path):
     assert checkpoint.path == tmp_path / "model.h5.checkpoint"
     assert checkpoint.output == tmp_path / "model.h5"
     checkpoint.remove()

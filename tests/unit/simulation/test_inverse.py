@@ -256,7 +256,7 @@ def test_thrust_carries_and_accelerates_the_mass():
     assert found.tilt.max() == 0.0
 
 
-def test_too_much_thrust_is_told_with_its_time():
+def test_too_much_thrust_is_said_with_its_time():
     # Climbs with 2 m/s^2 at 4 s; four rotors of 121.5e-6 N s^2 give 6 kg * (9.81 + 1) m/s^2 at 365.2 rad/s.
     vehicle = VehicleSettings(rotor_speed_max_rad_s=np.sqrt(6 * 10.81 / (4 * 121.5e-6)))
     found, trajectory = asked(vehicle)

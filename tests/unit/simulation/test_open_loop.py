@@ -242,7 +242,7 @@ def test_what_no_table_holds_is_simulated_by_itself_and_a_lag_behind_commands_st
     assert (held.response.lag_s, own.values("motor_lag")) == (0.0, {"time_constant_s": 0.05})
 
 
-def test_effects_that_hide_the_speeds_are_refused_beside_a_shift_of_them():
+def test_effects_that_hide_the_speeds_are_refused_next_to_a_shift_of_them():
     vehicle = VehicleSettings()
     name = CATALOGUE["channel_delay"].shapes[0].name
     late = VehicleModel(vehicle=vehicle, response=RotorResponse(lag_s=0.05), commanded=True)

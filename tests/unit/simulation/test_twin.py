@@ -175,14 +175,14 @@ def among(rng, larger=1.0):
     return in_gusts(walks[0], np.zeros_like(walks[0]), others, np.ones(6, dtype=bool), rng)
 
 
-def test_one_flight_of_twenty_that_is_like_the_others_is_told_not_to_be():
+def test_one_flight_of_twenty_that_is_like_the_others_is_said_not_to_be():
     rng = drawing(5)
     result = [bool(among(rng).beyond) for _ in range(400)]
     # 20 are expected; 4 deviations of a binomial on either side.
     assert 3 <= sum(result) <= 37
     larger = [among(rng, 20.0).beyond for _ in range(50)]
     assert all("roll" in beyond for beyond in larger)
-    # Its other channels are told no more often.
+    # Its other channels are said no more often.
     assert sum(len(beyond) > 1 for beyond in larger) <= 8
 
 

@@ -60,7 +60,7 @@ def test_what_a_file_of_rotorpy_states_besides_flies_too(tmp_path):
 
 
 def test_included_files_are_read_as_corrected(tmp_path):
-    """Files stand beside each other as they did, and the user's own are left alone."""
+    """Files stand next to each other as they did, and the user's own are left alone."""
     (tmp_path / "base").mkdir()
     base, parent = tmp_path / "base" / "model.sdf", tmp_path / "x" / "model.sdf"
     base.write_text(exported(sheet_of_vehicle(model()), "sdf", "v.sdf").text)

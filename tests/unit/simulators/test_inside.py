@@ -272,7 +272,7 @@ def both(of, held, texts, horizon_s=0.3):
 
 @pytest.mark.parametrize("ending", ["xml", "py"])
 def test_a_file_is_flown_as_given_and_as_corrected(tmp_path, held, ending, monkeypatch):
-    """With meshes that are beside the file and not beside its copy."""
+    """With meshes that are next to the file and not next to its copy."""
     require(ending)
     made = {
         "xml": lambda thrust: mjcf_of(TRUE, SPINS, thrust=thrust),

@@ -121,7 +121,7 @@ def test_a_plugin_without_a_number_has_its_own(tmp_path):
     assert "its own default" in ratio.where
 
 
-def test_an_include_beside_the_file_is_read(tmp_path):
+def test_an_include_next_to_the_file_is_read(tmp_path):
     text = sdf_of(LARGE)
     body, motors = text[: text.index("    <plugin")], text[text.index("    <plugin") : text.index("  </model>")]
     parts = text.split("    <plugin")[1:]

@@ -32,14 +32,14 @@ def of(folder, spins, logged, sure="stated", truth=LARGE):
     return of_log(read_model(path), proposal, None)
 
 
-def test_rotors_on_one_arm_are_told_apart_by_their_spin(tmp_path):
+def test_rotors_on_one_arm_are_distinguished_by_their_spin(tmp_path):
     logged = [(*place, spin) for spin in (1, -1) for place in X]
     vehicle = of(tmp_path, (-1, 1) * 4, logged, truth=Coaxial(*LARGE))
     assert vehicle.order == (1, 3, 5, 7, 0, 2, 4, 6)
     assert (vehicle.warnings, vehicle.turned) == ((), ())
 
 
-def test_rotors_that_nothing_tells_apart_are_said(tmp_path):
+def test_rotors_that_nothing_separates_are_said(tmp_path):
     logged = [(*place, 1) for place in X for _ in range(2)]
     vehicle = of(tmp_path, (1,) * 8, logged, truth=Coaxial(*LARGE))
     assert (

@@ -192,7 +192,7 @@ def test_all_axes_begin_and_end_together_within_their_limits(moves):
     assert any(move.active for move in moves)
 
 
-def test_an_axis_that_stays_is_told(moves):
+def test_an_axis_that_stays_is_said(moves):
     assert [move.outcome for move in moves].index(MoveOutcome.ZERO_DISPLACEMENT) == 2
     assert moves[2].profile.duration == 0.0
 

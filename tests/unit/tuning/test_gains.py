@@ -83,7 +83,7 @@ def test_no_proposal_leaves_the_documented_range():
     assert (inside.value, inside.clipped) == (4.57, False)
 
 
-def test_a_line_in_the_noise_is_found_beside_its_floor():
+def test_a_line_in_the_noise_is_found_next_to_its_floor():
     time = np.arange(0, 20, 1 / 500)
     rng = np.random.default_rng(1)
     rate = 0.02 * rng.standard_normal((len(time), 3)) + 0.05 * np.sin(2 * np.pi * 118.0 * time)[:, None]

@@ -152,7 +152,7 @@ def test_rounding_is_no_difference(ours, theirs):
     assert (found.ratio, found.lower, found.higher) == (1.0, False, False)
 
 
-def test_errors_beside_rounding_are_higher():
+def test_errors_next_to_rounding_are_higher():
     found = compare_errors(np.full(MOST_COMPARED, 1e-3), np.full(MOST_COMPARED, 1e-30), 1.0)
     assert (found.ratio, found.higher) == (np.inf, True)
 
@@ -276,7 +276,7 @@ def test_put_back_nothing_is_missing():
     np.testing.assert_allclose(with_constant(predicted, CONSTANT)(data.motion), data.torque, atol=1e-12)
 
 
-def test_a_vertical_pitch_throughout_tells_nothing():
+def test_a_vertical_pitch_throughout_shows_nothing():
     np.testing.assert_array_equal(mean_missing_torque(pushed_flight()[::9], predicted), np.zeros(3))
 
 

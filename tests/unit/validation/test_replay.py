@@ -73,7 +73,7 @@ def test_no_window_at_a_vertical_pitch():
 
 
 @pytest.mark.parametrize("inertia", [[0.6, -0.8, 1.2, 0, 0, 0], [0.6, 0.8, 0.0, 0, 0, 0], [0.6, 0.8, 1.2, 0.9, 0, 0]])
-def test_a_body_that_is_none_is_told_and_does_not_spoil_the_others(inertia):
+def test_a_body_that_is_none_is_said_and_does_not_spoil_the_others(inertia):
     data = rotating_flight()
     found = replay_steps("x", data, {"none": np.array(inertia), "body": INERTIA}, 10, 20)
     np.testing.assert_array_equal(found.lost, np.repeat([[20], [0], [0]], 10, axis=1))

@@ -127,7 +127,7 @@ def test_errors_never_fall_below_those_of_unit_noise():
 
 
 @pytest.mark.parametrize("known", [0.0, 0.3])
-def test_columns_beside_a_base_are_judged_as_one_fit_of_both(known):
+def test_columns_next_to_a_base_are_judged_as_one_fit_of_both(known):
     columns, right, block = problem(7, draws=3)
     # Nearly what the base is, nothing at all, seen in one block only.
     columns[..., 3] = columns[..., 0] + 1e-4 * columns[..., 3]
@@ -155,7 +155,7 @@ def test_draws_are_right_sides_of_their_own():
 
 @pytest.mark.parametrize("weight", [np.ones(6), np.array([1.0, 2.0, 0.5, 1.0, 1.0, 3.0])])
 @pytest.mark.parametrize("order", [np.arange(WINDOWS), np.arange(WINDOWS)[::-1] * 7 % WINDOWS])
-def test_a_subtracted_column_is_gone_from_the_right_side_and_channels_weigh_what_they_are_told(weight, order):
+def test_a_subtracted_column_is_gone_from_the_right_side_and_channels_weigh_what_they_are_given(weight, order):
     columns, right, block = problem(4, draws=3)
     columns[..., 1] *= 1e-3
     # Of blocks whose windows stand one after another, and of others.
