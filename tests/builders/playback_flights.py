@@ -181,7 +181,7 @@ def _flown_once(model, stated, plan, period, hold):
 
 
 class Plan(NamedTuple):
-    """What an autopilot is asked for: shape (time, flight, 3), or (time, flight) for heading and share of position held."""
+    """What an autopilot is asked for, shape (time, flight, 3), or (time, flight): heading, share of position held."""
 
     position: np.ndarray
     velocity: np.ndarray
