@@ -1,6 +1,7 @@
 """Rotors that pull or drag differently from what the model says."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -52,7 +53,8 @@ def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
         less, more = ("less", "more") if own < 0 else ("more", "less")
         mirrored = "".join(f", or M{other + 1} as much {more}" for other in alike)
         sentences += [f"M{rotor + 1} pulls {abs(100 * own):.2g} % {less} than modelled{mirrored}."] if own else []
-    return " ".join(sentences if len(off) == 4 else (f"If one rotor alone differs: {each}" for each in sentences))
+    pairs = len(off) == 4 and len(opposite_pairs(vehicle)) == 2
+    return " ".join(sentences if pairs else (f"If one rotor alone differs: {each}" for each in sentences))
 
 
 def _accounts(_number: str, values: Mapping[str, float]) -> float:
@@ -70,7 +72,7 @@ def _acts(see: Instant, p: Numbers) -> Wrench:
     return Wrench((0, 0, yaw), (0, 0, lift), at_hubs=(0, 0, gain * see.rotor_thrust))
 
 
-EFFECT = Effect(
+_EFFECT = Effect(
     name="rotor_mismatch",
     order=200,
     title="rotors that differ",
@@ -84,9 +86,10 @@ EFFECT = Effect(
             "1",
             -0.5,
             0.5,
-            "share of thrust that the first rotor of the first opposite pair pulls more than the other",
+            "share of thrust that the first rotor of the first opposite pair pulls more than the other; of other"
+            " vehicles than quadrotors, growth along x",
         ),
-        Coefficient("difference_2", "1", -0.5, 0.5, "the same of the second opposite pair"),
+        Coefficient("difference_2", "1", -0.5, 0.5, "the same of the second opposite pair, or along y"),
         Coefficient(
             "drag_imbalance", "1", -0.5, 0.5, "clockwise rotors drag this much more than modelled, the others less"
         ),
@@ -97,14 +100,6 @@ EFFECT = Effect(
             0.25,
             "counter-clockwise rotors pull this much more, the others less; force only",
         ),
-        Coefficient(
-            "difference_3",
-            "1",
-            -0.5,
-            0.5,
-            "from six rotors on, where the first two are growth along x and y: growth along x with the spin",
-        ),
-        Coefficient("difference_4", "1", -0.5, 0.5, "the same along y"),
     ),
     needs=frozenset({"rotor_speed"}),
     excitation="yaw effort to both sides, and changes of thrust",
@@ -117,4 +112,18 @@ EFFECT = Effect(
     describe=_describe,
     accounts=_accounts,
     acts=_acts,
+)
+
+# One weak rotor of many is a sum of four patterns; the first two show that rotors differ.
+EFFECT = replace(
+    _EFFECT,
+    exact=replace(
+        _EFFECT,
+        coefficients=(
+            *_EFFECT.coefficients,
+            Coefficient("difference_3", "1", -0.5, 0.5, "from six rotors on, growth along x with the spin"),
+            Coefficient("difference_4", "1", -0.5, 0.5, "the same along y"),
+        ),
+        columns=None,
+    ),
 )
