@@ -349,13 +349,11 @@ def _held(signs: Signs, active: BoolArray) -> str:
 
 
 def _before_hits(signs: Signs, active: BoolArray) -> BoolArray:
-    """Mark what feels its thrust or falls, of the parts between hits: what stands or lies since has flown before."""
+    """Mark what feels its thrust, of the parts between hits: what stands or lies since a hit has flown before."""
     flies = np.zeros_like(active)
     if signs.felt is None or signs.level is None:
         return flies
-    size = np.linalg.norm(signs.felt, axis=1)
-    falls = averaged(size, signs.period, _TURN_S) < _FALLS
-    hits = (size > HARD) | falls
+    hits = np.linalg.norm(signs.felt, axis=1) > HARD
     if not hits.any():
         return flies
     step = max(1, round(SLOW_S / signs.period))
@@ -369,8 +367,7 @@ def _before_hits(signs: Signs, active: BoolArray) -> BoolArray:
         both, power = float(works @ feels), float(works @ works)
         alike = both / np.sqrt(power * float(feels @ feels) + 1e-12)
         share = _UNFELT * float(thrust @ thrust) / float(squares[first:after].mean())
-        free = falls[after : after + 2 * step].any() or (alike > _AS_HELD and both > share * power)
-        flies[max(0, first - step) : after + step] = free
+        flies[max(0, first - step) : after + step] = alike > _AS_HELD and both > share * power
     return smoothed(flies & active, signs.period, _SHORT_S)
 
 

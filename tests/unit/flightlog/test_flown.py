@@ -269,19 +269,6 @@ def test_a_sensor_off_the_centre_of_what_vibrates_shows_no_test_stand(held):
     assert ("as on a test stand" in "".join(flown.reasons)) == held
 
 
-def test_what_falls_has_flown_before_however_calmly():
-    """A hover whose thrust hardly changes, a fall of 0.3 s, and rotors at more that push the ground."""
-    rng = np.random.default_rng(4)
-    falls = (TIME >= 25) & (TIME < 25.3)
-    rotors = np.repeat((between(2, 25.3, 0.42) + between(25.3, 31, 0.68))[:, None], 4, axis=1)
-    rate = 0.1 * rng.standard_normal((len(TIME), 3)) + turning(2, 31, 0.1)[:, None]
-    force = np.column_stack([0 * TIME, 0 * TIME, np.where(falls, 0.02, 1.0) + 0.03 * rng.standard_normal(len(TIME))])
-    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=force))
-    assert flown.stretches_s == ((pytest.approx(2.5, abs=0.3), pytest.approx(25.0, abs=0.7)),)
-    held = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=np.where(falls[:, None], force[:1], force)))
-    assert held.reasons == ("no flight in it: what it feels does not grow with its thrust, as on a test stand",)
-
-
 def test_what_is_cut_is_said_of_what_does_not_fly():
     flown = flown_by(between(5, 14, 0.5) + between(20, 35, 0.5), None, turning(5, 14) + turning(20, 35))
     assert [reason.split(":")[0] for reason in flown.reasons] == [
