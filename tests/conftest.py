@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 
 from cpfls_cli import store
+from cpfls_cli.changes import judge, trend
 from cpfls_cli.files import state_of
 from tests.builders import command_line, compiled_loops
 
@@ -61,8 +62,9 @@ def read_once():
 def spare():
     """Leave pictures away, but where a test looks at them; draw chance for a rate of 0.005; read a file once."""
     with command_line.undrawn(), pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr("cpfls_cli.changes.trend._DRAWS", 300)
-        monkeypatch.setattr("cpfls_cli.changes.judge._DRAWS", 600)
+        for module, most in ((trend, 300), (judge, 600)):
+            # Fewer of what is too little for its own tests stay so.
+            monkeypatch.setattr(module, "_DRAWS", min(most, module._DRAWS))
         monkeypatch.setattr(store, "examine", read_once())
         yield
 

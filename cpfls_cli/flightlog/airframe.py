@@ -31,8 +31,8 @@ _CORNERS: Final = {
     "rear left": (-1.0, 1.0),
 }
 _ENDS: Final = {"front": (1.0, 0.0), "right": (0.0, -1.0), "rear": (-1.0, 0.0), "left": (0.0, 1.0)}
-# What the parameters CA_ROTOR* of PX4 are unless changed: of some versions a log has only those that are.
-_PX4_USUAL: Final = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "KM": 0.05}
+# What CA_ROTOR*_KM of PX4 is unless changed: of some versions a log has only those that are.
+_PX4_KM: Final = 0.05
 _ROUNDED = 1e-9  # Below which a place along an axis is 0.
 _TURNS = ("roll", "pitch", "yaw")
 _LEAST_EXPLAINED = 0.05  # Share of the acceleration about one axis that chance does not explain.
@@ -112,8 +112,12 @@ def _of_px4(parameters: Parameters) -> Airframe | None:
     if not lifting or "CA_ROTOR0_PX" not in parameters:
         return None
     rotors, ratios = [], []
-    for index in lifting:
-        x, y, z, ratio = (float(parameters.get(f"CA_ROTOR{index}_{name}", usual)) for name, usual in _PX4_USUAL.items())
+    moments = [float(parameters.get(f"CA_ROTOR{index}_KM", _PX4_KM)) for index in lifting]
+    if sum(map(np.sign, moments)):
+        # As many turn either way: a moment that is absent is not the usual one, and its spin is not known.
+        moments = [float(parameters.get(f"CA_ROTOR{index}_KM", 0.0)) for index in lifting]
+    for index, ratio in zip(lifting, moments, strict=True):
+        x, y, z = (float(parameters.get(f"CA_ROTOR{index}_P{axis}", 0.0)) for axis in "XYZ")
         # Of PX4: y to the right, z down, and a positive moment for a rotor that turns counter-clockwise.
         rotors.append(RotorPlace(_name(x, -y), (x, 0.0 - y), int(np.sign(ratio)), 0.0 - z))
         ratios.append(abs(ratio))

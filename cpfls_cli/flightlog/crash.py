@@ -336,12 +336,16 @@ def _before(signs: Signs, part: tuple[int, int]) -> slice:
 
 
 def _recovers(signs: Signs, part: tuple[int, int]) -> bool:
-    """Tell whether a vehicle still flies where the log ends, and turns and leans there as it did before."""
+    """Tell whether a vehicle still flies where the log ends, and turns and leans there as it did before.
+
+    What turns less than nearly ever before lies on the ground.
+    """
     if part[1] < len(signs.time) or signs.turning is None or signs.upright is None:
         return False
-    before, end = _before(signs, part), slice(part[1] - round(_FALL_S / signs.period), None)
-    up = _turned_up(signs.upright, before)
-    return bool(signs.turning[end].max() <= signs.turning[before].max() and up[end].min() >= up[before].min())
+    before, end = _before(signs, part), slice(part[1] - max(1, round(_FALL_S / signs.period)), None)
+    up, turns, most = _turned_up(signs.upright, before), signs.turning[before], float(signs.turning[end].max())
+    moves = most >= LIVELY_RAD_S and most >= np.quantile(turns, 0.01)
+    return bool(moves and most <= turns.max() and up[end].min() >= up[before].min())
 
 
 def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> tuple[BoolArray, BoolArray, BoolArray]:

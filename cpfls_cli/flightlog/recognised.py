@@ -60,11 +60,14 @@ class LogTable:
         if not named.keys() >= {"position", "velocity"}:
             return
         (time, places), (_, speeds) = self.values(named["position"]), self.values(named["velocity"])
-        if len(time) < _FEWEST_SAMPLES or not speeds.std() > 0:
+        if min(len(time), len(speeds)) < _FEWEST_SAMPLES or not speeds.std() > 0:
             return
-        times = np.gradient(places, time, axis=0).std() / speeds.std() * _TIME_UNITS[self.time_unit]
-        # Units are a thousand apart, and derivatives of positions noisy.
-        unit = next((own for own, factor in _TIME_UNITS.items() if 0.1 < times / factor < 10), self.time_unit)
+        stated = _TIME_UNITS[self.time_unit]
+        times = np.gradient(places, time, axis=0).std() / speeds.std() * stated
+        step, (least, most) = float(np.median(np.diff(time))) / stated, _STEPS_S
+        # Units are a thousand apart, and derivatives of positions noisy: steps have to be those of a log as well.
+        fitting = (own for own, by in _TIME_UNITS.items() if 0.1 < times / by < 10 and least <= step * by <= most)
+        unit = next(fitting, self.time_unit)
         if unit != self.time_unit:
             self.time_doubt += f": so it is taken to be in {unit}, in which positions change as velocities say"
             self.time_unit = unit

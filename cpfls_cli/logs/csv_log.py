@@ -87,7 +87,7 @@ _Rows = Iterator[tuple[int, list[str]]]
 
 
 class _Table(NamedTuple):
-    """A CSV that is open: column names, the first row that is not empty, all rows with the lines on which they end."""
+    """A CSV that is open: column names, the first row that is not empty, all rows with the lines on which they begin."""
 
     names: list[str]
     first: list[str]
@@ -189,12 +189,15 @@ def _delimiter(line: str) -> str:
 
 
 def _rows(lines: Iterator[str], delimiter: str, before: int = 0) -> _Rows:
-    """Give each row with the line on which it ends, after so many lines."""
+    """Give each row with the line on which it begins, after so many lines."""
     if delimiter == " ":
-        return enumerate(map(str.split, lines), start=before + 1)
-    reader = csv.reader(lines, delimiter=delimiter)
-    # A field in quotes may go over several lines.
-    return ((before + reader.line_num, row) for row in reader)
+        yield from enumerate(map(str.split, lines), start=before + 1)
+        return
+    reader, begins = csv.reader(lines, delimiter=delimiter), before + 1
+    for row in reader:
+        yield begins, row
+        # A field in quotes may go over several lines.
+        begins = before + reader.line_num + 1
 
 
 def _fields(line: str) -> list[str]:
@@ -213,7 +216,7 @@ def _refuse_inflated(path: Path) -> None:
 
 
 def row_lines(path: Path) -> list[int]:
-    """List the line number, from 1, on which each row of values in a CSV ends; empty lines hold none."""
+    """List the line number, from 1, on which each row of values in a CSV begins; empty lines hold none."""
     with _opened(path) as table:
         return [number for number, row in table.rows if row]
 

@@ -102,12 +102,6 @@ def tells_sizes(found):
 
 
 def in_what_is_left(recordings):
-    found = air_in(recordings)
-    assert found is not None
-    return found
-
-
-def air_in(recordings):
     windows, model = common_windows(recordings, FEW), plain(None)
     hypothesis = model.system([weak_flight(each, windows, None, force=True) for each in recordings])
     block = block_index(hypothesis, FEW)
@@ -297,7 +291,7 @@ def test_where_instruments_know_too_little_what_was_before_shows(flown, monkeypa
     assert found.found.instrument_kind == "past"
     assert found.gusts_only.all()
     monkeypatch.setattr("cpfls_cli.gap.residual.air._WITNESSES", {"none": ("repeats",)})
-    assert air_in(recordings) is None
+    assert diagnosed(recordings).air is None
 
 
 def test_an_axis_that_other_runs_do_not_size_is_said_by_what_was_before(flown, monkeypatch):

@@ -78,6 +78,10 @@ def test_moments_of_px4_that_a_log_leaves_out_are_the_usual_ones():
     changed = {name: value for name, value in parameters.items() if not (name.endswith("_KM") and value > 0)}
     assert len(changed) == len(parameters) - 2
     assert stated_airframe(changed) == stated_airframe(parameters)
+    # Without that of one that turns clockwise as many would not turn either way: its spin is not known.
+    (one, *_) = (name for name, value in parameters.items() if name.endswith("_KM") and value < 0)
+    found = stated_airframe({name: value for name, value in parameters.items() if name != one})
+    assert sorted(rotor.spin for rotor in found.rotors) == [-1, 0, 1, 1]
 
 
 def test_an_arm_scales_what_is_stated():

@@ -178,6 +178,10 @@ def test_a_push_before_the_end_of_a_log_that_is_flown_out_of_is_no_loss_of_contr
     pushed.rate[turn, 0] += 12.0 * np.sin(phase)
     pushed.angles[turn, 0] += 12.0 * 0.4 / (2 * np.pi) * (1 - np.cos(phase))
     assert flown(pushed, ("height", "upright")).ended == ""
+    # What does not move at all has come down.
+    lies = type(own)(**vars(pushed))
+    lies.rate = np.where((own.time > begin + 0.6)[:, None], 0.0, pushed.rate)
+    assert flown(lies, ("height", "upright")).ended.startswith("loss of control at ")
     still = own.time < begin + 0.35
     for name in ("time", "rate", "angles", "position", "specific_force", "speed"):
         setattr(pushed, name, getattr(pushed, name)[still])

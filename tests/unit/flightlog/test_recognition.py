@@ -383,6 +383,19 @@ def test_stamps_in_another_unit_than_their_name_says_are_read_by_the_motion(own,
         seen(log)
 
 
+@pytest.mark.parametrize("scale", [("x", 1e3), ("vx", 1e3)], ids=["positions in mm", "velocities in mm/s"])
+def test_stamps_that_are_what_they_say_stay_so_whatever_unit_places_have(own, scale):
+    """A clock of 1 kHz in ms counts rows."""
+    name, factor = scale
+    time = np.arange(20000.0)
+    known = {each: np.interp(time / 1000.0, own.time, value) for each, value in flat_log(own).topics[""].items()}
+    known |= {axis: factor * known[axis] for axis in (name, name.replace("x", "y"), name.replace("x", "z"))}
+    log = flat_log(own)
+    log.topics[""] = {each: value for each, value in known.items() if each not in ("t", "time", "time_s")}
+    log.topics[""] = {"time[ms]": time} | log.topics[""]
+    assert seen(log).time_unit == "ms"
+
+
 def test_a_date_is_a_clock_whatever_its_name(own):
     log = flat_log(own, t=None)
     log.topics[""]["Date"], log.units["Date"] = own.time + 1.7e9, "s"

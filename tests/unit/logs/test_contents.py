@@ -156,7 +156,7 @@ def test_no_format_hides_another():
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.CSV.GZ", "b/a.parquet", "a.b.ULG", "a.BIN", "a.mat"])
-def test_a_log_is_said_by_its_name(name):
+def test_a_log_is_known_by_its_name(name):
     assert is_log(Path(name))
 
 
@@ -166,7 +166,7 @@ def test_other_names_are_no_logs(name):
 
 
 @pytest.mark.parametrize("first", [b"\xbc\x02\x00", b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n"])
-def test_binary_logs_are_said_by_their_first_bytes_whatever_their_name(tmp_path, first):
+def test_binary_logs_are_known_by_their_first_bytes_whatever_their_name(tmp_path, first):
     for name in ("log00", "LOG.TXT", "log.tar.gz", "study.h5", "log.ulg", "log.csv"):
         (tmp_path / name).write_bytes(first)
         assert is_log(tmp_path / name)
@@ -377,8 +377,8 @@ def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
 
 def test_lines_are_counted_past_fields_of_several_lines(tmp_path: Path) -> None:
     path = _written(tmp_path / "log.csv", 'time,p,q\n0,1,"[1\n2]"\n1,2,"[3\n4]"\n2,x,"[5\n6]"\n')
-    assert row_lines(path) == [3, 5, 7]
-    with pytest.raises(InputError, match=r"log\.csv:7: column 'p' = 'x': not a number"):
+    assert row_lines(path) == [2, 4, 6]
+    with pytest.raises(InputError, match=r"log\.csv:6: column 'p' = 'x': not a number"):
         contents(path, {"time", "p"})
 
 
