@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.consistency.channels import channel_warnings, filter_warnings
 from cpfls_cli.consistency.findings import AuditFinding, Finding, contradictions, doubts
 from cpfls_cli.consistency.gyroscope import GyroFit
+from cpfls_cli.consistency.majority import taken_off
 from cpfls_cli.consistency.motion import against_lean
 from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.consistency.rotors import (
@@ -186,6 +187,11 @@ class Audit:
         for repair in self.repairs:
             signals = repair.applied(signals)
         return signals
+
+    def with_offsets(self, flights: Sequence[Signals], windows: Windows) -> "Audit":
+        """Take off the constant offsets of other flights too: they are of each flight."""
+        more = taken_off([self.consistent(each) for each in flights], windows)
+        return replace(self, repairs=(*self.repairs, *more)) if more else self
 
     def repaired(self, signals: Signals) -> Signals:
         """Make the channels consistent and remove the named faults from the sensors.

@@ -121,22 +121,34 @@ def settled(flights: Sequence[Signals], windows: Windows) -> Settled:
             break
         repairs = (*repairs, *found)
         now = _Compared.of(now.repaired(*found), windows)
-    found = tuple(_taken_off(offset) for offset in offsets(now.checks, now.flights, windows))
+    found = taken_off(now.flights, windows, now.checks)
     checks = checked(now.repaired(*found), windows) if found else now.checks
     return Settled((*repairs, *found), checks, dropped=dropped)
 
 
-def _taken_off(found: Offset) -> ChannelRepair:
+def taken_off(
+    flights: Sequence[Signals], windows: Windows, checks: Sequence[PairCheck] | None = None
+) -> tuple[ChannelRepair, ...]:
+    """Take constant offsets off channels, where the checks of flights that are consistent else show some."""
+    found = offsets(checked(flights, windows) if checks is None else checks, flights, windows)
+    return tuple(map(_without, found))
+
+
+def _without(found: Offset) -> ChannelRepair:
     unit, along = ("m/s" if found.pair.first == "position" else "m/s^2"), f"along {'body ' if found.in_body else ''}"
-    words = joined(f"{size:+.2f} {unit} {along}{AXES[i]}" for i, size in found.sizes.items())
+    words = joined(
+        f"{' to '.join(dict.fromkeys(f'{size:+.2f}' for size in ends))} {unit} {along}{AXES[i]}"
+        for i, ends in found.sizes.items()
+    )
     of = "" if len(found.flights) == len(found.names) else f" in {joined(found.flights)}"
     channel, witness = CHANNELS[found.pair.second], CHANNELS[found.pair.first].words
-    what = f"the {channel.words} has a constant offset of {words}{of}, judged by the {witness}"
+    doubt = " (or that drifts)" if found.pair.first == "position" else ""
+    what = f"the {channel.words} has a constant offset of {words}{of}, judged by the {witness}{doubt}"
     finding = Finding(what, f"check {channel.keys}", found.pair.channels, contradiction=False, repairable=True)
     repair = ChannelRepair(
         found.pair.second, offset="".join(AXES[i] for i in found.sizes), offset_in_body=found.in_body
     )
-    return repair.with_finding(finding, f"In each flight it is taken off by the {witness}")
+    return repair.with_finding(finding, f"In each flight with {witness} it is taken off by that")
 
 
 def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:

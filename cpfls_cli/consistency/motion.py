@@ -181,16 +181,15 @@ class Offset(NamedTuple):
     names: Sequence[str]
 
     @property
-    def sizes(self) -> dict[int, float]:
-        """The largest along each axis that has one."""
-        return {i: largest(self.values[own, i].tolist(), abs) for i, own in enumerate(self.sure.T) if own.any()}
+    def sizes(self) -> dict[int, tuple[float, float]]:
+        """The smallest and the largest along each axis that has one."""
+        own = {i: self.values[sure, i] for i, sure in enumerate(self.sure.T) if sure.any()}
+        return {i: (float(values.min()), float(values.max())) for i, values in own.items()}
 
     @property
     def flights(self) -> list[str]:
         """Names of the flights that have one."""
-        least = {i: _APART * abs(size) for i, size in self.sizes.items()}
-        known = zip(self.names, self.values, strict=True)
-        return [name for name, own in known if any(abs(own[i]) > size for i, size in least.items())]
+        return [name for name, sure in zip(self.names, self.sure.any(axis=1).tolist(), strict=True) if sure]
 
 
 class _Constant(NamedTuple):
@@ -357,9 +356,8 @@ def offsets(checks: Sequence[PairCheck], flights: Sequence[Signals], windows: Wi
 
     `checks`: of these flights.
     """
-    long = [each for each in flights if len(each) * each.period >= ENOUGH_BLOCKS * block_length(0.0)]
-    if any(each.attitude is None for each in long):
-        return
+    least = ENOUGH_BLOCKS * block_length(0.0)
+    long = [each for each in flights if each.attitude is not None and len(each) * each.period >= least]
     for check in checks:
         pair, wrong = check.pair, any(each.contradiction for each in check.problems)
         known = [each for each in long if _row(pair, each, windows) is not None]
@@ -389,13 +387,18 @@ def _constants(pair: Pair, signals: Signals, windows: Windows) -> dict[bool, _Co
     # What is compared holds no error of the channel, which would explain itself.
     scale = np.einsum("ij,wk->wijk", np.eye(3), first - first.mean(axis=0)).reshape(len(first), 3, 9)
     columns = np.concatenate([scale, slope[:, :, None], lever, *frames.values()], axis=2)
-    blocks, halves = (folds(columns, second - first, contiguous(len(first), n)) for n in (ENOUGH_BLOCKS, 2))
+    parts = contiguous(len(first), ENOUGH_BLOCKS)
+    blocks, halves = (folds(columns, second - first, own) for own in (parts, contiguous(len(first), 2)))
     found = {}
     for body, last in zip(frames, range(columns.shape[2] - 3 * len(frames), columns.shape[2], 3), strict=True):
         chosen = np.r_[:13, last : last + 3]
         value, left = blocks.fit(chosen)
         without, halved = (each.solve(chosen)[0][:, -3:, 0] for each in (blocks, halves))
-        found[body] = _Constant(value[-3:, 0], serial_error(without), halved, first.mean(axis=0), float(left.sum()))
+        apart = np.einsum("wji,wj->wi", frames[body], second - first)
+        means = np.array([apart[parts != number].mean(axis=0) for number in range(ENOUGH_BLOCKS)])
+        # Scales explain away what noise of a position moves, and with it how far the mean of that scatters.
+        error = np.hypot(serial_error(without), serial_error(means))
+        found[body] = _Constant(value[-3:, 0], error, halved, first.mean(axis=0), float(left.sum()))
     return found
 
 

@@ -17,6 +17,8 @@ UP = np.array([0.0, 0.0, 1.0])
 _SAME = 1e-6
 """Share of an acceleration up to which it is the one made of the accelerometer: the import computes it as here."""
 
+_LEAST_S = 1.0  # Of a part whose mean shows an offset.
+
 _SCALED = 0.1
 """Logarithm of a change of volume from which a matrix changes the unit; axes that are turned leave it at 0."""
 
@@ -84,7 +86,8 @@ class ChannelRepair:
     def _offset(self, values: Array, signals: Signals) -> Array:
         """Compute the mean error of a velocity or an acceleration along the axes of the offset, in those of values."""
         integral = signals.position if self.channel == "velocity" else signals.velocity
-        if integral is None or signals.attitude is None:
+        # Of a shorter part the mean is that of noise.
+        if integral is None or signals.attitude is None or len(signals) * signals.period < _LEAST_S:
             return np.zeros(3)
         derivative = np.gradient(integral, signals.period, axis=0)
         to_body = signals.rotation.swapaxes(1, 2)

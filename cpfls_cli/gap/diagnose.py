@@ -108,7 +108,7 @@ def diagnose(
     """
     progress(0.0, "sensor audit")
     windows = common_windows([*training, *held], settings)
-    audited = audit(training, windows, whole)
+    audited = audit(training, windows, whole).with_offsets(held, windows)
     prepared = Preparation(windows, model, settings, audited)
     flights = _Flights(prepared.repaired(training), prepared.logged(held), prepared.repaired(held))
     named = _named(flights, settings, rng, progress)

@@ -87,7 +87,7 @@ _Rows = Iterator[tuple[int, list[str]]]
 
 
 class _Table(NamedTuple):
-    """A CSV that is open: column names, the first row that is not empty, all rows with the lines on which they begin."""
+    """A CSV that is open: column names, the first row that is not empty, all rows with the lines they begin on."""
 
     names: list[str]
     first: list[str]

@@ -202,15 +202,25 @@ class _Corrections:
         found = [self.of.model.rotors[index] for index in self.of.order]
         return [_turned_round(rotor) if place in self.turned else rotor for place, rotor in enumerate(found)]
 
-    def replace(self, name: str, stated: Stated, found: _Found, words: str, whom: str, room: Node | None) -> None:
-        """Put a number in the place of the stated one, where that is outside the interval."""
+    def replace(
+        self,
+        name: str,
+        stated: Stated,
+        found: _Found,
+        words: str,
+        whom: str,
+        room: Node | None,
+        *,
+        whatever: bool = False,
+    ) -> None:
+        """Put a number in the place of the stated one, where that is outside the interval, or whatever it is."""
         new, low, high = (stated.written(each) for each in found)
         low, high, name = min(low, high), max(low, high), stated.name or name
         before, text = stated.written(stated.value), f"{new:z.4g}"
         if stated.power < 0 and stated.value:
             # What the number is the reciprocal of is the other way round.
             words = words.replace("{share}", _share(found.value / stated.value))
-        if not found.contradicts(stated.value, self.wider):
+        if not (whatever or found.contradicts(stated.value, self.wider)):
             word = f"is as near as chance leaves one of {self.numbers} numbers: the flights have"
             word = word if found.contradicts(stated.value) else "agrees with the flights,"
             self._keep(f"{name} {before:.4g} {word} {text} [{low:.4g}, {high:.4g}]")
@@ -269,13 +279,16 @@ class _Corrections:
     def of_rotors(self, kind: str, found: Sequence[_Found], words: str, common: Sequence[_Found] = ()) -> bool:
         """Correct a number of each rotor; False where the file does not state it.
 
-        Where one number stands for rotors that differ it becomes what is common to them.
+        Where one number stands for rotors that differ it becomes what is common to them. Of a pattern over more than
+        four rotors each is a part: all are corrected, or none.
         """
         name = _TAGS[self.of.model.format].get(kind)
         held: list[Stated] = [own for rotor in self.rotors if (own := getattr(rotor, kind)) is not None]
         if name is None or not held or len(held) < len(self.rotors):
             return False
         wanted = [f"{own.written(each.value):.4g}" for own, each in zip(held, found, strict=True)]
+        off = [each.contradicts(own.value, self.wider) for own, each in zip(held, found, strict=True)]
+        pattern = len(held) > 4 and len(set(wanted)) > 1 and any(off)
         for index, own in enumerate(held):
             alike = [other for other, each in enumerate(held) if own.span is not None and each.span == own.span]
             new = found[index]
@@ -285,7 +298,8 @@ class _Corrections:
                 if not common or not common[index].contradicts(own.value, self.wider):
                     continue
                 new = common[index]
-            self.replace(name, own, new, words, f"M{index + 1}", self.rotors[index].node)
+            part = pattern and wanted[index] != f"{own.written(own.value):.4g}"
+            self.replace(name, own, new, words, f"M{index + 1}", self.rotors[index].node, whatever=part)
         return True
 
 
@@ -484,7 +498,8 @@ def _of_rotors(made: _Corrections, numbers: Mapping[str, Estimate]) -> None:
     lifting = [_sum(*own, _part(lifts, spin)) for own, spin in zip(patterns, spins, strict=True)]
     differ = "difference_1" in numbers
     if "thrust_scale" in numbers or differ:
-        words = "thrust of {whom} is {share}" + ("; flights show the difference of opposite rotors" if differ else "")
+        shown = "the difference of opposite rotors" if modes.shape[1] == 2 else "what rotors have not in common"
+        words = "thrust of {whom} is {share}" + (f"; flights show {shown}" if differ else "")
         _as_found(made, "thrust", [scale.with_factor(each) for each in lifting], words, scale)
         _largest_thrust(made, scale)
     by_inertia, why = _in_place_of_inertia(made, numbers, scale)

@@ -116,7 +116,7 @@ WRONG = {
     "velocity of another north": (of_velocity(lambda _, v: v @ turned(30).T), "The velocity is rotated by"),
     "velocity late": (of_velocity(lambda _, v: late(v, 0.1)), "The velocity is late by"),
     "velocity in km/h": (of_velocity(lambda _, v: 3.6 * v), "The velocity is in km/h"),
-    "velocity with an offset": (of_velocity(lambda _, v: v - 0.3 * NORTH), "of -0.30 m/s along y, judged by"),
+    "velocity with an offset": (of_velocity(lambda _, v: v - 0.3 * NORTH), "m/s along y, judged by"),
     "velocity with one in the body": (
         of_velocity(lambda s, v: v + 0.3 * s.rotation[:, :, 0]),
         "m/s along body x, judged by",
@@ -209,6 +209,29 @@ def test_an_offset_of_one_flight_is_taken_off_that_one_alone(flights):
     assert "offset of +0.30 m/s along x in first, judged by the position" in found.settled[0]
     for given, true in ((wrong, first), (other, other)):
         assert np.abs((found.repaired(given).velocity - true.velocity).mean(axis=0)).max() < 0.01
+
+
+def test_an_offset_of_a_flight_that_is_held_out_is_taken_off_it(flights):
+    first, other = flights
+    wrong = replace(other, velocity=other.velocity - 0.5 * NORTH, name="held out")
+    found = audit([first], WINDOWS).with_offsets([wrong], WINDOWS)
+    assert "offset of -0.50 m/s along y, judged by the position" in found.settled[-1]
+    assert np.abs((found.repaired(wrong).velocity - other.velocity).mean(axis=0)).max() < 0.01
+
+
+def test_what_offsets_differ_by_is_said(flights):
+    wrong = [replace(s, velocity=s.velocity + size * EAST) for s, size in zip(flights, (0.3, -0.7), strict=True)]
+    (said,) = audit(wrong, WINDOWS).settled
+    assert "offset of -0.7" in said
+    assert " to +0.30 m/s along x, judged by" in said
+
+
+def test_noise_of_the_position_is_no_offset_of_the_velocity(flights):
+    rng = np.random.default_rng(5)
+    for _ in range(6):
+        noise = rng.normal(size=(len(flights[0]), 3))
+        noisy = [replace(s, position=s.position + 0.5 * noise) for s in flights]
+        assert not any(each.offset for each in audit(noisy, WINDOWS).repairs)
 
 
 def test_the_noise_of_its_last_sample_is_no_change_of_a_velocity(flights):

@@ -13,9 +13,10 @@ from cpfls_cli.simulators.corrected import corrected
 from cpfls_cli.simulators.formats import read_model
 from cpfls_cli.simulators.model import SimulatorModel
 from cpfls_cli.simulators.study import of_log
+from cpfls_cli.vehicle.rotors import gain_modes
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gap_artifacts import named_effect
-from tests.builders.gusty_flights import SMALL
+from tests.builders.gusty_flights import SMALL, Truth
 from tests.builders.simulator_files import FRAME, SECTION, rotorpy_of, sdf_of, urdf_of
 
 URDF = """<robot name="cf2">
@@ -218,6 +219,32 @@ def test_rotors_that_differ_have_the_pattern_that_was_found(mine):
     ]
     wanted = np.array([1.05, 1.0, 0.95, 1.0]) * SMALL.thrust_factor
     np.testing.assert_allclose([rotor.thrust.value for rotor in new.rotors], wanted, rtol=1e-3)
+
+
+class Six(Truth):
+    @property
+    def places(self):
+        angles = np.pi / 3 * np.arange(6)
+        return self.arm * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def test_of_a_pattern_over_six_rotors_all_are_corrected(tmp_path):
+    """Of M3 alone, as its interval asks for, the torque would be another."""
+    path, loss = tmp_path / "six.sdf", np.array([0.0, 0.0, -0.06, 0.0, 0.0, 0.0])
+    path.write_text(sdf_of(Six(*SMALL), spins=(1, -1) * 3))
+    rotors = of_log(read_model(path), None, None).rotors
+    settings = (RotorSettings(position_m=tuple(each.position_m), spin=each.spin) for each in rotors)
+    modes = gain_modes(VehicleSettings(rotors=tuple(settings)))
+    shown = np.linalg.pinv(modes) @ loss
+    found = effect("rotor_mismatch", **{f"difference_{n}": (value, 0.02) for n, value in enumerate(shown, 1)})
+    said, new = correct(path, found)
+    assert [each.sentence.partition(";")[0] for each in said.changes] == [
+        "thrust of M1 and M5 is 2 % more",
+        "thrust of M3 is 4 % less",
+    ]
+    wanted = (1 + modes @ shown) * SMALL.thrust_factor
+    np.testing.assert_allclose([rotor.thrust.value for rotor in new.rotors], wanted, rtol=1e-3)
+    assert not correct(path, effect("rotor_mismatch", difference_1=(0.01, 0.02)))[0].changes
 
 
 def test_one_weak_rotor_with_what_the_force_shows(mine):
