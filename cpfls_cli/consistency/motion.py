@@ -189,7 +189,7 @@ class Offset(NamedTuple):
     @property
     def flights(self) -> list[str]:
         """Names of the flights that have one."""
-        return [name for name, sure in zip(self.names, self.sure.any(axis=1).tolist(), strict=True) if sure]
+        return [name for name, sure in zip(self.names, self.sure, strict=True) if np.any(sure)]
 
 
 class _Constant(NamedTuple):
