@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -121,6 +121,7 @@ class Effect:
     rivals: Mapping[str, str]  # Effects that look alike, each with the flight that separates them.
     source: str
     coefficients: tuple[Coefficient, ...] = ()  # Physical, as reported; those of `shapes` not among them.
+    optional: int = 0  # How many of the last of these a list or a file may leave out: they are 0.
     shapes: tuple[Shape, ...] = ()
     # ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of wrench.
     # Left out, it follows from `acts`; None for what only the audit of the sensors can see.
@@ -201,7 +202,10 @@ class Effect:
         """Check by the fitted parameters whether it is this effect or what took its place."""
         other = self.exact or self
         names = {shape.name for shape in other.shapes}
-        return other if (len(other.coefficients), names) == (coefficients, {*shapes}) else self
+        if (len(other.coefficients), names) == (coefficients, {*shapes}):
+            return other
+        fewer = 0 < len(self.coefficients) - coefficients <= self.optional
+        return replace(self, coefficients=self.coefficients[:coefficients], columns=None) if fewer else self
 
     @property
     def numbers(self) -> tuple[Coefficient | Shape, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
+from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -101,9 +102,15 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
 
 
 @lru_cache(maxsize=256)
+def _of_vehicle(block: str, vehicle: VehicleSettings) -> Effect:
+    """Give an effect with the numbers that act on a vehicle: what may be left out is of six rotors and more."""
+    known = CATALOGUE[block]
+    return known if len(vehicle.rotors) >= 6 else known.form(len(known.coefficients) - known.optional, ())
+
+
 def unit_wrenches(block: str, vehicle: VehicleSettings) -> Array:
     """Evaluate what a unit of each coefficient of an effect does at some motions, shape (coefficient, motion, 6)."""
-    known, rotors = CATALOGUE[block], len(vehicle.rotors)
+    known, rotors = _of_vehicle(block, vehicle), len(vehicle.rotors)
     rng = np.random.default_rng(0)
     speed = rng.uniform(500.0, 1500.0, (_MOTIONS, rotors))
     signals = Signals(
@@ -215,7 +222,7 @@ class FreeNumbers:
         if block in LEARNED:
             return self._remainder_numbers(block)
         numbers = []
-        for each in CATALOGUE[block].coefficients:
+        for each in _of_vehicle(block, vehicle).coefficients:
             scale, (low, high) = 1.0 if each.scale is None else each.scale(vehicle), each.bounds(vehicle)
             numbers.append(Number(f"{block}.{each.name}", each.unit, 0.0, scale, ROOM * low, ROOM * high, 1.0))
         return tuple(numbers)

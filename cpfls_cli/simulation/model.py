@@ -296,9 +296,9 @@ def _by_name(effect: Effect, given: Sequence[float] | Mapping[str, float]) -> di
     # What only a chosen effect has can be given by its name.
     every = [number.name for number in (effect.exact or effect).numbers]
     if not isinstance(given, Mapping):
-        if len(given) != len(names):
+        if not 0 <= len(names) - len(given) <= effect.optional:
             raise SettingError(_key(effect.name), f"takes {_wanted(effect)}; {len(given)} given")
-        given = dict(zip(names, given, strict=True))
+        given = dict(zip(names, given, strict=False))
     unknown = [name for name in given if name not in every]
     unset = [shape.name for shape in effect.shapes if shape.name not in given]
     if unknown or unset:

@@ -1,7 +1,6 @@
 """Rotors that pull or drag differently from what the model says."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -72,7 +71,7 @@ def _acts(see: Instant, p: Numbers) -> Wrench:
     return Wrench((0, 0, yaw), (0, 0, lift), at_hubs=(0, 0, gain * see.rotor_thrust))
 
 
-_EFFECT = Effect(
+EFFECT = Effect(
     name="rotor_mismatch",
     order=200,
     title="rotors that differ",
@@ -100,7 +99,11 @@ _EFFECT = Effect(
             0.25,
             "counter-clockwise rotors pull this much more, the others less; force only",
         ),
+        # One weak rotor of many is a sum of four patterns.
+        Coefficient("difference_3", "1", -0.5, 0.5, "from six rotors on, growth along x with the spin"),
+        Coefficient("difference_4", "1", -0.5, 0.5, "the same along y"),
     ),
+    optional=2,
     needs=frozenset({"rotor_speed"}),
     excitation="yaw effort to both sides, and changes of thrust",
     rivals={
@@ -112,18 +115,4 @@ _EFFECT = Effect(
     describe=_describe,
     accounts=_accounts,
     acts=_acts,
-)
-
-# One weak rotor of many is a sum of four patterns; the first two show that rotors differ.
-EFFECT = replace(
-    _EFFECT,
-    exact=replace(
-        _EFFECT,
-        coefficients=(
-            *_EFFECT.coefficients,
-            Coefficient("difference_3", "1", -0.5, 0.5, "from six rotors on, growth along x with the spin"),
-            Coefficient("difference_4", "1", -0.5, 0.5, "the same along y"),
-        ),
-        columns=None,
-    ),
 )

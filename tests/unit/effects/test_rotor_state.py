@@ -151,9 +151,19 @@ def circle(number):
 def test_columns_are_what_other_factors_do(columns, flight):
     true = with_gains(flight.vehicle, [0.05, -0.03, -0.05, 0.03], [-0.05, 0.07, -0.15, 0.13])
     change = body_wrench(true, flight.rotor_speed).body_torque - flight.torque
-    found = columns("rotor_mismatch", flight).direct @ [0.1, -0.06, 0.1, 0.0]
+    found = columns("rotor_mismatch", flight).direct @ [0.1, -0.06, 0.1, 0.0, 0.0, 0.0]
     np.testing.assert_allclose(found[:, :3], change, atol=1e-12)
     np.testing.assert_allclose(found[:, 5], body_wrench(true, flight.rotor_speed).thrust - flight.thrust, atol=1e-9)
+
+
+def test_four_numbers_are_those_of_a_quadrotor(flight):
+    """Of files and lists that know no others."""
+    own = CATALOGUE["rotor_mismatch"]
+    four = own.form(4, ())
+    assert four.coefficients == own.coefficients[:4]
+    np.testing.assert_array_equal(four.columns(flight, {}).direct, own.columns(flight, {}).direct[..., :4])
+    assert own.form(6, ()) is own
+    assert own.form(3, ()) is own
 
 
 def test_what_one_spin_lifts_more_shows_in_force_only(columns, flight):
@@ -204,7 +214,7 @@ def test_torque_of_one_weak_rotor_is_held_but_for_what_an_inertia_does(flight, c
     change = body_wrench(with_gains(craft, loss, loss), flown.rotor_speed).body_torque - flown.torque
     turned = np.stack([flown.torque @ np.diag(axis) for axis in np.eye(3)], axis=2)
     crossed = flown.torque[:, [1, 0, 2]] * [1.0, 1.0, 0.0]
-    own = CATALOGUE["rotor_mismatch"].exact.columns(flown, {}).direct[:, :3]
+    own = CATALOGUE["rotor_mismatch"].columns(flown, {}).direct[:, :3]
 
     def left(places):
         held = np.concatenate([own[..., places], turned, crossed[..., None]], axis=2).reshape(change.size, -1)
