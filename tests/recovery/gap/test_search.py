@@ -36,7 +36,7 @@ def names(chosen):
         ("linear_damping", [0.1, 0.1, 0.05]),
         ("products_of_inertia", [0.03, 0.0, 0.02]),
         ("rotor_drag", [1.5e-3]),
-        ("rotor_mismatch", [0.05, -0.03, 0.02, 0.0]),
+        ("rotor_mismatch", [0.05, -0.03, 0.02, 0.0, 0.0, 0.0]),
     ],
 )
 def test_forward_finds_one_effect_and_stops(name, coefficients):
