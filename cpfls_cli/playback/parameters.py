@@ -101,13 +101,13 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
 """Blocks that are the same for all vehicles."""
 
 
-@lru_cache(maxsize=256)
 def _of_vehicle(block: str, vehicle: VehicleSettings) -> Effect:
     """Give an effect with the numbers that act on a vehicle: what may be left out is of six rotors and more."""
     known = CATALOGUE[block]
     return known if len(vehicle.rotors) >= 6 else known.form(len(known.coefficients) - known.optional, ())
 
 
+@lru_cache(maxsize=256)
 def unit_wrenches(block: str, vehicle: VehicleSettings) -> Array:
     """Evaluate what a unit of each coefficient of an effect does at some motions, shape (coefficient, motion, 6)."""
     known, rotors = _of_vehicle(block, vehicle), len(vehicle.rotors)

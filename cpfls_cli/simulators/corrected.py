@@ -279,7 +279,7 @@ class _Corrections:
     def of_rotors(self, kind: str, found: Sequence[_Found], words: str, common: Sequence[_Found] = ()) -> bool:
         """Correct a number of each rotor; False where the file does not state it.
 
-        Where one number stands for rotors that differ it becomes what is common to them. Of a pattern over more than
+        A number that is that of rotors that differ becomes what is common to them. Of a pattern over more than
         four rotors each is a part: all are corrected, or none.
         """
         name = _TAGS[self.of.model.format].get(kind)
