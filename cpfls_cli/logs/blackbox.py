@@ -74,9 +74,11 @@ def _contents(content: bytes) -> LogContents:
     stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
     parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
     system, first = header.get("Firmware revision", ""), {"": 1e-6 * float(rows[0, 1])} if len(rows) else {}
-    if header.get("Firmware type") == "Cleanflight" and "setpoint[0]" in units and not system.startswith(_WRITERS):
-        # A fork under a name of its own: Betaflight calls itself so, and its kin alone log setpoints. By the comma its
-        # parameters are not taken for those of Betaflight (`Firmware.wrote`).
+    # Betaflight calls itself Cleanflight, and its kin alone have this parameter.
+    kin = header.get("Firmware type") == "Cleanflight" and "pid_process_denom" in header
+    if kin and re.match(r"\w+ \d+\.\d+", system) and not system.startswith(_WRITERS):
+        # A fork under a name of its own. By the comma its parameters are not taken for those of Betaflight
+        # (`Firmware.wrote`).
         system = f"Betaflight, as {system}"
     elif re.fullmatch(r"[0-9a-f]{7,}", system):
         # Before 2.1 Cleanflight wrote no version, but a commit.
@@ -161,7 +163,7 @@ def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str
     for name, (prefix, factor, unit) in ((name, each) for name in names for each in _scales(header)):
         if name.startswith(prefix):
             columns[name] = factor * columns[name]
-            units[name] = unit
+            units |= {name: unit} if unit else {}
     for name in [name for name in units if name.startswith("eRPM[")]:
         # The name would be a lie now.
         turned = f"rpm{name.removeprefix('eRPM')}"
@@ -175,14 +177,14 @@ def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str
 
 
 def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
-    """List beginnings of names, factors and units, as far as the header states them."""
+    """List beginnings of names, factors and units, as far as the header states them; sticks have none."""
     # Betaflight 2.8 to 3.0 write it with a dot.
     stated = header.get("gyro_scale", header.get("gyro.scale", "0x0"))
     (gyro,) = struct.unpack(">f", int(stated, 16).to_bytes(4, "big"))
     system = re.match(r"(\w+) (\d+)\.(\d+)", header.get("Firmware revision", ""))
     version = (system[1], (int(system[2]), int(system[3]))) if system else ("", (0, 0))
     finer = 10 if header.get("blackbox_high_resolution") == "1" else 1
-    scales = []
+    scales = [("rcCommand[", 1 / finer, "")]
     if gyro > 0:
         # Betaflight scales to deg/s, and to tenths of it where asked to, others to rad in a microsecond.
         scales += [("gyro", gyro / finer if gyro > 1e-5 else 1e6 * gyro * _DEGREES, "deg/s")]

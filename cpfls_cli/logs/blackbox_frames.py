@@ -19,7 +19,8 @@ _SIGNED, _UNSIGNED, _NEGATIVE, _EIGHT, _THREE, _FOUR, _NONE, _THREE_WIDE = 0, 1,
 ENCODINGS = (_SIGNED, _UNSIGNED, _NEGATIVE, _EIGHT, _THREE, _FOUR, _NONE, _THREE_WIDE)
 _INCREMENT = 6
 _TIME = 1
-_LONGEST_FRAME, _LONGEST_STEP_US = 256, 10_000_000
+_LONGEST_STEP_US = 10_000_000
+_LONGEST_EVENT = 16  # Bytes.
 _TOGETHER = 4096  # Rows that are made an array at a time.
 _END: Final = b"End of log"
 _LOG_END, _RESUMED, _ADJUSTED = 255, 14, 13
@@ -203,7 +204,7 @@ def decode(
     """
     length, width = len(content), max(map(len, fields.values()))
     # Beyond its end a frame that is cut is read as 0.
-    data = content + bytes(8 * width + _LONGEST_FRAME)
+    data = content + bytes(8 * width + _LONGEST_EVENT)
     # A kind that the header has no fields of is in no frame.
     readers = {ord(kind): reader(own, constants) for kind, own in fields.items() if own}
     main, between, slow, event_marker = map(ord, "IPSE")
@@ -224,7 +225,7 @@ def decode(
             end, row = readers[kind](data, place + 1, before, earlier)
         if event == _LOG_END:
             break
-        if not whole or end - place > _LONGEST_FRAME or end > length or (end < length and data[end] not in markers):
+        if not whole or end > length or (end < length and data[end] not in markers):
             # A cut end is no fault; what follows a fault is searched for the next frame.
             broken += in_step and not (kind in markers and end > length)
             in_step = False

@@ -20,6 +20,7 @@ from tests.builders.blackbox_logs import (
     flight,
     frames,
     header,
+    signed,
     three,
     unsigned,
 )
@@ -57,6 +58,18 @@ def test_every_encoding_and_prediction_comes_back(read, seed):
     assert contents.warnings == ()
 
 
+def test_frames_are_as_long_as_their_fields_are_many(read):
+    names = ",".join(["loopIteration", "time", *(f"debug[{number}]" for number in range(300))])
+    ways = {f"Field {kind} {what}": ",".join(["0"] * 302) for kind in "IP" for what in ("predictor", "encoding")}
+    signs = ",".join(["1"] * 302)
+    content = header(**{"Field I name": names, "Field I signed": signs, **ways})
+    for row in range(20):
+        content += b"I" + b"".join(signed(value) for value in (row, 1000 * row, *range(1000, 1300)))
+    contents = read(content + END)
+    assert contents.warnings == ()
+    np.testing.assert_allclose(contents.topics[""]["debug[299]"], np.full(20, 1299.0))
+
+
 def test_units_parameters_and_program(read):
     contents = read(header() + b"".join(frames(flight())))
     assert contents.units == {
@@ -84,6 +97,8 @@ def test_a_log_of_high_resolution_has_tenths(read):
     columns = read(renamed(content, axisI1="setpoint[1]")).topics[""]
     for name, place in (("gyroADC[0]", "gyroADC[0]"), ("setpoint[1]", "axisI[1]")):
         np.testing.assert_allclose(columns[name], 0.1 * rows[:, NAMES.index(place)])
+    # Sticks and throttle too.
+    np.testing.assert_allclose(columns["rcCommand[3]"], 0.1 * rows[:, NAMES.index("rcCommand[3]")])
     # What is no angular rate is as it was.
     np.testing.assert_allclose(columns["accSmooth[2]"], rows[:, NAMES.index("accSmooth[2]")] / 2048)
 
@@ -119,16 +134,17 @@ def test_older_and_other_programs_have_other_units(read):
 
 
 def test_a_fork_of_betaflight_under_a_name_of_its_own_is_its_kin(read):
-    names = {f"axisI{axis}": f"setpoint[{axis}]" for axis in range(3)}
-    content = header(**{"Firmware revision": "Otherflight 4.3.4 (norevision)"}) + b"".join(frames(flight()))
-    contents = read(renamed(content, **names))
-    assert contents.system == "Betaflight, as Otherflight 4.3.4 (norevision)"
-    assert contents.units["setpoint[0]"] == "deg/s"
-    assert read(content).system == "Otherflight 4.3.4 (norevision)"
-    assert not AUTOPILOTS["betaflight"].firmware.wrote(contents.system)
+    def written_by(revision, **more):
+        return read(header(**{"Firmware revision": revision, **more}) + b"".join(frames(flight())))
+
+    name = "Otherflight 4.3.4 (norevision)"
+    # A parameter that no other firmware has.
+    contents = written_by(name, pid_process_denom="4")
+    assert contents.system == f"Betaflight, as {name}"
+    assert written_by(name).system == name
     for unknown in ("", "Otherflight", "Other-Flight 4.3.4 (x)"):
-        content = header(**{"Firmware revision": unknown}) + b"".join(frames(flight()))
-        assert read(renamed(content, **names)).system == unknown
+        assert written_by(unknown, pid_process_denom="4").system == unknown
+    assert not AUTOPILOTS["betaflight"].firmware.wrote(contents.system)
 
 
 def test_a_firmware_that_states_a_commit_alone_is_called_by_its_type(read):
