@@ -48,6 +48,7 @@ with h5py.File(sys.argv[1], "r") as file:
 # Kind of a variable of a .mat that is compressed; what the probe of a file ends with that states too much.
 _COMPRESSED, _INFLATED = 15, 3
 _TIME_UNITS = ("s", "ms", "us", "ns")
+_OBJECTS = "holds objects or tables, which MATLAB alone reads: save their columns as vectors"
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -136,9 +137,13 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, Any, str]]:
     found: dict[str, Any] = {}
     with h5py.File(path, "r") as file:
         file.visititems(lambda name, own: found.update({name: own}) if isinstance(own, h5py.Dataset) else None)
-        for name, dataset in found.items():
-            # MATLAB keeps the insides of its cells and references below this name.
-            if not name.startswith("#refs#"):
+        # MATLAB keeps the insides of its cells, references and objects below such names.
+        own = {name: dataset for name, dataset in found.items() if not name.startswith(("#refs#", "#subsystem#"))}
+        objects = [name for name, dataset in own.items() if "MATLAB_object_decode" in dataset.attrs]
+        if objects and len(objects) == len(own):
+            raise InputError(f"{path}: {_OBJECTS}")
+        for name, dataset in own.items():
+            if name not in objects:
                 unit = dataset.attrs.get("units", dataset.attrs.get("unit", ""))
                 unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
                 yield name, dataset, unit if isinstance(unit, str) else ""
@@ -159,7 +164,7 @@ def _of_mat(path: Path) -> Iterator[tuple[str, Any, str]]:
         read = scipy.io.loadmat(str(path), simplify_cells=True)
     variables = {name: value for name, value in read.items() if not name.startswith("__")}
     if variables and all(isinstance(value, scipy.io.matlab.MatlabOpaque) for value in variables.values()):
-        raise InputError(f"{path}: holds objects or tables, which MATLAB alone reads: save their columns as vectors")
+        raise InputError(f"{path}: {_OBJECTS}")
     yield from within("", variables)
 
 

@@ -577,6 +577,19 @@ def test_a_table_of_matlab_with_a_vector_and_alone(tmp_path):
         log_contents(tmp_path / "log.mat")
 
 
+def test_an_object_of_matlab_in_hdf5_is_no_column(tmp_path):
+    with h5py.File(tmp_path / "log.mat", "w") as file:
+        # MATLAB leaves six numbers that point to where it keeps an object.
+        file.create_dataset("run", data=np.arange(6, dtype=np.uint32)[None]).attrs["MATLAB_object_decode"] = 3
+        file["#refs#/a"] = np.zeros((100, 3))
+        file["#subsystem#/MCOS"] = np.zeros((1, 5))
+    with pytest.raises(InputError, match=r"log\.mat: holds objects or tables, which MATLAB alone reads: save"):
+        log_contents(tmp_path / "log.mat")
+    with h5py.File(tmp_path / "log.mat", "a") as file:
+        file["gyro_x"] = np.arange(20.0)
+    assert list(log_contents(tmp_path / "log.mat").topics[""]) == ["gyro_x"]
+
+
 def test_an_artifact_of_this_program_is_no_log(tmp_path):
     hdf5(tmp_path / "flight.h5")
     with h5py.File(tmp_path / "flight.h5", "a") as file:
