@@ -169,6 +169,11 @@ def timeline(
     ]
     # What held before the log began is stamped before it.
     found = [replace(event, time_s=max(event.time_s, 0.0)) for event in found]
+    # Whoever disarms with the rotors on stops the log as it flies, or as it touches down.
+    last = next((event.time_s for event in found if event.kind == "end"), np.inf)
+    if stops := [event for event in found if event.text == "disarmed" and abs(event.time_s - last) < _AT_END_S]:
+        found = [event for event in found if event.kind != "end" and event not in stops]
+        found += [replace(event, text="disarmed as it flies or touches down") for event in stops]
     # On the ground a failsafe keeps it there.
     found = [
         replace(event, severity="note")

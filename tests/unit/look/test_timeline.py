@@ -202,6 +202,14 @@ def test_a_log_that_ends_in_the_air():
     assert not of(found, "landing")
 
 
+def test_who_disarms_with_the_rotors_on_may_touch_down():
+    armed = {"flightModeFlags": (OWN.time < OWN.time[-1] - 0.05).astype(float)}
+    found = events(logs.betaflight(OWN, more=armed))
+    assert [text for _, text in of(found, "armed")][-1:] == ["disarmed as it flies or touches down"]
+    assert not of(found, "end")
+    assert of(events(logs.betaflight(OWN)), "end")
+
+
 def test_what_is_logged_and_how_fast():
     contents = logs.px4(HOP, motors=10, outputs=2)
     # Every tenth sample of the output is lost.
