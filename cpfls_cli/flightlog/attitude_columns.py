@@ -175,6 +175,12 @@ def quaternion_readings(values: Array, named: bool, witnesses: Witnesses) -> Ite
         rotation = agreement.rotations_of(values[:, order], "xyzw" if scalar_last else "wxyz", inverse)
         back: Sign = (-1.0, -1.0, -1.0, 1.0) if scalar_last else (1.0, -1.0, -1.0, -1.0)
         yield witnesses.read(rotation, order, back if inverse else (1.0,) * 4, price + inverse, inverse, scalar_last)
+    if witnesses.known:
+        # An attitude in FRD and NED where the kind of log has the others in FLU, or the other way round.
+        for scalar_last in (False,) if named else (False, True):
+            turned: Sign = (1.0, -1.0, -1.0, 1.0) if scalar_last else (1.0, 1.0, -1.0, -1.0)
+            rotation = agreement.rotations_of(values * turned, "xyzw" if scalar_last else "wxyz")
+            yield witnesses.read(rotation, as_named, turned, 1, False, scalar_last)
 
 
 def permuted_quaternions(values: Array, witnesses: Witnesses, most: int) -> Iterator[Attitude]:
@@ -229,7 +235,9 @@ def _readings(attitude: Attitude, witnesses: Witnesses) -> Iterator[Reading]:
         turned = [(order, sign)] if rates is None else [(order, sign), (rates.order, rates.sign)]
         reversed_ = witnesses.sensed * up < 0
         price = attitude.price + sum(axes_price(*own) for own in turned) + reversed_ + (attitude.level < 0)
-        price += 2 * (witnesses.known is not None and witnesses.known != body)
+        # A gyroscope of a known kind of log is in its axes: what is otherwise is the attitude.
+        odd = body != witnesses.known or not (rates is None or (rates.order, rates.sign) == AS_NAMED)
+        price += 2 * (witnesses.known is not None and odd)
         columns = _changed(attitude.order, attitude.sign) + sum(_changed(*own) for own in turned) + 3 * reversed_
         yield Reading(attitude, body, rates, lean if share else None, order, sign, share, price, columns)
 
@@ -258,8 +266,10 @@ def read_attitude(seen: Seen) -> TakenReading | None:
         if euler is not None and euler.known and not named.known:
             break
         time, values = seen.log.values(named.group.columns)
-        if float(np.median(np.abs(np.linalg.norm(values, axis=1) - 1))) < 0.05:
-            verdict = read_quaternion(values, named.group.kind == "wxyz", _witnesses(seen, time))
+        lengths = np.linalg.norm(values, axis=1)
+        # Integers of some scale are a quaternion too where their length stays.
+        if (length := float(np.median(lengths))) > 0 and float(np.median(np.abs(lengths / length - 1))) < 0.05:
+            verdict = read_quaternion(values / length, named.group.kind == "wxyz", _witnesses(seen, time))
             _take_quaternion(seen, named, verdict)
             return verdict
     return None if euler is None else _read_euler(seen, euler)
@@ -357,7 +367,7 @@ def _take_quaternion(seen: Seen, named: Named, verdict: TakenReading) -> None:
     clear = best.explained > CLEAR
     data = f"its derivative explains {100 * best.explained:.0f} % of the gyroscope"
     turned = " when turned from world-to-body, as logged, to body-to-world" if own.inverse else ""
-    reason = f"of length 1; {called(named)}" + (f"; {data}{turned}" if clear else "")
+    reason = f"of one length; {called(named)}" + (f"; {data}{turned}" if clear else "")
     if own.order != (0, 1, 2, 3):
         held = ", ".join(named.group.columns[index] for index in own.order)
         reason += f"; judged by their values, {held} are w, x, y, z"

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog.agreement import (
     AS_NAMED,
     AxisFit,
@@ -21,6 +22,7 @@ from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 
 # Wind and clocks change a size by less than the first, and never from one unit of length to the next.
 _TOLERANCE, _TEN = 1.4, 10.0
+_FASTEST_M_S = 100.0  # Speed over a second that no multirotor flies.
 # Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
 _RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 # Rate beyond which no gyroscope reads, deg/s, and the counts that one deg/s is to those of 16 bits for 2000 deg/s.
@@ -171,6 +173,13 @@ def position_by_velocity(seen: Seen) -> None:
         )
 
 
+def length_unit(position: Array, rate_hz: float) -> UnitName:
+    """Give the unit of a position, shape (time, axis), whose name states none: m, or mm where no m could be flown."""
+    second = max(1, round(rate_hz))
+    speeds = np.linalg.norm(position[second:] - position[:-second], axis=1)
+    return "mm" if len(speeds) and float(np.quantile(speeds, 0.9)) > _FASTEST_M_S else "m"
+
+
 def take_places(seen: Seen, reading: Reading | None) -> None:
     """Take position and velocity in the axes in which the lean explains the motion, and the one derives the other."""
     position, velocity = seen.first("position"), seen.first("velocity")
@@ -202,6 +211,7 @@ def _take_place(
     stated, place, reason = named.unit, seen.guesses.get("position"), called(named)
     unit: UnitName = stated or units[0]
     sure: Sure = "named"
+    scale = 1.0
     rivals: tuple[Rival, ...] = ()
     relative = relative if relative is not None and relative.explained > CLEAR else None
     gain = float("nan") if tilt is None or tilt.lean is None else tilt.lean.gain
@@ -210,8 +220,9 @@ def _take_place(
     )
     if relative is not None and stated is None and place is not None:
         # What it is in follows from the position, whatever else is logged in other units.
-        small = known_unit(place.columns.unit).factor / relative.gain < 0.03
-        unit, sure = units[small], place.sure
+        size = known_unit(place.columns.unit).factor / relative.gain
+        unit, scale = min(((units[0], 1.0), (units[0], 0.01), (units[1], 1.0)), key=lambda own: _far(size, own))
+        sure = place.sure
     elif tilt is not None and stated is None:
         unit = units[gain > 100]
         sure = "data" if 1 / _TEN < gain / (1000 if gain > 100 else 1) < _TEN else "guess"
@@ -219,8 +230,10 @@ def _take_place(
     elif stated is None:
         spread = float(np.ptp(seen.grid(named), axis=0).max())
         sure = "data" if spread < 50 else "guess"
+        unit = units[named.signal == "position" and length_unit(seen.grid(named), seen.rate_hz) == "mm"]
         reason += f"; ranges over {spread:.3g}"
-        rivals = () if sure == "data" else (Rival(f"unit: {units[1]}", "no leaning attitude speaks against it"),)
+        other = units[unit == units[0]]
+        rivals = () if sure == "data" else (Rival(f"unit: {other}", "no leaning attitude speaks against it"),)
     else:
         reason += f", which is in {stated}"
         # The lean was held against the velocity only where there is no position.
@@ -241,8 +254,13 @@ def _take_place(
             order = tuple(relative.order[index] for index in order)
     if (order, sign) != AS_NAMED:
         reason += "; rotated into the axes of the attitude, as the tilt requires"
-    seen.take(named, unit, reason, sure, order=order, sign=sign, rivals=rivals)
+    seen.take(named, unit, reason, sure, scale, order, sign, rivals)
     seen.warn_of_mirrored(named, order, sign, "the rest of the log")
+
+
+def _far(size: float, way: tuple[UnitName, float]) -> float:
+    """Give how far the size of a unit is from that of a unit with its scale, as a logarithm."""
+    return float(abs(np.log(size / (known_unit(way[0]).factor * way[1]))))
 
 
 # The accelerometer.

@@ -167,8 +167,11 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
 
 
 def lists_all(system: str) -> bool:
-    """Tell whether all that drives rotors, and all that is asked for, stands in `KNOWN` for logs of a system."""
-    return any(is_of(system, known) for known in (PX4, *KIN))
+    """Tell whether all that drives rotors, and all that is asked for, stands in `KNOWN` for logs of a system.
+
+    A fork under a name of its own (``Betaflight, as NAME``) has columns of its own.
+    """
+    return ", as " not in system and any(is_of(system, known) for known in (PX4, *KIN))
 
 
 def is_of(system: str, known: str) -> bool:

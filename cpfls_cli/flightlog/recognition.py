@@ -27,7 +27,7 @@ from cpfls_cli.flightlog.stated_vehicle import Parameters, VehicleKind, forward_
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.rounding import largest
-from cpfls_cli.units import STANDARD_GRAVITY
+from cpfls_cli.units import STANDARD_GRAVITY, known_unit
 from cpfls_cli.words import joined, some
 
 _DEGREES = 180 / np.pi
@@ -165,7 +165,8 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
     height, rate, angles = values.get("position"), values.get("body_rate"), values.get("attitude")
     if height is not None:
         up = -1.0 if first["position"].frame == "NED" else 1.0
-        height = up * height[:, 2] / (1000 if first["position"].unit == "mm" else 1)
+        stated = first["position"].unit or motion_columns.length_unit(height, 1 / float(log.grid[1] - log.grid[0]))
+        height = up * known_unit(stated).factor * height[:, 2]
     if rate is not None:
         unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(rate), 0.99)) > _FASTEST_RAD_S
         rate = rate / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.builders.topic_logs import ardupilot, maps, proposed, topic
-from tests.builders.unknown_logs import flight, named
+from tests.builders.unknown_logs import FLIP, NED, flight, named, quaternion
 
 NAMES = ["front right", "rear left", "front left", "rear right"]
 
@@ -59,6 +60,25 @@ def test_a_blackbox_log_is_known_by_its_header(own):
         "front left",
     ]
     assert (proposal.time_column, proposal.time_unit) == ("time", "s")
+
+
+def test_a_fork_of_betaflight_may_have_its_attitude_in_other_axes_and_columns_of_its_own(own):
+    turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
+    columns = {
+        "time": own.time,
+        **named(np.degrees(own.rate), *(f"gyroADC[{axis}]" for axis in range(3))),
+        **named(own.specific_force / 9.80665, *(f"accSmooth[{axis}]" for axis in range(3))),
+        **named(own.speed[:, [3, 0, 1, 2]] * 1.9 + 48, *(f"motor[{motor}]" for motor in range(4))),
+        **named(own.speed[:, [3, 0, 1, 2]], *(f"omega[{motor}]" for motor in range(4))),
+        **named(quaternion(turned), *(f"quat[{part}]" for part in range(4))),
+    }
+    units = {"time": "s", **{f"gyroADC[{axis}]": "deg/s" for axis in range(3)}}
+    proposal = proposed({"": columns}, "Betaflight, as Otherflight 5.0.0", {"motorOutput": "48,1948"}, units)
+    found = maps(proposal)
+    assert found["body_rate"].sign is None
+    assert found["quaternion"].sign == (1.0, 1.0, -1.0, -1.0)
+    assert found["rotor_speed"].columns == tuple(f"omega[{motor}]" for motor in range(4))
+    assert next(rotor.name for rotor in proposal.airframe.rotors) == "rear right"
 
 
 def test_what_no_gyroscope_reads_in_degrees_is_in_its_counts(own):

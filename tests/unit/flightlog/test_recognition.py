@@ -113,6 +113,14 @@ def test_quaternions_of_either_order_and_direction_are_distinguished(own, order,
     assert recognition.choice("quaternion_order") == order
 
 
+def test_integers_whose_length_stays_are_a_quaternion(own):
+    attitude = named(np.round(8127 * quaternion(own.rotation)), "quat[0]", "quat[1]", "quat[2]", "quat[3]")
+    recognition = seen(flat_log(own, attitude=attitude))
+    assert recognition.signal("quaternion").columns.columns == ("quat[0]", "quat[1]", "quat[2]", "quat[3]")
+    assert recognition.choice("quaternion_order") == "wxyz"
+    assert recognition.signal("body_rate").columns.sign is None
+
+
 def test_a_gyroscope_with_other_axes_does_not_hide_the_order_of_a_quaternion(own):
     attitude = named(quaternion(own.rotation, "xyzw"), "q0", "q1", "q2", "q3")
     rate = named(np.degrees(own.rate[:, [1, 2, 0]] * [1, -1, 1]), *GYRO)
@@ -212,6 +220,22 @@ def test_of_two_positions_that_fit_the_velocity_the_first_by_name_is_taken(own):
     recognition = seen(flat_log(own, position=both))
     assert recognition.signal("position").columns.columns == PLACE
     assert recognition.left_out == ("mocap_x, mocap_y, mocap_z: also position by name; not used",)
+
+
+@pytest.mark.parametrize(("times", "unit", "scale"), [(1000, "mm/s", 1.0), (100, "m/s", 0.01), (1, "m/s", 1.0)])
+def test_a_velocity_is_in_the_unit_that_the_position_makes_it(own, times, unit, scale):
+    log = flat_log(own, position=named(1000 * own.position, *PLACE), velocity=named(times * own.velocity, *SPEED))
+    found = assert_the_flight_comes_back(log, own).signal("velocity").columns
+    assert (found.unit, found.scale) == (unit, scale)
+
+
+def test_no_fall_is_faster_than_a_multirotor_flies(own):
+    # Without an attitude nothing but its speed shows the unit of a position.
+    sinks = own.position - [0.0, 0.0, 2.0] * np.maximum(own.time - 10.0, 0.0)[:, None]
+    log = flat_log(own, position=named(1000 * sinks, *PLACE), velocity={}, attitude={})
+    recognition = seen(log)
+    assert recognition.signal("position").columns.unit == "mm"
+    assert not recognition.flown.moments
 
 
 def test_lengths_in_millimetres_are_said_by_what_the_lean_does(own):
