@@ -315,6 +315,9 @@ def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, 
     are rotors. Without an attitude nothing is found.
     """
     names, step = _of_matrix(columns), float(np.median(np.diff(time))) if len(time) > 2 else 1.0
+    if not step > 0:
+        # Stamps of parameters, all written at once, are no clock.
+        return ()
     every = max(1, round(1 / (_RATE_HZ * step)))
     table = np.column_stack([np.asarray(columns[name], dtype=float)[::every] for name in names]) if names else None
     if table is None or not np.isfinite(table).all():

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.attitude_columns import Reading
 from cpfls_cli.flightlog.conversion import to_program_frames
-from cpfls_cli.flightlog.names import nameless_clock
+from cpfls_cli.flightlog.names import nameless_clock, nameless_signals
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.units import known_unit
@@ -485,6 +485,10 @@ def test_a_flight_that_is_never_near_hover_shows_what_carries_it():
     columns = seen(flat_log(flight(seconds=20.0, push=15.0))).signal("acceleration")
     assert (columns.columns.unit, columns.columns.sign) == ("m/s^2", None)
     assert "times gravity, as it moves" in columns.reason
+
+
+def test_a_matrix_that_is_written_at_one_instant_has_no_signals():
+    assert nameless_signals({f"data[{column}]": np.arange(100.0) for column in range(12)}, np.zeros(100)) == ()
 
 
 def test_columns_of_something_else_are_refused_by_name():
