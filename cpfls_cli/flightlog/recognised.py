@@ -294,6 +294,7 @@ class Recognition:
     signals: tuple[Guess, ...]
     choices: tuple[KeyChoice, ...]  # Frames, the order of a quaternion, what a command is.
     left_out: tuple[str, ...]  # Sentences on columns that look like a signal and are not mapped.
+    unfollowed: tuple[SignalName, ...]  # Setpoints that are logged by name, and that the motion does not follow.
     flown: FlownPart
     rate_hz: float  # Of the clock.
     slowest_s: float  # Longest median step of a topic that is mapped, s; and without that of the voltage.
@@ -336,6 +337,7 @@ class Seen:
     guesses: dict[SignalName, Guess] = field(default_factory=dict)
     choices: dict[str, KeyChoice] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
+    unfollowed: list[SignalName] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
     @property

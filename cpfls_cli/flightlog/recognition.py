@@ -351,6 +351,7 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         signals=(*signals, *asked),
         choices=tuple(seen.choices.values()),
         left_out=tuple(seen.left_out),
+        unfollowed=tuple(seen.unfollowed),
         flown=flown,
         rate_hz=rates[base.signal],
         slowest_s=max(1 / rates[guess.signal] for guess in signals),

@@ -66,8 +66,9 @@ def take_setpoints(seen: Seen, parameters: Parameters, system: str) -> None:
         if taken:
             # The first that is sure; what a controller is given stands before what it makes of it.
             seen.guesses[name] = min(taken, key=lambda guess: guess.sure == "guess")
-        else:
+        elif judged:
             seen.left_out += [own for own in judged if isinstance(own, str)]
+            seen.unfollowed.append(name)
 
 
 def _of_known_logs(log: LogTable, parameters: Parameters, system: str) -> Iterator[_Candidate]:

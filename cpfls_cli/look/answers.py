@@ -223,6 +223,8 @@ def _loops(found: Found) -> tuple[str, str, str, str]:
     if known:
         return "yes" if len(known) == len(AXES) else "roughly", joined(known), "", ""
     if not np.isfinite(found.flight.rate_setpoint).any():
+        if found.flight.unfollowed:
+            return "no", "the body rate does not follow what is called a rate setpoint", "", found.sticks
         return "no", "rate setpoints are not logged", "also rate setpoints", ""
     if found.loop_hz < _SLOWEST_HZ:
         return (

@@ -58,6 +58,8 @@ class LogFlight:
     command_source : str
         How it is known: logged, or rebuilt from what.
     rate_setpoint : array, shape (time, 3), rad/s
+    unfollowed : bool
+        Whether rate setpoints are logged by name that the body rate does not follow; they are left out.
     stick : array, shape (time, 3)
         Of the pilot, -1 to 1, positive as the body rate.
     attitude_setpoint : array, shape (time, 3), rad
@@ -112,6 +114,7 @@ class LogFlight:
     command: Array
     command_source: str = ""
     rate_setpoint: Array
+    unfollowed: bool = False
     stick: Array
     attitude_setpoint: Array
     attitude: Array

@@ -124,7 +124,7 @@ def _rows(flight: LogFlight, log: LookedLog, recognition: Recognition) -> list[S
     for what, samples, asked in named:
         if samples is not None and what not in rows and len(samples.time) > 1:
             rows[what] = _row(flight, what, samples, asked)
-    asked = bool(np.isfinite(flight.rate_setpoint).any())
+    asked = flight.unfollowed or bool(np.isfinite(flight.rate_setpoint).any())
     for what in (rotors, *(() if asked else ("setpoint body rate",))):
         lacks = SignalRow(signal=what, source="", rate_hz=0.0, lost=0.0, longest_gap_s=0.0, asked_hz=_RATE_HZ)
         rows.setdefault(what, lacks)

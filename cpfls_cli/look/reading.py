@@ -105,8 +105,7 @@ class _Reader:
 
     def flight(self) -> LogFlight:
         """Gather all signals on one clock."""
-        gyroscope = self._gyroscope()
-        rate = self._rate(gyroscope)
+        rate = self._rate(gyroscope := self._gyroscope())
         speeds, commands = self.signal("rotor_speed"), self.signal("rotor_command")
         guess = self.recognition.signal("rotor_command")
         asks_speeds = guess is not None and guess.columns.unit in SPEED_UNITS
@@ -141,6 +140,7 @@ class _Reader:
             command=command,
             command_source=driving.source,
             rate_setpoint=on_clock(setpoint, clock, 3, cubic=True),
+            unfollowed="setpoint_body_rate" in self.recognition.unfollowed,
             stick=on_clock(sticks, clock, 3),
             attitude_setpoint=on_clock(asked, clock, 3),
             attitude=on_clock(attitude, clock, 3),

@@ -16,7 +16,7 @@ from tests.builders import looked_logs as logs
 from tests.builders.dataflash_logs import dataflash
 from tests.builders.look_flights import still_flight
 from tests.builders.ulogs import message, ulog
-from tests.builders.unknown_logs import flight, with_ground
+from tests.builders.unknown_logs import flight, named, with_ground
 
 OWN = flight(seconds=20.0)
 HOP = with_ground(flight(seconds=20.0))
@@ -234,6 +234,16 @@ def test_what_is_logged_and_how_fast():
     assert rows["setpoint body rate"].source == ""
     assert "SDLOG_PROFILE" in logged.faster
     assert logged.warnings == "one\ntwo"
+
+
+def test_rate_setpoints_that_nothing_follows_are_logged():
+    asked = np.random.default_rng(4).standard_normal(OWN.rate.shape)
+    contents = logs.WRITERS[""](OWN)
+    contents.topics[""].update(named(asked, "p_sp", "q_sp", "r_sp"))
+    found, recognition = read(contents)
+    assert found.unfollowed
+    log = LookedLog(contents.topics, contents.units, contents.system)
+    assert "setpoint body rate" not in {row.signal for row in what_is_logged(found, log, recognition, 0.0, ()).signals}
 
 
 def test_readers_give_messages(tmp_path):
