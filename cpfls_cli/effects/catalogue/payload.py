@@ -391,7 +391,7 @@ EFFECT = Effect(
             # A light damping lets it swing all flight long, and a few per cent make it one swing late.
             valley=0.02,
         ),
-        Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing", first=0.2),
+        Shape("damping_1_s", "1/s", (0.02, 0.2, 0.6), "damping of the swing", first=0.2),
         Shape(
             "depth_m",
             "m",
