@@ -230,8 +230,9 @@ def _start(signals: Signals, way: _Way) -> Array:
 
     Of the horizontal forces mass and start of the load explain what a constant push and a drag do not. Two periods
     separate the start from the driven swing; from there the search goes on over four times as much, up to the whole
-    flight, so that it never has to find its way among the swings of a load that has drifted apart. It ends where the
-    beginning contradicts: what rings late is no swing at the start.
+    flight, so that it never has to find its way among the swings of a load that has drifted apart. Where these show no
+    load, as in a gust against it, it begins with four times as much. It ends where the beginning contradicts: what
+    rings late is no swing at the start.
 
     Result: shape (4,); as `_Way.swing` takes it; at rest where nothing pulls like a load.
     """
@@ -242,16 +243,17 @@ def _start(signals: Signals, way: _Way) -> Array:
     tilt = signals.rotation[steps, :2, 2]
     needed = signals.vehicle.mass_kg * signals.acceleration[steps, :2] - signals.thrust[steps, None] * tilt
     balance = _Balance(way, needed, signals.velocity[steps, :2])
-    first = balance.up_to(_PERIODS)
-    start, periods = first.start(_AT_REST, _MOVES), _PERIODS
-    most = np.inf if start is None else _WORSE * first.left(start)
-    starts = [_AT_REST]
-    while start is not None and first.left(start) <= most:
-        starts.append(start)
-        if periods >= balance.periods:
+    starts, periods, first, most = [_AT_REST], _PERIODS, balance, np.inf
+    while periods < _LONGER * balance.periods:
+        part = balance.up_to(min(periods, balance.periods))
+        start = part.start(starts[-1], _MOVES if len(starts) == 1 else 1)
+        if start is not None and len(starts) == 1:
+            first, most = part, _WORSE * part.left(start)
+        if start is not None and first.left(start) <= most:
+            starts.append(start)
+        elif len(starts) > 1:
             break
         periods *= _LONGER
-        start = balance.up_to(periods).start(start, 1)
     return min(starts, key=balance.left) if len(starts) > 1 else _AT_REST
 
 
@@ -389,7 +391,7 @@ EFFECT = Effect(
             # A light damping lets it swing all flight long, and a few per cent make it one swing late.
             valley=0.02,
         ),
-        Shape("damping_1_s", "1/s", (0.05, 0.2, 0.6), "damping of the swing", first=0.2),
+        Shape("damping_1_s", "1/s", (0.02, 0.2, 0.6), "damping of the swing", first=0.2),
         Shape(
             "depth_m",
             "m",

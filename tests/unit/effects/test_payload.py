@@ -206,6 +206,17 @@ def test_in_gusts_all_of_a_flight_shows_the_start(flight):
     assert np.mean(found) < 0.02
 
 
+def test_a_gust_in_the_first_swings_does_not_hide_the_later_ones(flight):
+    """Over two periods it pushes against the load, which seems to weigh less than nothing."""
+    long = tumbling(flight.vehicle, np.arange(0.0, 40.0, 0.01))
+    start = (0.12, -0.15, 0.3, 0.2)
+    (level, cable), (bare, _) = (balanced(long, start, damping=0.05, load=load) for load in (0.6, 0.0))
+    early = (np.sqrt(9.81 / 1.5) * long.time < 2 * 2 * np.pi)[:, None]
+    blown = replace(level, attitude=level.attitude + early * 1.5 * (bare.attitude - level.attitude))
+    assert off(swing(level, 1.5, 0.05)[:, :2], cable) > 0.07
+    assert off(settled_swing(blown, 1.5, 0.05)[:, :2], cable) < 0.03
+
+
 @pytest.mark.parametrize("load", [1e-1, 1e-3, 1e-6, 1e-9])
 def test_a_start_that_would_throw_the_load_about_is_none(flight, load):
     """Of forces that a load all but massless would have to be started beyond all numbers for."""
