@@ -1,10 +1,12 @@
-"""A fit whose linear system holds for no step stands where it is, instead of creeping along."""
+"""Steps of the shapes of effects: none that is too far to be one, and none to where nothing is said."""
 
 from types import SimpleNamespace
 
 import numpy as np
 
 from cpfls_cli.gap.balance import refine
+from cpfls_cli.gap.balance.balance_system import System, system
+from tests.builders.gap_flights import candidate, fly, weak
 
 
 class Ridge:
@@ -42,3 +44,13 @@ def test_a_step_that_has_to_be_a_thousandth_is_none(monkeypatch):
     start = Ridge(0.0, 1e4, [])
     assert refine.refitted(start, np.ones((1, 1))) is start
     assert start.tried[0] == 1000.0
+
+
+def test_a_load_whose_mass_goes_as_it_is_fitted_keeps_its_hook(monkeypatch):
+    said = iter([[np.nan, np.nan, 0.1]])
+    monkeypatch.setattr(System, "following", lambda *_: np.array(next(said, [np.nan] * 3)))
+    flight = weak(fly(1, gyro=0.02, rotor=2.0))
+    start = system([flight], [candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.0)])
+    length, _, depth = refine.refitted(start, np.full(6, 1e-4)).shape_values
+    assert depth == 0.1
+    assert length != 0.52
