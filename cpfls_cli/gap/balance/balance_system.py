@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -116,9 +116,10 @@ class System:
     def with_shapes(self, values: Array) -> System:
         """Move the shapes of all chosen effects."""
         following = iter(values.tolist())
-        return system(
-            self.flights, [each.at({s.name: next(following) for s in each.effect.shapes}) for each in self.chosen]
-        )
+        chosen = tuple(each.at({s.name: next(following) for s in each.effect.shapes}) for each in self.chosen)
+        before, after = ([each.key for each in own if each.effect.apply] for own in (self.chosen, chosen))
+        # Where nothing that changes signals moves, all other columns are what they were.
+        return replace(self, chosen=chosen) if before == after else system(self.flights, chosen)
 
     def following(self, linear: Array) -> Array:
         """Give what coefficients, shape (column,), say of the shapes, within their bounds; NaN for nothing."""
