@@ -1,4 +1,4 @@
-"""Steps of the shapes of effects: none that is too far to be one, and none to where nothing is said."""
+"""Steps of the shapes of effects: none too far or to where nothing is said, and no work for what does not move."""
 
 from types import SimpleNamespace
 
@@ -54,3 +54,17 @@ def test_a_load_whose_mass_goes_as_it_is_fitted_keeps_its_hook(monkeypatch):
     length, _, depth = refine.refitted(start, np.full(6, 1e-4)).shape_values
     assert depth == 0.1
     assert length != 0.52
+
+
+def test_columns_are_evaluated_again_only_where_their_shape_or_the_signals_change():
+    load = candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.0)
+    start = system([weak(fly(1))], [candidate("drag_factor_error", error=0.1), candidate("linear_damping"), load])
+    error, length, *others = start.shape_values
+    damping, pull = (start.columns(each) for each in start.free[1:])
+    longer = start.with_shapes(np.array([error, 1.2 * length, *others]))
+    assert longer.columns(longer.free[1]) is damping
+    assert not np.array_equal(longer.columns(longer.free[2]), pull)
+    for moved in (longer, start.with_shapes(np.array([2 * error, length, *others]))):
+        alone = system(moved.flights, moved.chosen)
+        assert np.array_equal(moved.base, alone.base)
+        assert np.array_equal(moved.residual, alone.residual)
