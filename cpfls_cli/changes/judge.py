@@ -235,7 +235,8 @@ class _Space:
         self.listed, self.freedom = listed, freedom.tolist()
         self.root = np.linalg.cholesky(covariance)
         self.deviation = np.sqrt(np.diag(covariance))
-        self.numbers = [np.flatnonzero(np.array(kinds) == kind) for kind in dict.fromkeys(kinds)]
+        own = np.array([np.array(kinds) == kind for kind in dict.fromkeys(kinds)])
+        self.of_kind, self.numbers = own, list(map(np.flatnonzero, own))
         self.white = [self.whitened(cause.directions) for cause in listed]
         self.searched = [index for index, cause in enumerate(listed) if cause.searched]
         self.prior = np.log([cause.prior for cause in listed])
@@ -308,7 +309,7 @@ class _Space:
 
     def _parts(self, directions: Array) -> list[tuple[list[IntArray], IntArray]]:
         """Part the kinds into such that no direction moves together: the numbers of each kind, and the directions."""
-        moves = np.array([(directions[numbers] != 0.0).any(axis=0) for numbers in self.numbers])
+        moves = self.of_kind @ (directions != 0.0)
         # Directions of many sizes, and of many rows, move the same.
         key = moves.tobytes(), moves.shape[1]
         if key not in self._parted:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -466,7 +466,7 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     comes a period later. The length of the cable, m, comes with it.
     """
     # Slow to load, and who reads a record computes nothing.
-    from scipy.optimize import minimize
+    from scipy.optimize import least_squares
 
     vehicle = signals.vehicle
     own, inside = _windows(signals, flies, _SWING_S)
@@ -485,15 +485,16 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
         along = columns(signals, {"length_m": length, "damping_1_s": damping, "depth_m": 0.0}).direct[:, 3:, _MASS]
         return own.average(np.einsum("tij,tj->ti", signals.rotation, along)[:, :2])[inside]
 
-    def unexplained(place: Array) -> Any:
-        return -_pulled(left, drag, pull(*np.exp(place)))[1]
+    def unexplained(place: Array) -> Array:
+        size, y, x = _pulled(left, drag, pull(*np.exp(place)))
+        # What pushes is no load.
+        return y - max(size, 0.0) * x
 
-    start = min((np.log([length, _USUAL_DAMPING]) for length in _CABLES), key=unexplained)
-    possible = [_SHAPES[name].bounds(vehicle) for name in ("length_m", "damping_1_s")]
-    bounds = [(float(np.log(low)), float(np.log(high))) for low, high in possible]
-    found = minimize(
-        unexplained, start, method="Nelder-Mead", bounds=bounds, options={"xatol": 1e-3, "fatol": 0.0, "maxfev": 60}
+    start = min(
+        (np.log([length, _USUAL_DAMPING]) for length in _CABLES), key=lambda at: float((unexplained(at) ** 2).sum())
     )
+    low, high = np.log([_SHAPES[name].bounds(vehicle) for name in ("length_m", "damping_1_s")]).T
+    found = least_squares(unexplained, start, bounds=(low, high), diff_step=[1e-3] * 2, xtol=1e-3, max_nfev=8)
     length, damping = np.exp(found.x)
     pulls = pull(length, damping)
     share, left_out = leaving_out(
@@ -502,16 +503,15 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     return float(length), (["swing"], share, jackknife_error(left_out))
 
 
-def _pulled(left: Array, drag: Array, pull: Array) -> tuple[float, float]:
-    """Fit a pull jointly with a constant and a drag along each axis: its size, and the squares that it explains."""
+def _pulled(left: Array, drag: Array, pull: Array) -> tuple[float, Array, Array]:
+    """Fit a pull jointly with a constant and a drag along each axis: its size, and what these leave of both."""
     sides = []
     for axis in range(2):
         known = np.column_stack([np.ones(len(left)), drag[:, axis]])
         both = np.column_stack([left[:, axis], pull[:, axis]])
         sides.append(both - known @ np.linalg.lstsq(known, both, rcond=None)[0])
     y, x = np.concatenate(sides).T
-    size = float(x @ y / max(x @ x, 1e-300))
-    return size, size * float(x @ y) * np.sign(size)
+    return float(x @ y / max(x @ x, 1e-300)), y, x
 
 
 def _drawn(signals: Signals, flies: BoolArray) -> _Numbers:

@@ -288,12 +288,14 @@ def fit_parts(
     starts: Sequence[Mapping[str, float]],
     steps: int,
     tolerance: float,
+    enough: float = -np.inf,
 ) -> Fits:
     """Fit numbers to all windows, and from there, by one step, without each part, with the errors of its windows.
 
     Without a part the derivatives at the fit to all are known: they are those of all less those of the part. Each step
     has to lower the loss without the part. Parameters are those of `fit`, but that it begins at the best of several
-    starts, and that `part` says which part the windows of each flight are; a single part cannot be left out.
+    starts, or at the first whose loss is not above `enough`, and that `part` says which part the windows of each flight
+    are; a single part cannot be left out.
     """
     bounds = free.lows, free.highs
 
@@ -309,7 +311,11 @@ def fit_parts(
 
     every = part >= 0
     values = dict.fromkeys(tuple(np.clip(free.values(known), *bounds).tolist()) for known in starts)
-    begun = [at(each).mean(every) for each in values]
+    begun: list[FitPoint] = []
+    for each in values:
+        begun.append(at(each).mean(every))
+        if begun[-1].loss <= enough:
+            break
     finite = [each for each in begun if np.isfinite(each.objective)]
     if not finite:
         raise ComputationError("the prediction error is not finite with the stated numbers; check the units of the log")

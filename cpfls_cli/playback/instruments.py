@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations, pairwise
 from typing import Literal, NamedTuple
 
@@ -241,6 +242,10 @@ class Repeats:
             groups = [group for group in groups if not group & joined] + [joined]
         return tuple(tuple(sorted(group)) for group in groups)
 
+    @cached_property
+    def _firsts(self) -> dict[int, int]:
+        return {number: group[0] for group in self.paths() for number in group}
+
     def others(self, number: int, values: Sequence[Array]) -> Array:
         """Average over the other runs what they have at the same places of the path.
 
@@ -301,7 +306,7 @@ class Repeats:
         place : array, shape (time,)
             NaN where the first is not.
         """
-        first = next((group[0] for group in self.paths() if number in group), number)
+        first = self._firsts.get(number, number)
         return first, self.places[number].get(first, np.arange(length, dtype=float))
 
 

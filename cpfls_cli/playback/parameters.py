@@ -14,6 +14,7 @@ from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
+from cpfls_cli.fuzzy.periodic import PeriodicStructure
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.model import Remainder
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -168,6 +169,20 @@ class Rules(NamedTuple):
         """Count the columns of the system; none without rules."""
         return self.number * (1 + (2 * self.order or 1))
 
+    def of(self, other: Rules) -> Array:
+        """Give the coefficients, one column for each of other rules, that come closest to the same over the circle."""
+        turn = np.linspace(0.0, 2 * np.pi, _DIRECTIONS, endpoint=False)[:, None]
+        own, given = (each._system.columns(turn) for each in (self, other))
+        return np.asarray(np.linalg.lstsq(own, given)[0])
+
+    @property
+    def _system(self) -> PeriodicStructure:
+        partition = np.linspace(0.0, 1.0, self.number + 1)
+        return PeriodicStructure((partition,), "harmonic" if self.order else "seesaw", self.order, "additive")
+
+
+_DIRECTIONS = 72
+"""In which partitions are compared."""
 
 _NO_RULES = Rules(0, 0)
 

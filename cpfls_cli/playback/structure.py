@@ -109,12 +109,18 @@ class Judged:
     fit: Fitted
     without: tuple[FittedNumbers, ...]
 
-    def start(self, structure: Structure) -> Mapping[str, float]:
+    def start(self, structure: Structure) -> dict[str, float]:
         """Give the values that the fit of another structure starts from."""
-        known = self.fit.free.named(self.fit.values)
+        free = self.fit.free
+        known = free.named(self.fit.values)
         if structure.rules == self.structure.rules:
             return known
-        return {name: value for name, value in known.items() if name.split(".")[0] not in LEARNED}
+        other, again = replace(free.base, rules=structure.rules), structure.rules.of(self.structure.rules)
+        for block in LEARNED.keys() & {*self.structure.blocks}:
+            learned = np.array([known.pop(number.name) for number in free.base.of_block(block)])
+            values = again @ learned.reshape(len(LEARNED[block]), -1, 2)
+            known |= dict(zip((number.name for number in other.of_block(block)), values.ravel().tolist(), strict=True))
+        return known
 
     def worse_than(self, other: Judged) -> tuple[float, float]:
         """Compare on the same blocks: mean difference, and its standard error."""
@@ -231,14 +237,21 @@ class _Bench:
         errors = [stays_error(each) for each in self.windows.windows]
         return float(np.average(errors, weights=self.windows.counts))
 
-    def judge(self, structure: Structure, *starts: Start, first: VehicleSettings | None = None) -> Judged:
-        """Fit and judge a structure, from the best of some starts; fitted to another vehicle first, if one is given.
+    def judge_from(self, near: Judged, structure: Structure, outlook: Outlook) -> Judged:
+        """Fit and judge a structure, from where the fit of another one predicts it, or from that fit."""
+        # With its numbers taken out a fit is no better than it was.
+        return self.judge(structure, outlook.start(structure.blocks), near.start(structure), enough=near.fit.loss)
 
-        The last of the starts is flown once only where it is the best.
+    def judge(
+        self, structure: Structure, *starts: Start, enough: float = -np.inf, first: VehicleSettings | None = None
+    ) -> Judged:
+        """Fit and judge a structure, from the best of some starts, or the first whose loss is not above `enough`.
+
+        It is fitted to another vehicle before, if one is given `first`.
         """
         if structure not in self.known:
             kept = self.kept.get(structure)
-            fits = self._fits(structure, starts, first) if kept is None else self._rebuilt(structure, kept)
+            fits = self._fits(structure, starts, enough, first) if kept is None else self._rebuilt(structure, kept)
             whole, held, sums = fits
             self._outlooks[structure] = Outlook(sums, self.part)
             errors = [each for _, aside in held for each in aside]
@@ -255,14 +268,16 @@ class _Bench:
                 self.progress(tuple(self.known.values()), max(self.expected, len(self.known)))
         return self.known[structure]
 
-    def _fits(self, structure: Structure, starts: tuple[Start, ...], first: VehicleSettings | None) -> Fits:
+    def _fits(
+        self, structure: Structure, starts: tuple[Start, ...], enough: float, first: VehicleSettings | None
+    ) -> Fits:
         begun = starts or (self._nearest(structure),)
         if first is not None:
             free = structure.free(first)
             found = fit(free, self.windows.windows, begun[0], _SEARCH_STEPS, _SEARCH_TOLERANCE)
             begun = (free.named(found.values),)
         free = structure.free(self.vehicle)
-        return fit_parts(free, self.windows, self.part, begun, _SEARCH_STEPS, _SEARCH_TOLERANCE)
+        return fit_parts(free, self.windows, self.part, begun, _SEARCH_STEPS, _SEARCH_TOLERANCE, enough)
 
     def _rebuilt(self, structure: Structure, kept: Solution) -> Fits:
         free = structure.free(self.vehicle)
@@ -284,16 +299,26 @@ class _Bench:
         known = ascending(self.known.values(), lambda each: each.error)
         return min(known, key=away).start(structure) if known else {}
 
+    def outlooks(self, near: Judged, others: Sequence[Structure]) -> dict[Structure, Outlook]:
+        """Give what predicts the errors of each of some structures from the fit of one."""
+        like = [each for each in others if not each.learns or each.rules == near.structure.rules]
+        alike = dict.fromkeys(like, self.outlook(near, [block for each in like for block in each.blocks]))
+        return {each: alike.get(each) or self._from(near, each) for each in others}
+
     def outlook(self, near: Judged, blocks: Iterable[str]) -> Outlook:
         """Give what predicts the errors of structures of some blocks and its own, from the fit of one."""
         own = near.structure
         asked = tuple(dict.fromkeys((*own.blocks, *blocks)))
         if not self._outlooks[own].blocks.issuperset(asked):
-            union = Structure(asked, own.rules).free(self.vehicle)
-            absent = {number.name: number.absent for number in union.numbers}
-            values = union.values(absent | near.fit.free.named(near.fit.values))
-            self._outlooks[own] = Outlook(WindowSums(union, self.windows, values), self.part)
+            self._outlooks[own] = self._from(near, Structure(asked, own.rules))
         return self._outlooks[own]
+
+    def _from(self, near: Judged, structure: Structure) -> Outlook:
+        """Give what predicts the errors of a structure from the fit of another one."""
+        free = structure.free(self.vehicle)
+        absent = {number.name: number.absent for number in free.numbers}
+        values = free.values(absent | near.start(structure))
+        return Outlook(WindowSums(free, self.windows, values), self.part)
 
 
 def tried_blocks(
@@ -383,7 +408,7 @@ def _explore(bench: _Bench, centre: Judged, blocks: tuple[str, ...]) -> Judged:
         if not _keeps_up(bench, errors[fewer], errors[best], 1.0):
             break
         simplest = fewer
-    found = [bench.judge(each, centre.start(each), outlook.start(each.blocks)) for each in (best, simplest)]
+    found = [bench.judge_from(centre, each, outlook) for each in (best, simplest)]
     return smallest([centre, *found], lambda each: each.error)
 
 
@@ -449,8 +474,8 @@ def _judge_other(bench: _Bench, choice: Judged, blocks: tuple[str, ...]) -> None
     for learned in (block for block in structure.blocks if block in LEARNED):
         named = [_with(_with(structure, learned, blocks), effect, blocks) for effect in absent]
         _judge_hopeful(bench, choice, named, _HOPEFUL)
-    for rules in REMAINDERS if structure.learns else ():
-        bench.judge(structure._replace(rules=rules))
+    if structure.learns:
+        _judge_hopeful(bench, choice, [structure._replace(rules=rules) for rules in REMAINDERS], _HOPEFUL)
 
 
 def _judge_hopeful(bench: _Bench, near: Judged, others: Sequence[Structure], most: float) -> None:
@@ -459,11 +484,11 @@ def _judge_hopeful(bench: _Bench, near: Judged, others: Sequence[Structure], mos
     new = [each for each in others if each not in bench.known]
     if not new:
         return
-    outlook = bench.outlook(near, [block for each in new for block in each.blocks])
-    errors = {each: outlook.errors(each.blocks) for each in new}
+    outlooks = bench.outlooks(near, new)
+    errors = {each: outlook.errors(each.blocks) for each, outlook in outlooks.items()}
     for each in ascending(new, lambda each: float(errors[each].mean()))[:_FITTED]:
         if _keeps_up(bench, errors[each], best.by_block, most):
-            bench.judge(each, near.start(each), outlook.start(each.blocks))
+            bench.judge_from(near, each, outlooks[each])
 
 
 def _keeps_up(bench: _Bench, errors: Array, best: Array, most: float) -> bool:

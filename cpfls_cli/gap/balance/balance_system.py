@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -81,17 +81,20 @@ class System:
     @cached_property
     def noise(self) -> Array:
         """Noise like that of `base`, and of `residual` in the last column; shape (window, 6, column + 1)."""
-        return self.by_flight(self._noise)
+        inertial = self.by_flight(lambda flight, _: flight.noise(flight.inertial)[..., None])
+        return np.concatenate([*map(self._noise, self.free), inertial], axis=2)
 
-    def _noise(self, flight: WeakFlight, signals: Signals) -> Array:
-        parts = []
-        for candidate, place in self.places:
+    def _noise(self, candidate: Candidate) -> Array:
+        def of_flight(flight: WeakFlight, signals: Signals) -> Array:
             if candidate.effect.missing(signals):
-                parts.append(np.zeros((len(flight), 6, place.stop - place.start)))
-                continue
-            noise = flight.noise(columns_of(candidate, signals))
-            parts.append(noise * self.turns if candidate.effect.kind == "parameter" else noise)
-        return np.concatenate([*parts, flight.noise(flight.inertial)[..., None]], axis=2)
+                return np.zeros((len(flight), 6, self.columns(candidate).shape[2]))
+            return flight.noise(columns_of(candidate, signals))
+
+        key = ("noise", *candidate.key)
+        if key not in self.cache:
+            found = self.by_flight(of_flight)
+            self.cache[key] = found * self.turns if candidate.effect.kind == "parameter" else found
+        return self.cache[key]
 
     @cached_property
     def rotor_wrench(self) -> Array:
@@ -116,9 +119,10 @@ class System:
     def with_shapes(self, values: Array) -> System:
         """Move the shapes of all chosen effects."""
         following = iter(values.tolist())
-        return system(
-            self.flights, [each.at({s.name: next(following) for s in each.effect.shapes}) for each in self.chosen]
-        )
+        chosen = tuple(each.at({s.name: next(following) for s in each.effect.shapes}) for each in self.chosen)
+        before, after = ([each.key for each in own if each.effect.apply] for own in (self.chosen, chosen))
+        # Where nothing that changes signals moves, all other columns are what they were.
+        return replace(self, chosen=chosen) if before == after else system(self.flights, chosen)
 
     def following(self, linear: Array) -> Array:
         """Give what coefficients, shape (column,), say of the shapes, within their bounds; NaN for nothing."""

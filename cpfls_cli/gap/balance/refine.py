@@ -267,8 +267,9 @@ def refitted(hypothesis: System, weight: Array) -> System:
         # holds for no step: a filter and a lag that nothing separates would creep along with no end in sight.
         least = max(_SETTLED, _SETTLED * gain)
         while gain >= least:
-            moved = np.clip(hypothesis.shape_values + step, low, high)
-            ahead = hypothesis.with_shapes(np.where(free, moved, hypothesis.following(linear)))
+            moved, said = np.clip(hypothesis.shape_values + step, low, high), hypothesis.following(linear)
+            # Of a load whose mass has gone nothing says how deep its hook is: it stays.
+            ahead = hypothesis.with_shapes(np.where(free | np.isnan(said), moved, said))
             left, there = fitted(ahead)
             if error - left >= _SETTLED:
                 break

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import groupby, permutations
+from operator import itemgetter
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -246,7 +247,7 @@ class RepeatedRuns:
         """
         flights = hypothesis.flights
         sides = [_sides(residual_along(hypothesis, n, linear), flight.inertial) for n, flight in enumerate(flights)]
-        found = [self._of_band(band.windows, sides) for band in self.bands]
+        found = self._by_band(sides)
         blocks = np.array([len(of_band) for of_band in found])
         if blocks[0] < FEWEST_BLOCKS:
             return None
@@ -275,28 +276,29 @@ class RepeatedRuns:
         """Numbers of the runs that are compared with others."""
         return tuple(sorted({number for pair in self.pairs for number in pair}))
 
-    def _of_band(self, band: Windows, sides: Sequence[Array]) -> Array:
-        """Sum products over the windows of all pairs, by block of the paths, shape (block, 4, 6)."""
+    def _by_band(self, sides: Sequence[Array]) -> list[Array]:
+        """Sum products over the windows of all pairs, by block of the paths, for each band of shape (block, 4, 6)."""
         repeats, cut = self.given.repeats, [sides[run.flight][run.part] for run in self.given.runs]
-        # Blocks of all paths are no shorter than the windows.
+        bands, found = [band.windows for band in self.bands], [dict[tuple[int, int], Array]() for _ in self.bands]
         samples = sum(len(self.given.flown[path[0]]) for path in repeats.paths())
-        length = max(block_length(samples * band.period) / band.period, float(len(band.weight)))
-        found: dict[tuple[int, int], Array] = {}
-        for number, other in self.pairs:
-            middles = band.middles([slice(0, len(cut[number]))])
+        for number, pairs in groupby(self.pairs, key=itemgetter(0)):
             first, place = repeats.path(number, len(cut[number]))
+            middles = [band.middles([slice(0, len(cut[number]))]) for band in bands]
             # Too short a run has no window.
-            if not len(middles):
-                continue
-            mine, theirs = (
-                band.balance(*each.swapaxes(0, 1)) for each in (cut[number], repeats.at(number, other, cut[other]))
-            )
-            known = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(place[middles])
-            block = np.where(known, place[middles] // length, -1)
-            for each in np.unique(block[known]):
-                sums = _products(mine[block == each], theirs[block == each])
-                found[first, int(each)] = found.get((first, int(each)), 0.0) + sums
-        return np.array(list(found.values())).reshape(-1, 4, 6)
+            long = [at for at, own in enumerate(middles) if len(own)]
+            own = {at: bands[at].balance(*cut[number].swapaxes(0, 1)) for at in long}
+            for _, other in pairs:
+                there = repeats.at(number, other, cut[other]).swapaxes(0, 1)
+                for at, mine in own.items():
+                    band, theirs, sums = bands[at], bands[at].balance(*there), found[at]
+                    # Blocks of all paths are no shorter than the windows.
+                    length = max(block_length(samples * band.period) / band.period, float(len(band.weight)))
+                    known = np.isfinite(theirs).all(axis=(1, 2)) & np.isfinite(place[middles[at]])
+                    block = np.where(known, place[middles[at]] // length, -1)
+                    for each in np.unique(block[known]):
+                        added = _products(mine[block == each], theirs[block == each])
+                        sums[first, int(each)] = sums.get((first, int(each)), 0.0) + added
+        return [np.array(list(sums.values())).reshape(-1, 4, 6) for sums in found]
 
     def _noise(self, flights: Sequence[WeakFlight], sides: Sequence[Array]) -> Array:
         """Estimate the mean squares of a gap by white noise, shape (6, band); NaN behind a filter."""

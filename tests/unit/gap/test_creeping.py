@@ -1,10 +1,12 @@
-"""A fit whose linear system holds for no step stands where it is, instead of creeping along."""
+"""Steps of the shapes of effects: none too far or to where nothing is said, and no work for what does not move."""
 
 from types import SimpleNamespace
 
 import numpy as np
 
 from cpfls_cli.gap.balance import refine
+from cpfls_cli.gap.balance.balance_system import System, system
+from tests.builders.gap_flights import candidate, fly, weak
 
 
 class Ridge:
@@ -42,3 +44,27 @@ def test_a_step_that_has_to_be_a_thousandth_is_none(monkeypatch):
     start = Ridge(0.0, 1e4, [])
     assert refine.refitted(start, np.ones((1, 1))) is start
     assert start.tried[0] == 1000.0
+
+
+def test_a_load_whose_mass_goes_as_it_is_fitted_keeps_its_hook(monkeypatch):
+    said = iter([[np.nan, np.nan, 0.1]])
+    monkeypatch.setattr(System, "following", lambda *_: np.array(next(said, [np.nan] * 3)))
+    flight = weak(fly(1, gyro=0.02, rotor=2.0))
+    start = system([flight], [candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.0)])
+    length, _, depth = refine.refitted(start, np.full(6, 1e-4)).shape_values
+    assert depth == 0.1
+    assert length != 0.52
+
+
+def test_columns_are_evaluated_again_only_where_their_shape_or_the_signals_change():
+    load = candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.0)
+    start = system([weak(fly(1))], [candidate("drag_factor_error", error=0.1), candidate("linear_damping"), load])
+    error, length, *others = start.shape_values
+    damping, pull = (start.columns(each) for each in start.free[1:])
+    longer = start.with_shapes(np.array([error, 1.2 * length, *others]))
+    assert longer.columns(longer.free[1]) is damping
+    assert not np.array_equal(longer.columns(longer.free[2]), pull)
+    for moved in (longer, start.with_shapes(np.array([2 * error, length, *others]))):
+        alone = system(moved.flights, moved.chosen)
+        assert np.array_equal(moved.base, alone.base)
+        assert np.array_equal(moved.residual, alone.residual)

@@ -10,9 +10,9 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.playback import structure
-from cpfls_cli.playback.fit import WindowSet, fit, parts_of
+from cpfls_cli.playback.fit import WindowSet, WindowSums, fit, parts_of
 from cpfls_cli.playback.flight import motion_at
-from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.playback.parameters import Rules, blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, tried_blocks
 from cpfls_cli.playback.windows import Loss
@@ -156,6 +156,32 @@ def test_a_fit_predicts_structures_of_fewer_blocks_by_its_own_derivatives(flight
     assert bench.outlook(judged, ()).errors(judged.structure.blocks).mean() == pytest.approx(judged.error, rel=0.05)
 
 
+@pytest.fixture(scope="module")
+def learned(flights):
+    """A bench that has judged a model with a learned force."""
+    bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {}, structure._ACTUATION)
+    blocks = ("inertia", "thrust_factor", "lag", "linear_damping", "flapping_moment", "remainder_force")
+    return bench, bench.judge(Structure(blocks))
+
+
+@pytest.mark.parametrize("rules", [Rules(1, 3), Rules(3, 1)])
+def test_other_rules_begin_with_what_was_learned(learned, rules):
+    bench, judged = learned
+    other = judged.structure._replace(rules=rules)
+    free = other.free(STATED)
+    found = WindowSums(free, bench.windows, free.values(judged.start(other))).errors
+    for before, after in zip(bench.windows.errors(judged.fit.free, judged.fit.values), found, strict=True):
+        assert after == pytest.approx(before, rel=1e-9)
+
+
+def test_rules_that_are_predicted_to_be_no_better_are_not_fitted(learned, monkeypatch):
+    bench, judged = learned
+    tried = []
+    monkeypatch.setattr(bench, "judge_from", lambda _, each, __: tried.append(each))
+    structure._judge_other(bench, judged, judged.structure.blocks)
+    assert len(tried) <= structure._FITTED < len(structure.REMAINDERS)
+
+
 class Bench:
     """Knows the error of each structure, its blocks one letter each, with noise that no comparison sees through."""
 
@@ -173,8 +199,14 @@ class Bench:
     def by_block(self, blocks):
         return self.errors["".join(blocks)] + 0.002 * (-1) ** len(blocks) * np.array([-1.0, 1.0])
 
+    def judge_from(self, near, tried, outlook):  # noqa: ARG002
+        return self.judge(tried)
+
     def outlook(self, near, blocks):  # noqa: ARG002
         return SimpleNamespace(errors=self.by_block, start=lambda _: {})
+
+    def outlooks(self, near, others):
+        return {each: self.outlook(near, each.blocks) for each in others}
 
 
 def test_no_block_can_be_left_out_of_the_choice():
