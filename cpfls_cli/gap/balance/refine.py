@@ -268,7 +268,9 @@ def refitted(hypothesis: System, weight: Array) -> System:
         least = max(_SETTLED, _SETTLED * gain)
         while gain >= least:
             moved = np.clip(hypothesis.shape_values + step, low, high)
-            ahead = hypothesis.with_shapes(np.where(free, moved, hypothesis.following(linear)))
+            # A load of no mass says nothing of its hook, which stays where it is.
+            said = hypothesis.following(linear)
+            ahead = hypothesis.with_shapes(np.where(free | np.isnan(said), moved, said))
             left, there = fitted(ahead)
             if error - left >= _SETTLED:
                 break
