@@ -135,7 +135,8 @@ def diagnose(
     progress(0.75, "rivals")
     # Lags of rotors in gusts instruments have decided.
     tried = [each for each in named.effects if gusts is None or not each.is_lag]
-    wider, unnamed = with_unnamed(found, named.steps[-1], tried, rng)
+    wider, unnamed, bends = with_unnamed(found, named.steps[-1], tried, rng)
+    named = named._replace(bends=bends)
     pairs = zip(hypothesis.chosen, estimates.effects, wider.effects, strict=True)
     # Averages over windows, which widen the others, are biased by the loop for what is small.
     held_by = tuple(
@@ -151,7 +152,7 @@ def diagnose(
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
     doubts = [
-        *_doubts(unnamed, judged, settings),
+        *_doubts(unnamed, bends, judged, settings),
         *(refused.sentence for refused in named.refusals),
     ]
     notes = [*not_judged(held_out), *([] if named.differ else doubts)]
@@ -221,6 +222,8 @@ class _Named(NamedTuple):
     unidentified: tuple[str, ...] = ()
     small: frozenset[str] = frozenset()
     """Effects whose numbers are by samples."""
+    bends: tuple[str, ...] = ()
+    """Of formulas, which are a part of the gap that counts."""
 
     def in_gusts(self, judged: JudgedEffect) -> JudgedEffect:
         """Take the p-value of an effect by instruments, and drop rivals of a lag: a fit sees the loop."""
@@ -383,8 +386,12 @@ def _wrong_inertia(named: _Named) -> bool:
     return wrong is not None and any(each.name.startswith("inertia") for each in wrong.numbers)
 
 
-def _doubts(unnamed: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings) -> Iterator[str]:
-    """Say what intervals cover, and which effects are not significant jointly with the others."""
+def _doubts(
+    unnamed: Sequence[str], bends: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings
+) -> Iterator[str]:
+    """Say what intervals cover, whose formula is another one, and which effects are not significant with the others."""
+    if bends:
+        yield f"a part of the gap that counts is {' and '.join(bends)}: the formula is another one"
     if unnamed:
         yield (
             f"something unnamed explains more than chance ({', '.join(unnamed)}); the intervals cover the numbers with"
@@ -470,7 +477,7 @@ def _concluded(
     before, after = (held_out.size(each).floors for each in (held_out.parameters, held_out.after))
     remains = bool(remainder)
     if effects:
-        remains = gap_remains(before, after, remainder, settings.named_share, len(named))
+        remains = gap_remains(before, after, remainder, settings.named_share, len(named)) or bool(found.bends)
     verdict = verdict_of(effects, rivals, remains, tuple(removed.values()) or (1.0,), excited, settings)
     if verdict is GapVerdict.NAMED and any(not CATALOGUE[rival.instead_of].is_lag for rival in found.alike):
         # A rival that does as well as a small effect may be there instead.

@@ -105,7 +105,12 @@ class _Sets:
         # What is needed jointly with the others does without them.
         needed = {name for names in self.fits if len(names) > 1 for name in self._needed(names, rate)}
         rivals = [names for names in significant if needed.issuperset(names)] or significant
-        return self.least(rivals or [()]), rivals
+        # No rotor follows at once, so that a lag alone is open wherever it leaves as little; and where a lag is no less
+        # than anybody has, but may be 0, so is what does without it.
+        usual = next(iter(self.effects))
+        alone = [each for each in significant if each == (usual,) or not self._refuted(each, rate)]
+        alone = [each for each in alone if each not in rivals]
+        return self.least(rivals or [()]), [*rivals, *alone]
 
     def fit(self, tried: Sequence[_Names]) -> list[_Names]:
         """Fit sets; the names of those whose numbers instruments identify come back."""
@@ -163,6 +168,12 @@ class _Sets:
         own = {name: number for name, (number, *_) in self.numbers(names).items()}
         least = {name: self.effects[name].shapes[0].grid[0] for name in own}
         return {n for n, one in own.items() if (one.value >= least[n] if n == usual else self.chance_of(one) <= rate)}
+
+    def _refuted(self, names: _Names, rate: float) -> bool:
+        """Check whether another effect is significant conditional on those of a set."""
+        joint = [each for each in self.fits if set(names) < set(each)]
+        others = (number for each in joint for name, (number, *_) in self.numbers(each).items() if name not in names)
+        return any(self.chance_of(number) <= rate for number in others)
 
     def chance_of(self, number: Estimate) -> float:
         """Compute the p-value of a time by its interval and the error of the log's clock.

@@ -25,8 +25,9 @@ from cpfls_cli.gap.balance.balance_system import (
 from cpfls_cli.gap.balance.refine import fit, least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.estimate import NamedFit, Refusal, channel_weight, estimates, on_bound, size_in_floors
-from cpfls_cli.gap.naming.open_questions import unexplained_channels
-from cpfls_cli.gap.naming.ranking import RankedStep, block_index
+from cpfls_cli.gap.naming.odds import unbeaten
+from cpfls_cli.gap.naming.open_questions import bends_of, unexplained_channels
+from cpfls_cli.gap.naming.ranking import RankedStep, block_index, rank_effects
 from cpfls_cli.gap.naming.results import GapSize
 from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, NOISE, OFF, VISIBLE
 from cpfls_cli.rounding import ascending, largest, levelled, smallest
@@ -211,7 +212,7 @@ class Judge:
         least = smallest(compared, lambda each: compared[each].visibly)
         if compared[least].visibly < VISIBLE**2:
             return Refusal(least, "on the held-out flights the gap is as small without it")
-        return _filling(judgement, compared)
+        return _bent(judgement, compared) or _filling(judgement, compared)
 
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
@@ -254,6 +255,26 @@ class Without(NamedTuple):
         surely = -self.raised > ERRORS * self.error
         worse = (after > CLEAR) & (after > (1 + OFF) * self.left) & surely
         return np.where(worse, after / np.maximum(self.left, 1e-9), 0.0)
+
+
+def _bent(judgement: Judgement, compared: Mapping[str, Without]) -> Refusal | None:
+    """Find an effect that another named one, whose formula bends over speed, surely explains more without.
+
+    Of several the smallest.
+    """
+    hypothesis, _, _, settings = judgement.found
+    for name in ascending(compared, lambda each: compared[each].visibly):
+        others = [each for each in hypothesis.chosen if each.effect.name != name]
+        bends = bends_of(others, hypothesis.flights)
+        if not bends:
+            continue
+        own = next(each for each in hypothesis.chosen if each.effect.name == name)
+        step = rank_effects(hypothesis.flights, others, bends, settings, None, also=(own,))
+        scored = next(each for each in step.ranking if each.candidate.effect.name == name)
+        best = step.ranking[0]
+        if best is not scored and not unbeaten(best, [scored], step.above_floor):
+            return Refusal(name, f"{best.candidate.effect.name} explains surely more in its place")
+    return None
 
 
 def _filling(judgement: Judgement, compared: dict[str, Without]) -> Refusal | None:

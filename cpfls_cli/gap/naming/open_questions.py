@@ -1,6 +1,6 @@
 """Open questions of a diagnosis: unexplained residuals, and effects too small for a name or not shown at all."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -84,56 +84,80 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
 
 def with_unnamed(
     found: NamedFit, last: RankedStep, effects: Sequence[Effect], rng: np.random.Generator
-) -> tuple[Estimates, tuple[str, ...]]:
+) -> tuple[Estimates, tuple[str, ...], tuple[str, ...]]:
     """Widen the intervals of named effects by what is more than chance and too small for a name.
 
     A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
     formula that is right in slow flight bends in fast flight: where a bend shows, its number changes with it.
 
     `last` is the look that ended the search, and `effects` are those to be tried. The intervals hold what the numbers
-    are with the unnamed effects, whose names come too, and without them.
+    are with the unnamed effects, whose names come too, and without them. Last come bends that are a part of the gap
+    that counts: the formula is another one.
     """
     flights, named, settings = found.hypothesis.flights, found.hypothesis.chosen, found.settings
     if not named:
-        return found.estimates, ()
-    step = last
+        return found.estimates, (), ()
+    step, counting = last, tuple[str, ...]()
     if names_of(named) != names_of(last.hypothesis.chosen):
         step = rank_effects(flights, named, effects, settings, rng)
     chosen = _beyond_chance(step, effects, settings, rng)
     bends = bends_of(named, flights)
     if bends:
-        chosen = _beyond_chance(rank_effects(flights, chosen, bends, settings, rng), bends, settings, rng)
+        step = rank_effects(flights, chosen, bends, settings, rng)
+        least = COUNTS * rank_effects(flights, (), (), settings, None, floor=step.floor).above_floor
+        large = (each for each in step.ranking if each.gain > max(least, step.least_gain()))
+        counting = tuple(each.candidate.effect.name for each in large if step.p_value(each.gain) <= RARE)
+        chosen = _beyond_chance(step, bends, settings, rng)
     if len(chosen) == len(named):
-        return found.estimates, ()
+        return found.estimates, (), counting
     wider = fitted(flights, chosen, found.floor, settings).estimates
     held = []
     for numbers, others in zip(found.estimates.effects, wider.effects, strict=False):
         there = {number.name: number for number in others}
         pairs = [(number, there.get(number.name, number)) for number in numbers]
         held.append(tuple(replace(n, low=min(n.low, o.low), high=max(n.high, o.high)) for n, o in pairs))
-    return replace(found.estimates, effects=tuple(held)), tuple(each.effect.name for each in chosen[len(named) :])
+    unnamed = tuple(each.effect.name for each in chosen[len(named) :])
+    return replace(found.estimates, effects=tuple(held)), unnamed, counting
 
 
 def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[Effect]:
-    """Make an effect of the bend of each formula in the air velocity u: the formula times ``|u|^2 / (|u|^2 + U^2)``.
+    """Make effects of the bends of each formula in the air velocity u, over speed and over height.
 
-    U is the root mean square of u over the flights. Bounded, because powers hang on the fastest seconds of a flight.
+    Over speed it is the formula times ``|u|^2 / (|u|^2 + U^2)``, U being the root mean square of u over the flights,
+    bounded because powers hang on the fastest seconds of a flight; over height the formula times the height above the
+    lowest point of the flights, in their range.
     """
     flown = [flight.signals for flight in flights if "velocity" in flight.signals.available]
-    squared = [(signals.air_velocity**2).sum(axis=1) for signals in flown]
-    usual = float(np.sqrt(np.mean(np.concatenate(squared)))) if squared else np.inf
-    effects = (each.effect for each in named if each.effect.kind == "wrench" and "velocity" in each.effect.needs)
-    return [_bend(effect, usual) for effect in effects if not (effect.shapes or effect.physical)]
+    usual = float(np.mean(np.concatenate([_squared_speed(signals) for signals in flown]))) if flown else np.inf
+    over: dict[str, Callable[[Signals], Array]] = {
+        "speed": lambda signals: _squared_speed(signals) / (_squared_speed(signals) + usual)
+    }
+    heights = [_height(signals) for signals in flown if "height" in signals.available]
+    low, high = (float(end(np.concatenate(heights))) if heights else 0.0 for end in (np.min, np.max))
+    if high > low:
+        over["height"] = lambda signals: (_height(signals) - low) / (high - low)
+    effects = [each.effect for each in named if each.effect.kind == "wrench" and "velocity" in each.effect.needs]
+    plain = [effect for effect in effects if not (effect.shapes or effect.physical)]
+    return [_bend(effect, name, by) for effect in plain for name, by in over.items()]
 
 
-def _bend(effect: Effect, usual: float) -> Effect:
+def _squared_speed(signals: Signals) -> Array:
+    return np.asarray((signals.air_velocity**2).sum(axis=1))
+
+
+def _height(signals: Signals) -> Array:
+    assert signals.position is not None, "a bend over height declares its need"
+    return signals.position[:, 2]
+
+
+def _bend(effect: Effect, over: str, by: Callable[[Signals], Array]) -> Effect:
     def columns(signals: Signals, shape: Mapping[str, float]) -> Columns:
         assert effect.columns is not None
-        squared = (signals.air_velocity**2).sum(axis=1)
-        return Columns(effect.columns(signals, shape).direct * (squared / (squared + usual**2))[:, None, None])
+        return Columns(effect.columns(signals, shape).direct * by(signals)[:, None, None])
 
     either = tuple(replace(each, low=-each.high) for each in effect.coefficients)
-    return replace(effect, name=f"a bend of {effect.name} over speed", columns=columns, coefficients=either)
+    name, needs = f"a bend of {effect.name} over {over}", effect.needs | ({over} & {"height"})
+    return replace(effect, name=name, columns=columns, coefficients=either, needs=needs)
 
 
 def _beyond_chance(

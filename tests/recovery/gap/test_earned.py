@@ -13,7 +13,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import fit_within_bounds
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.estimate import earned, fitted
-from cpfls_cli.gap.naming.held_out import Judge, differences
+from cpfls_cli.gap.naming.held_out import Judge, _bent, differences
 from cpfls_cli.gap.naming.ranking import best_floor, rank_effects
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak
@@ -174,6 +174,30 @@ def test_what_fills_in_for_the_form_of_another_is_no_name(companion):
     last, (refusal,), _ = judged(of_another_power((1, 2)), of_another_power((3,)), "parasitic_drag", companion)
     assert kept(last.found) == ["parasitic_drag"]
     assert refusal.name == companion
+
+
+@pytest.mark.parametrize("companion", [("rotor_drag", 1.5e-3), ("inflow", 1e-3)], ids=lambda each: each[0])
+@pytest.mark.parametrize("there", [False, True], ids=["another form", "there"])
+def test_what_a_bend_of_another_explains_better_is_no_name(companion, there):
+    """A drag of the power 1.5 of the speed is not the drags of the powers 1 and 2, which each take a part of it."""
+    name, size = companion
+
+    def known(seeds):
+        if not there:
+            return of_another_power(seeds)
+        body = (candidate("parasitic_drag"), [0.05, 0.05, 0.05, 0.0, 0.0, 0.0])
+        return flights((candidate(name), [size]), body, seeds=seeds, force=True)
+
+    training = known((1, 2))
+    judging, chosen = judge(training, known((3,))), [candidate("parasitic_drag"), candidate(name)]
+    first = judging.judge(fitted(training, chosen, best_floor(system(training)), SETTINGS))
+    compared = {each.effect.name: judging._without(first, each.effect.name) for each in chosen}
+    refusal = _bent(first, compared)
+    if there:
+        assert refusal is None
+    else:
+        assert refusal.name == name
+        assert "a bend of parasitic_drag over speed" in refusal.sentence
 
 
 def test_what_is_there_stands_and_what_is_not_needed_goes():

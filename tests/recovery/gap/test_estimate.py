@@ -284,7 +284,7 @@ def widened(hidden, named):
 
 def test_intervals_leave_room_for_what_is_too_small_for_a_name():
     drag, body = candidate("rotor_drag"), candidate("parasitic_drag")
-    found, (beside, unnamed) = widened([(drag, [1.3e-3]), (body, [0.01, 0.01, 0.01, 0.0, 0.0, 0.0])], drag)
+    found, (beside, unnamed, _) = widened([(drag, [1.3e-3]), (body, [0.01, 0.01, 0.01, 0.0, 0.0, 0.0])], drag)
     (alone,), (there,) = found.estimates.effects[0], beside.effects[0]
     assert unnamed == ("parasitic_drag",)
     assert alone.low > 1.3e-3
@@ -294,9 +294,28 @@ def test_intervals_leave_room_for_what_is_too_small_for_a_name():
 
 def test_where_nothing_else_is_there_intervals_stay_what_they_are():
     drag = candidate("rotor_drag")
-    found, (beside, unnamed) = widened([(drag, [1.3e-3])], drag)
+    found, (beside, unnamed, _) = widened([(drag, [1.3e-3])], drag)
     assert unnamed == ()
     assert beside is found.estimates
+
+
+def growing(effect):
+    """Make an effect grow from nothing at the lowest point of a flight to itself at the highest one."""
+
+    def columns(signals, shape):
+        height = signals.position[:, 2]
+        share = (height - height.min()) / np.ptp(height)
+        return Columns(effect.columns(signals, shape).direct * share[:, None, None])
+
+    return replace(effect, columns=columns)
+
+
+@pytest.mark.parametrize("over", ["height", ""], ids=["over height", "as it says"])
+def test_a_formula_that_bends_by_a_part_that_counts_is_another_one(over):
+    drag = candidate("rotor_drag")
+    hidden = drag._replace(effect=growing(drag.effect)) if over else drag
+    _, (_, _, counting) = widened([(hidden, [1.3e-3])], drag)
+    assert ("a bend of rotor_drag over height" in counting) == bool(over)
 
 
 def glauert(signals, _shape):
@@ -311,7 +330,7 @@ def glauert(signals, _shape):
 def test_an_interval_holds_the_number_of_slow_flight_where_a_formula_bends():
     lift = candidate("translational_lift")
     bending = lift._replace(effect=replace(lift.effect, columns=glauert))
-    found, (beside, unnamed) = widened([(bending, [0.05])], lift)
+    found, (beside, unnamed, _) = widened([(bending, [0.05])], lift)
     (alone,), (there,) = found.estimates.effects[0], beside.effects[0]
     assert "a bend of translational_lift over speed" in unnamed
     assert alone.high < 0.05

@@ -60,10 +60,11 @@ def apart(monkeypatch, own, left, sizes=None):
     ("together", "names", "rivals"),
     [
         ([SURE, ABSENT], LAG, set()),
-        ([ABSENT, SURE], DELAY, set()),
+        ([ABSENT, SURE], DELAY, {("motor_lag", "command_delay", "")}),
         ([ABSENT, ABSENT], LAG, {("command_delay", "motor_lag", "")}),
+        ([OPEN, ABSENT], LAG, {("command_delay", "motor_lag", "")}),
     ],
-    ids=["it is the lag", "it is the delay", "the usual one of two"],
+    ids=["it is the lag", "it is the delay", "the usual one of two", "a lag that may be 0 jointly with a delay"],
 )
 def test_what_is_needed_next_to_the_other_is_named_whatever_was_found(own, together, names, rivals, monkeypatch):
     left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}

@@ -33,6 +33,7 @@ def refused(raised, after, monkeypatch, beyond=None):
         name: Without(channel(*value), NOTHING, np.sqrt(np.maximum(floors**2 + channel(*value), 0.0)))
         for name, value in raised.items()
     }
+    monkeypatch.setattr(unseen, "_bent", lambda *_: None)
     monkeypatch.setattr(Judge, "_without", lambda _self, _judgement, name: without[name])
     return Judge([], [], [], np.random.default_rng(0))._refused(judgement)
 
