@@ -74,6 +74,7 @@ class Witnesses(NamedTuple):
     lift: Array | None  # Shape (time,), or None; what grows with the thrust.
     sensed: float  # Sign of what an accelerometer reads along its third axis; 0 without one.
     known: str | None  # Body axes that the kind of log is known for.
+    free: bool  # Whether the attitude is none that the kind of log is known for.
 
     def read(self, rotation: Rotation, order: Order, sign: Sign, price: int, *kind: bool) -> Attitude:
         """Make a way to read columns of what they make."""
@@ -175,7 +176,7 @@ def quaternion_readings(values: Array, named: bool, witnesses: Witnesses) -> Ite
         rotation = agreement.rotations_of(values[:, order], "xyzw" if scalar_last else "wxyz", inverse)
         back: Sign = (-1.0, -1.0, -1.0, 1.0) if scalar_last else (1.0, -1.0, -1.0, -1.0)
         yield witnesses.read(rotation, order, back if inverse else (1.0,) * 4, price + inverse, inverse, scalar_last)
-    if witnesses.known:
+    if witnesses.known and witnesses.free:
         # An attitude in FRD and NED where the kind of log has the others in FLU, or the other way round.
         for scalar_last in (False,) if named else (False, True):
             turned: Sign = (1.0, -1.0, -1.0, 1.0) if scalar_last else (1.0, 1.0, -1.0, -1.0)
@@ -236,7 +237,9 @@ def _readings(attitude: Attitude, witnesses: Witnesses) -> Iterator[Reading]:
         reversed_ = witnesses.sensed * up < 0
         price = attitude.price + sum(axes_price(*own) for own in turned) + reversed_ + (attitude.level < 0)
         # A gyroscope of a known kind of log is in its axes: what is otherwise is the attitude.
-        odd = body != witnesses.known or not (rates is None or (rates.order, rates.sign) == AS_NAMED)
+        odd = body != witnesses.known or (
+            witnesses.free and rates is not None and (rates.order, rates.sign) != AS_NAMED
+        )
         price += 2 * (witnesses.known is not None and odd)
         columns = _changed(attitude.order, attitude.sign) + sum(_changed(*own) for own in turned) + 3 * reversed_
         yield Reading(attitude, body, rates, lean if share else None, order, sign, share, price, columns)
@@ -269,13 +272,19 @@ def read_attitude(seen: Seen) -> TakenReading | None:
         lengths = np.linalg.norm(values, axis=1)
         # Integers of some scale are a quaternion too where their length stays.
         if (length := float(np.median(lengths))) > 0 and float(np.median(np.abs(lengths / length - 1))) < 0.05:
-            verdict = read_quaternion(values / length, named.group.kind == "wxyz", _witnesses(seen, time))
-            _take_quaternion(seen, named, verdict)
-            return verdict
+            # Rows of zeros are of a sensor that is not ready.
+            held = lengths > 0
+            witnesses = _witnesses(seen, time[held], bool(named.known))
+            verdict = read_quaternion(values[held] / length, named.group.kind == "wxyz", witnesses)
+            # Any four numbers that hardly change have one length; of another length than 1, the motion has to agree.
+            best = verdict.best
+            if abs(length - 1) < 0.05 or (best.place_share if best.rates is None else best.explained) > CLEAR:
+                _take_quaternion(seen, named, verdict)
+                return verdict
     return None if euler is None else _read_euler(seen, euler)
 
 
-def _witnesses(seen: Seen, time: Array) -> Witnesses:
+def _witnesses(seen: Seen, time: Array, of_kind: bool = True) -> Witnesses:
     gyro, sensed, lift = seen.first("body_rate"), 0.0, None if seen.level is None else seen.level[seen.part] ** 2
     position, velocity, rate_hz = seen.first("position"), seen.first("velocity"), seen.rate_hz
     for values in map(seen.grid, seen.candidates.get("acceleration", ())):
@@ -300,12 +309,13 @@ def _witnesses(seen: Seen, time: Array) -> Witnesses:
         lift,
         sensed,
         bodies.pop() if len(bodies) == 1 else None,
+        not of_kind,
     )
 
 
 def _read_euler(seen: Seen, named: Named) -> TakenReading:
     time, values = seen.log.values(named.group.columns)
-    witnesses = _witnesses(seen, time)
+    witnesses = _witnesses(seen, time, bool(named.known))
     flown = (time >= witnesses.grid[0]) & (time <= witnesses.grid[-1])
     unit, reason, sure, rivals = _angle_unit(named, named.scale * values[flown if flown.any() else slice(None)])
     if named.unit not in (None, unit):

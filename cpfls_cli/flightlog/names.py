@@ -167,7 +167,7 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
 
 
 def lists_all(system: str) -> bool:
-    """Tell whether all that drives rotors, and all that is asked for, stands in `KNOWN` for logs of a system.
+    """Tell whether all that drives rotors, and all that is asked for, is in `KNOWN` for logs of a system.
 
     A fork under a name of its own (``Betaflight, as NAME``) has columns of its own.
     """

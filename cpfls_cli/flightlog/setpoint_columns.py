@@ -111,6 +111,9 @@ def _by_words(seen: Seen) -> Iterator[_Candidate]:
             seen.left_out.append(f"{named.group.pattern}: looks like a commanded thrust, but in no stated unit")
             continue
         mapped = SignalMap(columns=columns, unit=unit or units[0], scale=named.scale, required=False)
+        if len(columns) == 4 and (measured := seen.guesses.get("quaternion")) is not None:
+            # As the attitude: its inverse, or in other axes.
+            mapped = replace(mapped, sign=measured.columns.sign)
         mapped = _in_stated_unit(seen.log, named.signal, mapped)
         units = () if unit is not None or mapped.columns[0] in seen.log.units else units
         doubts = (_REFERENCE,) if {"ref", "reference"} & {*named.group.words} else ()

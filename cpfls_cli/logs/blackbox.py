@@ -74,9 +74,7 @@ def _contents(content: bytes) -> LogContents:
     stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
     parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
     system, first = header.get("Firmware revision", ""), {"": 1e-6 * float(rows[0, 1])} if len(rows) else {}
-    # Betaflight calls itself Cleanflight, and its kin alone have this parameter.
-    kin = header.get("Firmware type") == "Cleanflight" and "pid_process_denom" in header
-    if kin and re.match(r"\w+ \d+\.\d+", system) and not system.startswith(_WRITERS):
+    if _is_kin(header) and re.match(r"\w+ \d+\.\d+", system) and not system.startswith(_WRITERS):
         # A fork under a name of its own. By the comma its parameters are not taken for those of Betaflight
         # (`Firmware.wrote`).
         system = f"Betaflight, as {system}"
@@ -84,6 +82,14 @@ def _contents(content: bytes) -> LogContents:
         # Before 2.1 Cleanflight wrote no version, but a commit.
         system = f"{header.get('Firmware type', '')} {system}".strip()
     return LogContents({"": columns}, units, parameters, system, (lost,) if broken else (), _flown_at(header), first)
+
+
+def _is_kin(header: Mapping[str, str]) -> bool:
+    """Tell whether a log is of Betaflight, which called itself Cleanflight before 4.6, or a fork of it.
+
+    They alone have this parameter.
+    """
+    return header.get("Firmware type") in ("Cleanflight", "Betaflight") and "pid_process_denom" in header
 
 
 def _in_order(time: Array) -> IntArray:
@@ -190,7 +196,9 @@ def _scales(header: Mapping[str, str]) -> list[tuple[str, float, str]]:
         scales += [("gyro", gyro / finer if gyro > 1e-5 else 1e6 * gyro * _DEGREES, "deg/s")]
     if int(header.get("acc_1G", "0")) > 0:
         scales += [("accSmooth[", 1 / int(header["acc_1G"]), "g")]
-    if version[0] not in ("INAV", "Cleanflight") and version[1] >= (3, 1):
+    # A fork counts its versions from wherever it likes.
+    fork = _is_kin(header) and version[0] not in _WRITERS
+    if fork or (version[0] not in ("INAV", "Cleanflight") and version[1] >= (3, 1)):
         scales += [(f"setpoint[{axis}]", 1 / finer, "deg/s") for axis in range(3)]
         scales += [("imuQuaternion[", 1 / _LARGEST_SHORT, "1")]
     cells = max(map(int, header.get("vbatcellvoltage", "0").split(",")))

@@ -53,6 +53,7 @@ _NEAR_S, _RESTARTS_S, _LONG_GAP_S, _PAUSE_S = 3.0, 1.0, 0.1, 2.0
 starts anew; and from which on a gap in flight, and a pause outside, is worth a line, s."""
 
 _AROUND_S, _AT_END_S, _LESS = 0.75, 0.1, 0.7
+_IN_THE_AIR = "the log ends in the air"
 """Of a flight that signals leave out near the ground, and at the end of a log, s; and the share of what carries the
 vehicle below which nothing does."""
 
@@ -172,8 +173,7 @@ def timeline(
     # Whoever disarms with the rotors on stops the log as it flies, or as it touches down.
     last = next((event.time_s for event in found if event.kind == "end"), np.inf)
     if stops := [event for event in found if event.text == "disarmed" and abs(event.time_s - last) < _AT_END_S]:
-        found = [event for event in found if event.kind != "end" and event not in stops]
-        found += [replace(event, text="disarmed as it flies or touches down") for event in stops]
+        found = [_disarmed(event, flight) if event.kind == "end" else event for event in found if event not in stops]
     # On the ground a failsafe keeps it there.
     found = [
         replace(event, severity="note")
@@ -212,11 +212,20 @@ def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Ite
         if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows), stopped)):
             yield touch
         elif last - end < _AT_END_S and lately.min(initial=np.inf) > _LESS * _carried_by(flight):
-            text = f"the log ends in the air{_voltage_lost(flight)}"
+            text = f"{_IN_THE_AIR}{_voltage_lost(flight)}"
             yield Event(time_s=end, kind="end", text=text, severity="warning" if flight.system else "note")
     for what, at in ends:
         words, severity = _MOMENTS[what]
         yield Event(time_s=at, kind=what, text=words, severity=severity)
+
+
+def _disarmed(end: Event, flight: LogFlight) -> Event:
+    """Say of a log that ends with rotors on that it was disarmed; what climbs does not touch down."""
+    late = flight.climb_rate[-max(2, round(_AT_END_S * flight.rate_hz)) :]
+    climbs = late[np.isfinite(late)]
+    if len(climbs) and float(np.median(climbs)) > _MOVES_M_S:
+        return replace(end, text=f"{end.text}, disarmed")
+    return replace(end, text=end.text.replace(_IN_THE_AIR, "disarmed as it flies or touches down"), severity="note")
 
 
 def _landing(flight: LogFlight, begin: float, end: float, at: float) -> Event:

@@ -121,6 +121,21 @@ def test_integers_whose_length_stays_are_a_quaternion(own):
     assert recognition.signal("body_rate").columns.sign is None
 
 
+def test_four_numbers_that_hardly_change_are_no_quaternion(own):
+    warm = 40.0 + 0.1 * np.random.default_rng(1).standard_normal((len(own.time), 4))
+    attitude = {**named(own.angles, "roll", "pitch", "yaw"), **named(warm, "q0", "q1", "q2", "q3")}
+    recognition = seen(flat_log(own, attitude=attitude))
+    assert recognition.signal("attitude").columns.columns == ("roll", "pitch", "yaw")
+    assert recognition.signal("attitude").sure == "data"
+
+
+def test_rows_of_zeros_before_an_estimator_is_ready_are_left_out_of_a_quaternion(own):
+    values = np.round(8127 * quaternion(own.rotation))
+    values[:50] = 0
+    recognition = seen(flat_log(own, attitude=named(values, "q0", "q1", "q2", "q3")))
+    assert recognition.signal("quaternion").columns.columns == ("q0", "q1", "q2", "q3")
+
+
 def test_a_gyroscope_with_other_axes_does_not_hide_the_order_of_a_quaternion(own):
     attitude = named(quaternion(own.rotation, "xyzw"), "q0", "q1", "q2", "q3")
     rate = named(np.degrees(own.rate[:, [1, 2, 0]] * [1, -1, 1]), *GYRO)
