@@ -10,6 +10,7 @@ from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.lag import delayed
 from cpfls_cli.result import About, about
+from cpfls_cli.rotations import euler_angles, rotation_matrix
 from cpfls_cli.words import capitalised
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -33,7 +34,12 @@ class ChannelRepair:
     in_body: bool = about("1 where world axes were logged in body axes", default=False)
     matrix: Array = field(
         default_factory=lambda: np.eye(3),
-        metadata={"about": About("unit and axes, after the turn to world axes", ("axis", "axis"))},
+        metadata={
+            "about": About(
+                "unit and axes, after the turn to world axes; of the attitude, from axes of the body to those logged",
+                ("axis", "axis"),
+            )
+        },
     )
     gravity_m_s2: float = about("added along the vertical", unit="m/s^2", default=0.0)
     offset: str = about(
@@ -69,12 +75,21 @@ class ChannelRepair:
             return signals
         changed: dict[str, Any] = {self.channel: None if self.dropped else self._truth(reading, signals)}
         repaired = replace(signals, **changed)
-        return replace(repaired, acceleration=accelerated(repaired)) if is_derived(signals) else repaired
+        if is_derived(signals):
+            return replace(repaired, acceleration=accelerated(repaired))
+        turned = self.channel == "attitude" and not self._is_square
+        return replace(repaired, acceleration=_turned_along(signals, repaired)) if turned else repaired
+
+    @property
+    def _is_square(self) -> bool:
+        return bool((self.matrix == np.eye(3)).all())
 
     def _truth(self, reading: Array, signals: Signals) -> Array:
         truth = shifted(reading, signals.time, self.delay_s)
         if self.channel == "rotor_speed":
             return truth
+        if self.channel == "attitude":
+            return truth if self._is_square else euler_angles(rotation_matrix(truth) @ self.matrix)
         if self.in_body:
             truth = np.einsum("tij,tj->ti", signals.rotation, truth)
         truth = truth @ self.matrix.T
@@ -98,6 +113,17 @@ class ChannelRepair:
         weight = np.hanning(len(apart))
         mean = [axis in self.offset for axis in "xyz"] * (weight @ apart) / weight.sum()
         return _turned(to_body.swapaxes(1, 2), mean) if self.offset_in_body else np.asarray(mean)
+
+
+def _turned_along(before: Signals, after: Signals) -> Array | None:
+    """Turn an acceleration with its attitude if it then comes nearer to the derivative of the velocity."""
+    if before.acceleration is None or before.velocity is None:
+        return before.acceleration
+    up, rate = before.vehicle.gravity_m_s2 * UP, np.gradient(before.velocity, before.period, axis=0)
+    felt = _turned(before.rotation.swapaxes(1, 2), before.acceleration + up)
+    ways = before.acceleration, _turned(after.rotation, felt) - up
+    off = [np.linalg.norm(_turned(after.rotation.swapaxes(1, 2), way - rate).mean(axis=0)) for way in ways]
+    return ways[int(np.argmin(off))]
 
 
 def _turned(rotation: Array, values: Array) -> Array:

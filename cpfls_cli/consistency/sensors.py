@@ -14,7 +14,7 @@ from cpfls_cli.consistency.channels import TURNING_RAD_S, gyroscope_apart, least
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber, Finding, in_ms, off_clock
 from cpfls_cli.consistency.gyroscope import DelayScan, GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.consistency.majority import Settled, set_apart, settled
-from cpfls_cli.consistency.repairs import ChannelRepair, shifted
+from cpfls_cli.consistency.repairs import UP, ChannelRepair, shifted
 from cpfls_cli.consistency.rotors import thrust_is_known, weighed
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.hooks import FaultFit, SensorTest
@@ -250,10 +250,10 @@ class Gyroscope:
         """Say why none of its faults is identified."""
         return cls(untested=dict.fromkeys(_of_gyroscope(), reason), apart=apart)
 
-    def late(self, windows: Windows) -> AuditFinding | None:
-        """Find the fault that shifts the gyroscope against the attitude."""
+    def named(self, estimate: str, windows: Windows) -> AuditFinding | None:
+        """Find the fault of a kind, such as the delay of the gyroscope against the attitude, if it is significant."""
         named = (each for each in findings(self.faults, windows.period) if each.named)
-        return next((each for each in named if _estimate(each.name) == "delay"), None)
+        return next((each for each in named if _estimate(each.name) == estimate), None)
 
     def findings(self, windows: Windows) -> tuple[Finding, ...]:
         """Say what is wrong with the gyroscope, far beyond what sensors of multirotors show."""
@@ -269,7 +269,7 @@ class Sensors:
     """What the sensors of flights say of each other."""
 
     gyroscope: Gyroscope  # Once a late attitude is set right.
-    clocks: tuple[ChannelRepair, ...]  # What sets a late attitude and late rotors right.
+    clocks: tuple[ChannelRepair, ...]  # What sets an attitude that is late or turned, and late rotors, right.
     flights: tuple[Signals, ...]  # On one clock.
     motion: Settled  # What a majority says of the channels of the motion.
     findings: tuple[Finding, ...]  # What is wrong.
@@ -278,14 +278,20 @@ class Sensors:
 def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
     """Hold the sensors of flights with the same hardware, at the sampling period of the windows, against each other."""
     gyroscope, dropped = _gyroscope(flights, windows), tuple[Finding, ...]()
-    late = gyroscope.late(windows)
+    late = gyroscope.named("delay", windows)
     # The one that comes after the other is late: sensors, filters and wires delay a log, and nothing makes it early.
     clocks: tuple[ChannelRepair, ...] = ()
     if late and late.coefficients[0].value < 0:
         clocks = _attitude_on_clock(late.coefficients[0], flights, windows)
         flights = _repaired(clocks, flights)
         gyroscope = _gyroscope(flights, windows)
-        late = gyroscope.late(windows)
+        late = gyroscope.named("delay", windows)
+    askew = gyroscope.named("misalignment", windows)
+    turned = None if askew is None else _attitude_on_axes(askew, flights)
+    if turned is not None:
+        clocks, flights = (*clocks, turned), _repaired((turned,), flights)
+        gyroscope = _gyroscope(flights, windows)
+        late = gyroscope.named("delay", windows)
     # A gyroscope that is late is set right by what names its delay.
     delay = late.coefficients[0].value if late else 0.0
     ahead = [replace(each, body_rate=shifted(each.body_rate, each.time, delay)) for each in flights]
@@ -315,6 +321,41 @@ def _attitude_on_clock(found: FaultNumber, flights: Sequence[Signals], windows: 
     alone, both = (_repaired(each, flights) for each in ways)
     along = set_apart(flights, flights, alone, windows) and not set_apart(flights, alone, both, windows)
     return ways[1 if along else 0]
+
+
+def _attitude_on_axes(fault: AuditFinding, flights: Sequence[Signals]) -> ChannelRepair | None:
+    """Turn an attitude whose axes are not those of the gyroscope, where the thrust is along the gyroscope's.
+
+    As of a camera whose axes of the body were drawn askew: what the attitude takes for the thrust leans as it does.
+    Every half of a flight has to say so, since a drag, a wind and an acceleration depend on where it flies.
+
+    `fault`: rotation of the gyroscope against the attitude.
+    """
+    test = CATALOGUE[fault.name].test
+    assert test is not None, "found by it"
+    turn = fault.named_values(test.labels)
+    lean = np.array([turn[1], -turn[0]])
+    for flight in flights:
+        if flight.velocity is None or flight.attitude is None:
+            return None
+        felt = np.gradient(flight.velocity, flight.period, axis=0) + flight.vehicle.gravity_m_s2 * UP
+        felt = np.einsum("tij,ti->tj", flight.rotation, felt)
+        for half in np.array_split(felt, 2):
+            x, y, z = half.mean(axis=0)
+            if not abs(lean @ (x / z, y / z) - lean @ lean) < _HALF * (lean @ lean):
+                return None
+    words = ", ".join(test.number(axis, -each) for axis, each in zip("xyz", turn, strict=True) if each)
+    finding = Finding(
+        f"the attitude is rotated relative to the vehicle, {words}, judged by the gyroscope and the thrust",
+        "align the body axes of the attitude with those of the vehicle",
+        ("attitude", "gyroscope", "thrust"),
+        float(np.abs(turn).max()),
+        "rad",
+        contradiction=False,
+        repairable=True,
+    )
+    matrix = np.asarray(np.linalg.inv(test.error(turn).matrix), dtype=np.float64)
+    return ChannelRepair("attitude", matrix=matrix).with_finding(finding, f"This is {_DONE}")
 
 
 def _gross(fault: AuditFinding) -> Finding | None:

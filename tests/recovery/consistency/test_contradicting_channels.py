@@ -302,6 +302,43 @@ def test_gyroscope_and_rotors_that_are_late_over_one_wire_are_set_right(lively):
     assert (rotors.channel, rotors.delay_s) == ("rotor_speed", pytest.approx(0.08, abs=0.004))
 
 
+def leaned(*angles):
+    return lambda signals: replace(signals, attitude=signals.attitude + np.array(angles))
+
+
+def askew(turn):
+    """Turn the axes of the body that an attitude is of."""
+    matrix = Rotation.from_rotvec(turn).as_matrix()
+    return lambda signals: replace(signals, attitude=euler_angles(signals.rotation @ matrix))
+
+
+@pytest.mark.parametrize(
+    ("change", "degrees"),
+    [
+        (askew([0.0, 0.03, 0.0]), [0.0, 1.72, 0.0]),
+        (askew([0.02, 0.02, 0.03]), [1.15, 1.15, 1.72]),
+        (leaned(0.03, 0.0, 0.0), [1.72, 0.0, 0.0]),
+    ],
+)
+def test_an_attitude_that_leans_as_its_thrust_does_is_turned_back(flights, change, degrees):
+    found = audit([change(signals) for signals in flights], WINDOWS)
+    assert not found.named
+    (sentence,) = found.settled
+    assert sentence.startswith("The attitude is rotated relative to the vehicle, ")
+    said = {axis: float(value) for value, axis in re.findall(r"([+-][\d.]+) deg about ([xyz])", sentence)}
+    np.testing.assert_allclose([said.get(axis, 0.0) for axis in "xyz"], degrees, atol=0.15)
+    again = found.repaired(change(flights[0]))
+    np.testing.assert_allclose(again.attitude.mean(axis=0), flights[0].attitude.mean(axis=0), atol=0.003)
+
+
+@pytest.mark.parametrize("turn", [[0.03, 0.0, 0.0], [0.0, 0.03, 0.0]])
+def test_a_gyroscope_that_is_turned_leaves_the_attitude_as_it_is(flights, turn):
+    turned_back = Rotation.from_rotvec(turn).inv()
+    found = audit([replace(each, body_rate=turned_back.apply(each.body_rate)) for each in flights], WINDOWS)
+    assert [each.name for each in found.named] == ["imu_misalignment"]
+    assert not found.settled
+
+
 def test_motion_that_is_late_with_the_attitude_is_set_right_with_it(lively):
     """As by motion capture: the attitude alone on the clock of the gyroscope contradicts velocity and position."""
     names = ("attitude", "position", "velocity", "acceleration")
@@ -450,6 +487,12 @@ def test_the_effect_is_named_in_spite_of_a_wrong_channel(flights, wrong):
     assert found.effects[0].numbers[0].value == pytest.approx(DRAG, rel=0.05)
     assert words in found.notes[0]
     assert np.nanmax(found.gap.before_floors) < 20
+
+
+def test_the_effect_is_named_in_spite_of_an_attitude_that_leans(flights):
+    found = answer(*map(askew([0.03, 0.02, 0.0]), flights))
+    assert (found.verdict, [effect.name for effect in found.effects]) == ("NAMED", ["rotor_drag"])
+    assert found.effects[0].numbers[0].value == pytest.approx(DRAG, rel=0.05)
 
 
 def test_a_low_passed_log_has_the_floors_of_the_raw_one_and_says_so_first(flights):
