@@ -15,6 +15,7 @@ from cpfls_cli.effects.hooks import FaultFit
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.repair import align_quaternion_signs
 from cpfls_cli.lag import fit_delay
+from cpfls_cli.rotations import attitude_rate, body_rate
 from cpfls_cli.weak_form.resampling import blocks_of, folds
 from cpfls_cli.weak_form.windows import Windows
 
@@ -79,25 +80,48 @@ class Kinematics:
 
 
 def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
-    """Cut a flight with attitude into windows, clear of its ends by the longest delay; None for too short a one."""
+    """Cut a flight with attitude into windows, clear of its ends by the longest delay; None for too short a one.
+
+    What the logging of one of the two averages is averaged in the other, too.
+    """
     from scipy.interpolate import CubicSpline
     from scipy.spatial.transform import Rotation
 
-    margin = int(np.ceil(LONGEST_DELAY_S / windows.period))
+    of_attitude, of_gyro = signals.attitude_spans, signals.body_rate_spans
+    margin = int(np.ceil((LONGEST_DELAY_S + 0.5 * max(sum(of_attitude), sum(of_gyro))) / windows.period))
     inside = slice(margin, len(signals) - margin)
     length = len(windows.weight)
     if len(signals) - 2 * margin < length or signals.attitude is None:
         return None
     # At an overlap of three quarters the windows add up to a constant, so attitude noise cancels between neighbours.
     hop = max(1, length // 4)
-    turned = align_quaternion_signs(Rotation.from_euler("ZYX", signals.attitude[inside, ::-1]).as_quat())
-    relative = _relative(np.moveaxis(sliding_window_view(turned, length, axis=0)[::hop], 1, 2))
+    turned = align_quaternion_signs(Rotation.from_euler("ZYX", signals.attitude[:, ::-1]).as_quat())
+    if of_gyro:
+        turned = _averaged(CubicSpline(signals.time, turned), of_gyro)(signals.time)
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    relative = _relative(np.moveaxis(sliding_window_view(turned[inside], length, axis=0)[::hop], 1, 2))
     time = sliding_window_view(signals.time[inside], length)[::hop]
     rate = -2 * np.einsum("wsi,s->wi", relative[..., :3], windows.slope)
     x, y, z, scalar = np.moveaxis(relative, -1, 0)
     turning = np.stack([scalar, -z, y, z, scalar, -x, -y, x, scalar], axis=-1).reshape(*relative.shape[:-1], 3, 3)
     weighted = turning * windows.weight[:, None, None]
-    return Kinematics(rate, weighted, np.asarray(time), CubicSpline(signals.time, signals.body_rate))
+    gyro = CubicSpline(signals.time, signals.body_rate)
+    if of_attitude:
+        # Angles are what is averaged: in fast turns body axes are others after an update.
+        gyro = _averaged(CubicSpline(signals.time, attitude_rate(signals.attitude, signals.body_rate)), of_attitude)
+        gyro = CubicSpline(gyro.x, body_rate(signals.attitude[np.isin(signals.time, gyro.x)], gyro(gyro.x)))
+    return Kinematics(rate, weighted, np.asarray(time), gyro)
+
+
+def _averaged(values: "CubicSpline", spans: Sequence[float]) -> "CubicSpline":
+    """Average values over spans of time, s, one after another, each around its middle; the ends lose half of them."""
+    from scipy.interpolate import CubicSpline
+
+    for span in spans:
+        whole = values.antiderivative()
+        time = values.x[(values.x >= values.x[0] + 0.5 * span) & (values.x <= values.x[-1] - 0.5 * span)]
+        values = CubicSpline(time, (whole(time + 0.5 * span) - whole(time - 0.5 * span)) / span)
+    return values
 
 
 def _relative(turned: Array) -> Array:

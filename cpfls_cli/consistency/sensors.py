@@ -233,6 +233,7 @@ _SLOWER, _FILTERED_FROM, _NEARER = (8, 4), 0.05, 0.7
 and the share of it that a filter leaves there at most: an error of scale leaves all."""
 
 _FILTERED = "its size against the attitude nears 1 in slow motion, so one of the two is behind a filter"
+_COARSE = "attitude or gyroscope is logged too slowly for windows of gap.window_s"
 _GROSS = {"bias": 0.1, "scale": 0.12, "misalignment": np.radians(8.0), "delay": 0.016}
 
 
@@ -395,8 +396,7 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     apart = (*unlike, *(() if filtered else scaled))
     if unlike:
         return Gyroscope.unjudged("the axes of the gyroscope and the attitude do not match", apart)
-    raw = scanned.seen - np.concatenate([flight.gyro_rate(0.0) for flight in cut])
-    if np.sqrt((raw**2).mean()) < _ROUNDING:
+    if _agrees_to_rounding(flights, windows):
         return Gyroscope.unjudged(
             "the attitude agrees with the gyroscope to rounding, as if it were integrated from it"
         )
@@ -408,12 +408,23 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     untested = {name: still for name, numbers in fits.items() if not numbers.known.any()}
     if filtered:
         untested |= {name: _FILTERED for name, test in _of_gyroscope().items() if test.estimate == "scale"}
+    # What averages for as long as a window leaves nothing of the motion that a window shows.
+    coarse = max(max(sum(each.attitude_spans), sum(each.body_rate_spans)) for each in flights)
+    if coarse >= len(windows.weight) * windows.period:
+        untested |= {name: _COARSE for name, test in _of_gyroscope().items() if test.estimate == "scale"}
     noise = least_noise([signals.body_rate for signals in flights]) * np.sqrt((windows.weight**2).sum())
     if np.sqrt(fit.variance.max()) < _SHARE_OF_NOISE * noise:
         derived = "the attitude contains the gyroscope's own noise, so it was integrated from it and would not show it"
         untested |= {name: derived for name, test in _of_gyroscope().items() if test.integrated}
     faults = (CheckedFault(CATALOGUE[name], numbers) for name, numbers in fits.items() if name not in untested)
     return Gyroscope(tuple(faults), untested, fit, apart)
+
+
+def _agrees_to_rounding(flights: Sequence[Signals], windows: Windows) -> bool:
+    """Check whether the rates by gyroscope and attitude are one, as they are logged."""
+    logged = (kinematics(replace(each, attitude_spans=(), body_rate_spans=()), windows) for each in flights)
+    apart = np.concatenate([motion.rate - motion.gyro_rate(0.0) for motion in logged if motion is not None])
+    return bool(np.sqrt((apart**2).mean()) < _ROUNDING)
 
 
 def _is_filtered(flights: Sequence[Signals], windows: Windows, scanned: DelayScan) -> bool:

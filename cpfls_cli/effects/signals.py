@@ -36,6 +36,10 @@ class Signals:
     name: str = ""  # Of its file, with the part of it where one flight was split.
     begins: float = np.nan  # Stamp of the log's own clock at time 0, s; NaN where there is none.
     slow_rotors: str = ""  # What cannot be found where its log holds the rotors rarely, and the remedy; else empty.
+    # Spans, s, over which rows average these one after another where they are logged slower: the time between updates,
+    # twice where rows lie on straight lines between them.
+    attitude_spans: tuple[float, ...] = ()
+    body_rate_spans: tuple[float, ...] = ()
     attitude: Array | None = None  # Shape (time, 3), rad: roll, pitch, yaw.
     velocity: Array | None = None  # Shape (time, 3), m/s, world frame: relative to the ground.
     position: Array | None = None  # Shape (time, 3), m, world frame.
@@ -344,6 +348,10 @@ class RecordedFlight:
         "stamp of the log's own clock at time 0 of the flight; not finite where there is none", unit="s", gaps=True
     )
     slow_rotors: str = about("what rotors that are logged rarely do not show, and the remedy", default="")
+    attitude_spans: tuple[float, ...] = about(
+        "over which rows average an attitude that is logged slower, one after another", "span", unit="s", default=()
+    )
+    body_rate_spans: tuple[float, ...] = about("the same of body rates", "rate span", unit="s", default=())
     time: Array = about("time on the clock of the flight", "sample", unit="s")
     body_rate: Array = about("body rates p, q, r, as logged", "sample", "axis", unit="rad/s", frame=BODY)
     attitude: Array | None = about(

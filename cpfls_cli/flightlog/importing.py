@@ -118,6 +118,7 @@ def read_signals(
         rate_hz=rate_hz,
         cut_off_hz=filtered,
         updated_hz={signal.name: signal.rate_hz for signal in slow},
+        repeated=tuple(signal.name for signal in slow if signal.between == "repeated"),
         warnings=warnings,
         parameters={},
         stated={},

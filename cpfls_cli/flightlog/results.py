@@ -64,6 +64,7 @@ class ImportReport:
     rate_hz: float = about("rate of the result", unit="Hz")
     cut_off_hz: Mapping[str, float] = about("cut-off of the low-pass filter before the log, by signal", unit="Hz")
     updated_hz: Mapping[str, float] = about("updates a second of signals slower than the log's rows", unit="Hz")
+    repeated: tuple[str, ...] = about("those of them whose rows repeat the last update", "signal", default=())
     lowpass_hz: float | None = about("cut-off of the zero-phase filter of all signals", unit="Hz", default=None)
     delay_s: float = about("delay by which the commands were shifted", unit="s", default=0.0)
     delay: DelayEstimate | None = part(default=None)

@@ -131,7 +131,8 @@ class ReadFlight:
     """A flight as it was read.
 
     `flown_at`: when the log begins, s since 1970 began (UTC), NaN where it does not say, and of an artifact;
-    `updated_hz`: updates a second of signals that its log has more rows than; `begins`: stamp of the log's own clock at
+    `updated_hz`: updates a second of signals that its log has more rows than; `repeated`: those of them whose rows
+    repeat the last one; `begins`: stamp of the log's own clock at
     time 0, s, NaN where there is none; `stated`: what the log says of its vehicle, as `stated_vehicle`; `system`: what
     wrote the log, such as ``PX4``, with its version where it is known.
     """
@@ -142,9 +143,19 @@ class ReadFlight:
     warnings: tuple[str, ...]
     flown_at: float = nan
     updated_hz: Mapping[str, float] = field(default_factory=dict)
+    repeated: tuple[str, ...] = ()
     begins: float = nan
     stated: Mapping[str, str] = field(default_factory=dict)
     system: str = ""
+
+    def spans(self, *names: str) -> tuple[float, ...]:
+        """Give the spans over which rows average a signal, s, one after another; none if it is as fast as they are.
+
+        Motion of a frequency f shows sinc(f span) times where rows repeat updates, which come late by half the span as
+        well, and its square times where they lie on straight lines between them.
+        """
+        name = next((each for each in names if each in self.updated_hz), None)
+        return () if name is None else (1 / self.updated_hz[name],) * (1 if name in self.repeated else 2)
 
 
 class ReadAlone(NamedTuple):
@@ -190,7 +201,13 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     flight, origin = read_whole(path)
     own = ReadFlight(path.name, flight.signals, units_of(path, origin, study), (), begins=flight.begins)
     if isinstance(flight, Imported):
-        return replace(own, updated_hz=flight.updated_hz, stated=flight.stated, system=flight.system)
+        return replace(
+            own,
+            updated_hz=flight.updated_hz,
+            repeated=flight.repeated,
+            stated=flight.stated,
+            system=flight.system,
+        )
     return own
 
 
@@ -204,7 +221,7 @@ def read_import(name: str, parts: Sequence[Imported], study: Study) -> ReadFligh
     for part in parts:
         _require_speeds(name, part, study)
     first = parts[0]
-    updated = min((part.updated_hz for part in parts), key=lambda each: min(each.values(), default=np.inf))
+    slowest = min(parts, key=lambda each: min(each.updated_hz.values(), default=np.inf))
     signals, begins = [part.signals for part in parts], first.first_stamp_s
     notes: tuple[str, ...] = ()
     if len(parts) == 1:
@@ -216,7 +233,8 @@ def read_import(name: str, parts: Sequence[Imported], study: Study) -> ReadFligh
             own["time"] = own["time"] + part.span_s[0]
         joined = {each: np.concatenate([own[each] for own in signals]) for each in shared}
     known = (first.stated, first.system)
-    return ReadFlight(name, joined, _units(study), notes, first.flown_at, updated, begins, *known)
+    updated = (slowest.updated_hz, slowest.repeated)
+    return ReadFlight(name, joined, _units(study), notes, first.flown_at, *updated, begins, *known)
 
 
 def _require_speeds(log: str, part: Imported, study: Study) -> None:
@@ -302,6 +320,8 @@ def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
         voltage=None if doubts_on_voltage(known, flight.units) else known.get("voltage"),
         ground_height_m=study.gap.ground_height_m,
         setpoints={name: own.reshape(len(time), -1) for name, own in asked.items() if np.isfinite(own).all()},
+        attitude_spans=flight.spans("attitude", "quaternion"),
+        body_rate_spans=flight.spans("body_rate"),
         **optional,
     )
     return made, notes

@@ -1,10 +1,14 @@
 """Faults put into a gyroscope come back, each alone and all together; nothing wrong is called nothing wrong."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from cpfls_cli.consistency.check import audit
 from cpfls_cli.consistency.sensors import sensors_of
+from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight, faulty_flights
 
@@ -126,3 +130,34 @@ def test_other_sampling_rates(period):
     found = audit(made, windows(period, 0.4, 0.5))
     assert names(found) == {"channel_delay"}
     assert fit_of(made, windows(period, 0.4, 0.5)).value[12] == pytest.approx(0.012, abs=0.0005)
+
+
+def logged_slowly(flight, channel, hz, between):
+    """Take a channel at updates of its own, between two of which rows repeat the last or lie on a straight line."""
+    values = getattr(flight, channel)
+    stamps = np.arange(flight.time[0], flight.time[-1], 1 / hz)
+    updates = CubicSpline(flight.time, values)(stamps)
+    last = np.searchsorted(stamps, flight.time, side="right") - 1
+    straight = np.column_stack([np.interp(flight.time, stamps, own) for own in updates.T])
+    spans = (1 / hz,) if between == "repeated" else (1 / hz, 1 / hz)
+    return replace(flight, **{channel: updates[last] if between == "repeated" else straight, f"{channel}_spans": spans})
+
+
+@pytest.mark.parametrize("channel", ["attitude", "body_rate"])
+@pytest.mark.parametrize("between", ["repeated", "interpolated"])
+@pytest.mark.parametrize(("scale", "found"), [(0.0, set()), (0.05, {"gyro_scale"})])
+def test_a_channel_that_is_logged_slowly_shows_the_scale_of_the_gyroscope_alone(channel, between, scale, found):
+    faults = Faults(scale=np.array([scale, 0, 0]))
+    made = faulty_flights(np.random.default_rng(1), faults, level=LEVELS["low"])
+    result = audit([logged_slowly(flight, channel, 9.3, between) for flight in made], WINDOWS)
+    assert names(result) - {"channel_delay"} == found
+    for own in (each for each in result.named if each.name == "gyro_scale"):
+        [x] = [each for each in own.coefficients if each.named]
+        assert (x.name, x.value) == ("x", pytest.approx(scale, abs=0.01))
+
+
+def test_rates_made_of_an_attitude_that_is_logged_slowly_show_no_scale():
+    made = faulty_flights(np.random.default_rng(1), Faults(), level=LEVELS["low"])
+    slow = [logged_slowly(flight, "attitude", 10.0, "interpolated") for flight in made]
+    found = audit([replace(each, body_rate=body_rate_of(each.time, each.attitude, None)) for each in slow], WINDOWS)
+    assert (names(found), "gyro_scale" in found.untested) == (set(), True)

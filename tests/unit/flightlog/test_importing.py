@@ -295,6 +295,15 @@ def test_a_slow_column_in_a_fast_log_is_distinguished_from_a_wrong_clock():
         read_signals(columns, settings())
 
 
+def test_a_signal_whose_rows_repeat_updates_is_known():
+    columns = log(800)
+    held = {name: np.repeat(columns[name][::4], 4) for name in "pqr"}
+    signals = read_signals(columns | held, settings())
+    assert signals.repeated == ("body_rate",)
+    assert signals.updated_hz["body_rate"] == pytest.approx(25, rel=0.01)
+    assert read_signals(columns, settings()).repeated == ()
+
+
 TAU, PERIOD = 0.07, 0.004
 
 

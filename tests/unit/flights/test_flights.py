@@ -12,6 +12,7 @@ import pytest
 from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study, resolved_yaml
+from cpfls_cli.effects.signals import RecordedFlight
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.flightlog.results import MOTION, Flight, Imported
@@ -99,6 +100,15 @@ def read(vehicle, speed, **changes):
     known = {"time": np.arange(SAMPLES) / 100, "body_rate": np.ones((SAMPLES, 3))} | stated
     known = {name: values for name, values in known.items() if values is not None}
     return signals_of(ReadFlight("flight.csv", known, {}, ()), known, Study(vehicle=vehicle))
+
+
+def test_a_flight_knows_over_what_its_slow_channels_are_averaged():
+    known = {"time": np.arange(SAMPLES) / 100, "body_rate": np.ones((SAMPLES, 3)), "body_torque": np.ones((SAMPLES, 3))}
+    slow = {"updated_hz": {"quaternion": 10.0, "body_rate": 50.0}, "repeated": ("body_rate",)}
+    flight, _ = signals_of(ReadFlight("flight.csv", known, {}, (), **slow), known, Study())
+    assert (flight.attitude_spans, flight.body_rate_spans) == ((0.1, 0.1), (0.02,))
+    kept = RecordedFlight.of(flight, "given").flight(flight.vehicle, 0.0)
+    assert (kept.attitude_spans, kept.body_rate_spans) == ((0.1, 0.1), (0.02,))
 
 
 @pytest.fixture
