@@ -284,8 +284,8 @@ def widened(hidden, named):
 
 def test_intervals_leave_room_for_what_is_too_small_for_a_name():
     drag, body = candidate("rotor_drag"), candidate("parasitic_drag")
-    found, (beside, unnamed, _) = widened([(drag, [1.3e-3]), (body, [0.01, 0.01, 0.01, 0.0, 0.0, 0.0])], drag)
-    (alone,), (there,) = found.estimates.effects[0], beside.effects[0]
+    found, (wider, unnamed, _) = widened([(drag, [1.3e-3]), (body, [0.01, 0.01, 0.01, 0.0, 0.0, 0.0])], drag)
+    (alone,), (there,) = found.estimates.effects[0], wider.effects[0]
     assert unnamed == ("parasitic_drag",)
     assert alone.low > 1.3e-3
     assert there.low <= 1.3e-3 <= there.high
@@ -294,9 +294,9 @@ def test_intervals_leave_room_for_what_is_too_small_for_a_name():
 
 def test_where_nothing_else_is_there_intervals_stay_what_they_are():
     drag = candidate("rotor_drag")
-    found, (beside, unnamed, _) = widened([(drag, [1.3e-3])], drag)
+    found, (wider, unnamed, _) = widened([(drag, [1.3e-3])], drag)
     assert unnamed == ()
-    assert beside is found.estimates
+    assert wider is found.estimates
 
 
 def growing(effect):
@@ -330,8 +330,8 @@ def glauert(signals, _shape):
 def test_an_interval_holds_the_number_of_slow_flight_where_a_formula_bends():
     lift = candidate("translational_lift")
     bending = lift._replace(effect=replace(lift.effect, columns=glauert))
-    found, (beside, unnamed, _) = widened([(bending, [0.05])], lift)
-    (alone,), (there,) = found.estimates.effects[0], beside.effects[0]
+    found, (wider, unnamed, _) = widened([(bending, [0.05])], lift)
+    (alone,), (there,) = found.estimates.effects[0], wider.effects[0]
     assert "a bend of translational_lift over speed" in unnamed
     assert alone.high < 0.05
     assert there.low <= 0.05 <= there.high

@@ -61,8 +61,8 @@ def test_what_is_kept_of_a_flight_is_that_of_the_formula_that_was_asked_for():
     signals = fly(1, EFFECTS)
     flight, faster = weak(signals, force=True), weak(replace(signals, velocity=3 * signals.velocity), force=True)
     assert weak(signals, force=True) is flight
-    (alone, _), (beside, _) = (bends_of([candidate("rotor_drag")], each) for each in ([flight], [flight, faster]))
-    for bend in (alone, beside):
+    (alone, _), (faster_too, _) = (bends_of([candidate("rotor_drag")], each) for each in ([flight], [flight, faster]))
+    for bend in (alone, faster_too):
         fresh = weak(replace(signals), force=True)
         rows = [each.rows(Candidate(bend, {}), each.signals) for each in (flight, fresh)]
         np.testing.assert_array_equal(*rows)
