@@ -121,8 +121,13 @@ class System:
         following = iter(values.tolist())
         chosen = tuple(each.at({s.name: next(following) for s in each.effect.shapes}) for each in self.chosen)
         before, after = ([each.key for each in own if each.effect.apply] for own in (self.chosen, chosen))
+        if before != after:
+            return system(self.flights, chosen)
         # Where nothing that changes signals moves, all other columns are what they were.
-        return replace(self, chosen=chosen) if before == after else system(self.flights, chosen)
+        stay = {each.key for each in (nuisance(), *chosen)}
+        return replace(
+            self, chosen=chosen, cache={key: own for key, own in self.cache.items() if {key, key[1:]} & stay}
+        )
 
     def following(self, linear: Array) -> Array:
         """Give what coefficients, shape (column,), say of the shapes, within their bounds; NaN for nothing."""

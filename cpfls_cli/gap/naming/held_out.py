@@ -258,7 +258,7 @@ class Without(NamedTuple):
 
 
 def _bent(judgement: Judgement, compared: Mapping[str, Without]) -> Refusal | None:
-    """Find an effect that another named one, whose formula bends over speed, surely explains more without.
+    """Find an effect that another named one, whose formula bends over speed or height, surely explains more without.
 
     Of several the smallest.
     """
@@ -272,7 +272,8 @@ def _bent(judgement: Judgement, compared: Mapping[str, Without]) -> Refusal | No
         step = rank_effects(hypothesis.flights, others, bends, settings, None, also=(own,))
         scored = next(each for each in step.ranking if each.candidate.effect.name == name)
         best = step.ranking[0]
-        if best is not scored and not unbeaten(best, [scored], step.above_floor):
+        # One that is refused for another reason is compared with nothing.
+        if best.gain > scored.gain > -np.inf and not unbeaten(best, [scored], step.above_floor):
             return Refusal(name, f"{best.candidate.effect.name} explains surely more in its place")
     return None
 
