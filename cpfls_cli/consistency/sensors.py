@@ -335,16 +335,21 @@ def _attitude_on_axes(fault: AuditFinding, flights: Sequence[Signals]) -> Channe
     test = CATALOGUE[fault.name].test
     assert test is not None, "found by it"
     turn = fault.named_values(test.labels)
-    lean = np.array([turn[1], -turn[0]])
+    lean, across = np.array([turn[1], -turn[0]]), list[Array]()
     for flight in flights:
         if flight.velocity is None or flight.attitude is None:
             return None
         felt = np.gradient(flight.velocity, flight.period, axis=0) + flight.vehicle.gravity_m_s2 * UP
         felt = np.einsum("tij,ti->tj", flight.rotation, felt)
-        for half in np.array_split(felt, 2):
-            x, y, z = half.mean(axis=0)
-            if not abs(lean @ (x / z, y / z) - lean @ lean) < _HALF * (lean @ lean):
+        for half in np.array_split(felt[:, :2] / felt[:, 2].mean(), 2):
+            if not abs(lean @ half.mean(axis=0) - lean @ lean) < _HALF * (lean @ lean):
                 return None
+        # In still air this is more precise than the gyroscope is, in gusts less.
+        moved = np.column_stack([flight.ground_velocity[:, :2], np.ones(len(felt))])
+        across.append(np.linalg.lstsq(moved, felt[:, :2] / felt[:, 2].mean(), rcond=None)[0][-1])
+    x, y = np.mean(across, axis=0)
+    ends = {each.name: (each.low, each.high) for each in fault.coefficients}
+    turn[:2] = [np.clip(own, *ends.get(axis, (0.0, 0.0))) for axis, own in zip(test.labels[:2], (-y, x), strict=True)]
     words = ", ".join(test.number(axis, -each) for axis, each in zip("xyz", turn, strict=True) if each)
     finding = Finding(
         f"the attitude is rotated relative to the vehicle, {words}, judged by the gyroscope and the thrust",
