@@ -350,7 +350,9 @@ def _attitude_on_axes(fault: AuditFinding, flights: Sequence[Signals]) -> Channe
     x, y = np.mean(across, axis=0)
     ends = {each.name: (each.low, each.high) for each in fault.coefficients}
     turn[:2] = [np.clip(own, *ends.get(axis, (0.0, 0.0))) for axis, own in zip(test.labels[:2], (-y, x), strict=True)]
-    words = ", ".join(test.number(axis, -each) for axis, each in zip("xyz", turn, strict=True) if each)
+    words = ", ".join(
+        test.number(axis, -each) for axis, each in zip("xyz", turn, strict=True) if abs(each) >= test.smallest
+    )
     finding = Finding(
         f"the attitude is rotated relative to the vehicle, {words}, judged by the gyroscope and the thrust",
         "align the body axes of the attitude with those of the vehicle",
