@@ -250,9 +250,11 @@ def _follow(measured: Array, asked: Array, rate_hz: float, factors: tuple[float,
 
     Both are of shape (time, 3), the latter NaN where nothing is; one of the factors makes it as large as the former.
     """
-    smooth = slow(measured, rate_hz, _MOTION_HZ)
-    edge = (len(asked) - len(smooth)) // 2
-    within = asked[edge : edge + len(smooth)]
+    smooth, known = slow(measured, rate_hz, _MOTION_HZ), np.isfinite(asked)
+    # In the same band, or what asks for a short move is larger than what follows it.
+    share = slow(known.astype(float), rate_hz, _MOTION_HZ)
+    within = slow(np.where(known, asked, 0.0), rate_hz, _MOTION_HZ) / np.maximum(share, 0.5)
+    within[share < 0.5] = np.nan
     tried = (_at_delay(smooth, within, round(late * rate_hz), factors) for late in _LATE_S)
     return max(tried, key=lambda own: float(np.sum(np.abs(own.along))))
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from math import nan, pi
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -21,6 +22,15 @@ _LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
 # Cells of a battery, and the largest voltage of one, as the header has it, from which on it is in hundredths.
 _MOST_CELLS, _HUNDREDTHS = 15, 100
+# What the log viewer calls lines of the header in what it exports, where it is no name that any version has; the numbers
+# of a PID, which it writes more behind.
+_EXPORTED: Final = {
+    "dterm_lpf_dyn_hz": "dterm_lowpass_dyn_hz",
+    "dterm_lpf2_hz": "dterm_lowpass2_hz",
+    "pidSumLimit": "pidsum_limit",
+    "pidSumLimitYaw": "pidsum_limit_yaw",
+}
+_CELLS, _OF_PID = ("vbatmincellvoltage", "vbatwarningcellvoltage", "vbatmaxcellvoltage"), 3
 _WRITERS = ("Betaflight", "INAV", "Cleanflight", "EmuFlight", "Rotorflight")
 
 
@@ -45,7 +55,9 @@ def flights(path: Path) -> list[LogContents]:
     if not begins:
         raise InputError(f"{path}: not a blackbox log: it does not start like one")
     try:
-        found = [_contents(content[begin:end]) for begin, end in zip(begins, [*begins[1:], None], strict=True)]
+        found = [
+            _of_frames(*_flight(content[begin:end])) for begin, end in zip(begins, [*begins[1:], None], strict=True)
+        ]
     except KeyError as error:
         raise InputError(f"{path}: a broken blackbox log: its header lacks the line {error}") from None
     except (ValueError, OverflowError) as error:
@@ -56,8 +68,30 @@ def flights(path: Path) -> list[LogContents]:
     return whole
 
 
-def _contents(content: bytes) -> LogContents:
-    header, rows, slow, broken = _flight(content)
+def of_export(stated: Mapping[str, str], names: list[str], rows: Array) -> LogContents:
+    """Read a flight that Betaflight's log viewer exported: lines of the header by the viewer's names, raw numbers."""
+    header = {_EXPORTED.get(name, name): value for name, value in stated.items()}
+    if "gyroScale" in header:
+        # In rad and a microsecond, of whatever the log has it in.
+        scale = struct.pack(">f", 1e6 * _DEGREES * float(header["gyroScale"]))
+        header["gyro_scale"] = f"0x{scale.hex()}"
+    cells = [header[name] for name in _CELLS if name in header]
+    header |= {"vbatcellvoltage": ",".join(cells)} if cells else {}
+    gains = [header.get(f"{axis}PID", "").split(",") for axis in ("roll", "pitch", "yaw")]
+    if all(len(own) > _OF_PID for own in gains):
+        fast = "d_max" if re.match(r"Betaflight 20", header.get("Firmware revision", "")) else "d_min"
+        header[fast] = ",".join(own[_OF_PID] or "0" for own in gains)
+        header |= {
+            f"{axis}PID": ",".join(own[:_OF_PID]) for axis, own in zip(("roll", "pitch", "yaw"), gains, strict=True)
+        }
+    header["Firmware type"] = header.get("Firmware revision", "").partition(" ")[0]
+    # What is logged as it changes is unknown before it first does.
+    known = np.isfinite(rows)
+    rows = np.where(known, rows, rows[known.argmax(axis=0), range(len(names))])
+    return _of_frames(header | {"Field I name": ",".join(names)}, rows, np.empty((0, 1), dtype=np.int64), 0)
+
+
+def _of_frames(header: Mapping[str, str], rows: IntArray | Array, slow: IntArray, broken: int) -> LogContents:
     columns, units = _scaled_columns(header, rows)
     if len(slow):
         # What is logged as it changes, such as modes, at each main frame.
@@ -157,7 +191,7 @@ def _fields(header: Mapping[str, str]) -> dict[str, list[Field]]:
     return fields
 
 
-def _scaled_columns(header: Mapping[str, str], rows: IntArray) -> tuple[dict[str, Array], dict[str, str]]:
+def _scaled_columns(header: Mapping[str, str], rows: IntArray | Array) -> tuple[dict[str, Array], dict[str, str]]:
     """Name the columns, and give those whose unit the header states in that unit."""
     names = header["Field I name"].split(",")
     # A small step back is that of a damaged frame.

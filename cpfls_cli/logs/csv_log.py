@@ -20,6 +20,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import most_held
+from cpfls_cli.logs.blackbox import of_export
 from cpfls_cli.logs.formats import MOST_LISTED, LogContents
 from cpfls_cli.words import some
 
@@ -28,6 +29,7 @@ _LONGEST_LINE = 1 << 20
 _LONGEST_ROW = 64  # Lines of the first row.
 _LONGEST_LIST = 50  # Numbers of a list that becomes columns: of a vehicle nothing is longer, a scan is.
 _REMARKS: Final = ("#", "%", "//")  # With which a remark before the column names begins.
+_EXPORT: Final = '"Product","Blackbox flight data recorder'  # With which what Betaflight's log viewer exports begins.
 # A number as it is written in much of Europe, where semicolons separate columns.
 _DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
 
@@ -35,13 +37,17 @@ _DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read columns of a log; without a wish, those whose first value is a number, a time or absent."""
     with _opened(path) as table:
-        names, first = table.names, dict(zip(table.names, table.first, strict=False))
+        names, first, stated = table.names, dict(zip(table.names, table.first, strict=False)), table.stated
         # What is absent at first may be a word later on.
         for row in (own for _, own in table.rows if len(own) == len(first)):
             if all(map(str.strip, first.values())):
                 break
             first = {name: own.strip() or later for (name, own), later in zip(first.items(), row, strict=True)}
     numeric = [name for name in names if name in first and _kind(first[name])]
+    if stated:
+        columns = read_csv(path, set(numeric))
+        ordered = sorted(numeric, key=lambda name: (name != "loopIteration", name != "time"))
+        return of_export(stated, ordered, np.column_stack([columns[name] for name in ordered]))
     units = {name: "s" for name in numeric if _kind(first[name]) == "time"}
     if wanted is not None:
         return LogContents({"": read_csv(path, set(wanted))}, units)
@@ -92,6 +98,7 @@ class _Table(NamedTuple):
     names: list[str]
     first: list[str]
     rows: _Rows
+    stated: dict[str, str]  # Lines of the header of a log that a viewer exported, which stand before the names.
 
 
 @contextmanager
@@ -114,6 +121,11 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     remark, header, line = "", next(lines, ""), 1
     while header.startswith(_REMARKS):
         remark, header, line = header.lstrip("#%/ "), next(lines, ""), line + 1
+    stated = {}
+    if header.startswith(_EXPORT):
+        while len(pair := _fields(header)) == 2:
+            stated[pair[0]] = pair[1]
+            header, line = next(lines, ""), line + 1
     if len(header) == _LONGEST_LINE:
         raise InputError(f"{path}: not a CSV file: its first line, the column names, does not end")
     if not header.strip():
@@ -155,7 +167,7 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         parts = zip(names, sizes, strict=True)
         names = [own for name, size in parts for own in ([f"{name}[{at}]" for at in range(size)] or [name])]
         first = _spread(first, sizes)
-    return _Table(names, first, rows)
+    return _Table(names, first, rows, stated)
 
 
 def _with_points(field: str) -> str:
