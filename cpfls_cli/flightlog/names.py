@@ -19,6 +19,7 @@ from cpfls_cli.flightlog.vocabulary import (
     KIN,
     MEANINGS,
     NOT_MEASURED,
+    PARROT,
     PX4,
     RATE_WORDS,
     WISHED,
@@ -42,6 +43,12 @@ class ColumnGroup:
     pattern: str  # The name with ``*`` in place of the axis or the number.
     kind: Kind  # In what the columns differ.
     columns: tuple[str, ...]  # In the order of axes or numbers, of a quaternion w, x, y, z.
+
+    @property
+    def pqr(self) -> bool:
+        """Whether the columns differ in p, q and r."""
+        before, _, after = self.pattern.partition("*")
+        return self.kind == "angles" and self.columns[0].removeprefix(before).removesuffix(after) == "p"
 
     @cached_property
     def ending(self) -> str:
@@ -153,7 +160,9 @@ _AXES_OF_A_BODY = 3
 def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Named, ...]:
     """List what groups of columns may be by name, what a kind of log is known for first; without a system any."""
     known = [named for group in groups for named in _known_to_systems(group, system)]
-    kinds = {own: {named.group.columns for named in known if named.known == own} for own in (PX4, *KIN, CRAZYFLIE)}
+    kinds = {
+        own: {named.group.columns for named in known if named.known == own} for own in (PX4, *KIN, CRAZYFLIE, PARROT)
+    }
     # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
     found = [named for named in known if system or len(kinds[named.known]) > 1]
     found += [named for group in groups for named in _by_words(group)]
@@ -182,7 +191,7 @@ def is_of(system: str, known: str) -> bool:
 def _known_to_systems(group: ColumnGroup, system: str) -> Iterator[Named]:
     for rank, known in enumerate(_MEASURED):
         of_other = system and not is_of(system, known.system)
-        angles = known.signal != "attitude" or group.kind == "angles"
+        angles = known.signal != "attitude" or (group.kind == "angles" and not group.pqr)
         # On its card a Crazyflie puts the name of an event before that of a variable.
         patterns = (group.pattern, group.pattern.partition(".")[2] if system.startswith(CRAZYFLIE) else "")
         suits = [own.signal for own in MEANINGS if own.signal == known.signal and _suits(own, group)]
@@ -204,7 +213,6 @@ def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
         rank += 10 * sum(word in vocabulary.SECOND_HAND for word in words)
         rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
     before, _, after = group.pattern.partition("*")
-    pqr = wished and group.kind == "angles" and group.columns[0].removeprefix(before).removesuffix(after) == "p"
     squared = bool(re.search(r"[a-z]2($|_)", f"{before}{after}")) or bool({"squared", "sq"} & {*words})
     for meaning in () if wished and words == group.words else MEANINGS:
         signal, stated, ending = meaning.signal, _stated_unit(group, meaning.signal), group.ending
@@ -214,7 +222,7 @@ def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
         named = _SETPOINT_OF.get(signal) if wished else None if squared and signal in ROTORS else signal
         if named is None or other or not _suits(meaning, group) or (NOT_MEASURED - allowed) & {*words}:
             continue
-        if signal == "body_rate" if pqr else _means(meaning, group, words):
+        if signal == "body_rate" if wished and group.pqr else _means(meaning, group, words):
             fast = not wished and any(signal in vocabulary.IN_RADIANS.get(word, ()) for word in words)
             usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
             yield Named(named, group, rank, *(stated or (usual, 1.0)))
@@ -263,8 +271,7 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     if signal == "position" and group.kind != "numbers":
         return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
-        pqr = group.columns[0].removesuffix(group.ending) == "p"
-        turns = pqr or ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
+        turns = group.pqr or ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
         return turns if signal == "body_rate" else not turns and not own & {"torque", "tau", "moment"}
     return bool({*words[-meaning.last :]} & meaning.words)
 

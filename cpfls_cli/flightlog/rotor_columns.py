@@ -28,7 +28,7 @@ from cpfls_cli.flightlog.stated_vehicle import (
     whole,
 )
 from cpfls_cli.flightlog.topics import logged_hz
-from cpfls_cli.flightlog.vocabulary import ARDUPILOT, ASKED, BETAFLIGHT, CRAZYFLIE, PX4, RANGES
+from cpfls_cli.flightlog.vocabulary import ARDUPILOT, ASKED, BETAFLIGHT, CRAZYFLIE, PARROT, PX4, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 from cpfls_cli.words import joined
 
@@ -181,8 +181,12 @@ def _guess(found: Found, parameters: Parameters) -> tuple[Guess | None, list[str
         return None, []
     columns, values = tuple(named.group.columns[index] for index in chosen.outputs), values[:, chosen.outputs]
     is_speed = named.signal == "rotor_speed"
+    # What turns the other way may count downward.
+    turns = np.median(values, axis=0) if is_speed else values.max(axis=0)
+    sign = tuple(float(value) for value in np.where(turns < 0, -1.0, 1.0))
+    values = values if is_speed else values * sign
     guess = _speed_unit(named, values, parameters) if is_speed else _command_unit(named, values, parameters, chosen)
-    if guess is None:
+    if guess is None or (guess.columns.offset and min(sign) < 0):
         return None, []
     sure, rivals = guess.sure, guess.rivals
     still = [column for column in named.group.columns if column not in (*columns, *chosen.others)]
@@ -193,8 +197,7 @@ def _guess(found: Found, parameters: Parameters) -> tuple[Guess | None, list[str
         every = f"columns: [{', '.join((*columns, *chosen.doubtful))}]"
         words = f"if {joined(chosen.doubtful)}, which do not rise with the others and swing further, are no servos"
         sure, rivals = "guess", (Rival(every, words), *rivals)
-    sign = tuple(float(value) for value in np.where(np.median(values, axis=0) < 0, -1.0, 1.0))
-    mapped = replace(guess.columns, columns=columns, sign=sign if is_speed and min(sign) < 0 else None)
+    mapped = replace(guess.columns, columns=columns, sign=sign if min(sign) < 0 else None)
     guess = replace(guess, columns=mapped, sure=sure, rivals=rivals, rate_hz=logged_hz(time))
     return guess, [f"{column}: {why}" for column, why in chosen.others.items()]
 
@@ -399,8 +402,8 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
         reason, scale = f"{called}: {begin:g} to {end:g} by {where}", 1 / (end - begin)
         sure: Sure = "guess" if where == _USUAL_PULSES else "named"
         return _in_unit(named, "1", scale, reason, sure, offset=-begin / (end - begin))
-    if named.known == CRAZYFLIE:
-        return _in_unit(named, "1", named.scale, f"{called}: 16 bits, as on a Crazyflie", "named")
+    if named.known in (CRAZYFLIE, PARROT):
+        return _in_unit(named, "1", named.scale, f"{called}: of {1 / named.scale:.0f}, as on a {named.known}", "named")
     words = {*named.group.words}
     if named.unit in SPEED_UNITS or words & {"om", "omega", "omcmd", "rpm", "rads", "speed", "rad"}:
         unit = named.unit or ("rpm" if high > _RPM_FROM else "rad/s")
@@ -482,6 +485,8 @@ def _meaning(
         before = "of firmware before November 2022 they are thrusts, before it compensates for the battery"
         said = "motor.m* of a Crazyflie are what the motors get, by its firmware since November 2022"
         return choose("speed", said, Rival("rotor_command_is: thrust", before))
+    if command.kind == PARROT:
+        return choose("thrust", "MathWorks' model makes the commands of a Parrot minidrone of thrusts")
     if parameters.get("THR_MDL_FAC") is not None:
         value = float(parameters["THR_MDL_FAC"])
         said = f"THR_MDL_FAC is {value:g}"

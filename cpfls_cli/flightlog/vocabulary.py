@@ -11,7 +11,7 @@ from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.units import UnitName
 
 _TABLE: Final = tomllib.loads(Path(__file__).with_name("columns.toml").read_text("utf-8"))
-PX4, ARDUPILOT, BETAFLIGHT, CRAZYFLIE = "PX4", "ArduPilot", "Betaflight", "Crazyflie"
+PX4, ARDUPILOT, BETAFLIGHT, CRAZYFLIE, PARROT = "PX4", "ArduPilot", "Betaflight", "Crazyflie", "Parrot"
 _UNITS: Final[dict[str, UnitName]] = {own.replace(" ", "~"): own for own in get_args(UnitName)}
 KIN: Final = {ARDUPILOT: ("Ardu",), BETAFLIGHT: ("INAV", "Cleanflight", "EmuFlight")}
 

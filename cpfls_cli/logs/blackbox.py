@@ -22,8 +22,8 @@ _LARGEST_SHORT = 0x7FFF
 _DEGREES = 180 / pi
 # Cells of a battery, and the largest voltage of one, as the header has it, from which on it is in hundredths.
 _MOST_CELLS, _HUNDREDTHS = 15, 100
-# What the log viewer calls lines of the header in what it exports, where it is no name that any version has; the numbers
-# of a PID, which it writes more behind.
+# What the log viewer calls lines of the header in what it exports, where it is no name that any version has, and how
+# many numbers a line of a PID has without those that it adds.
 _EXPORTED: Final = {
     "dterm_lpf_dyn_hz": "dterm_lowpass_dyn_hz",
     "dterm_lpf2_hz": "dterm_lowpass2_hz",

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import warnings
 import zlib
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import lru_cache
 from math import prod
 from pathlib import Path
@@ -19,6 +19,7 @@ import scipy.io
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import FileState, is_sealed, longest_read_s, most_held, state_of
+from cpfls_cli.flightlog.vocabulary import PARROT
 from cpfls_cli.logs.formats import MOST_LISTED, LogContents
 from cpfls_cli.units import known_unit
 from cpfls_cli.words import some
@@ -48,6 +49,10 @@ with h5py.File(sys.argv[1], "r") as file:
 # Kind of a variable of a .mat that is compressed; what the probe of a file ends with that states too much.
 _COMPRESSED, _INFLATED = 15, 3
 _TIME_UNITS = ("s", "ms", "us", "ns")
+# Columns of the buses that MathWorks' model of a Parrot minidrone logs, whose names are lost.
+_STATES = "x y z yaw pitch roll vx vy vz gyro_x gyro_y gyro_z"
+_SENSED = "acc_x acc_y acc_z gyro_x gyro_y gyro_z height pressure"
+_BUSES = {"rt_estim": _STATES, "rt_estimatedStates": _STATES, "rt_sensor": _SENSED}
 _OBJECTS = "holds objects or tables, which MATLAB alone reads: save their columns as vectors"
 
 
@@ -76,7 +81,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     read = {name.partition("[")[0] for name in columns}
     others = [name for name in names if name not in read] if wanted is None else []
     warnings = (f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}",) if others else ()
-    return LogContents({"": columns}, units, warnings=warnings)
+    system = f"{PARROT} minidrone" if any(name.startswith((*_BUSES, "rt_motor", "rt_yout/motors")) for name in columns) else ""
+    return LogContents({"": columns}, units, system=system, warnings=warnings)
 
 
 def is_log(path: Path) -> bool:
@@ -150,8 +156,12 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, Any, str]]:
 
 
 def _of_mat(path: Path) -> Iterator[tuple[str, Any, str]]:
+    timed: dict[str, dict[str, Any]] = {}
+
     def within(prefix: str, value: Any) -> Iterator[tuple[str, Any, str]]:
-        if isinstance(value, dict):
+        if isinstance(value, dict) and {"time", "signals"} <= value.keys():
+            timed[prefix] = value
+        elif isinstance(value, dict):
             for name, own in value.items():
                 yield from within(f"{prefix}/{name}" if prefix else name, own)
         elif isinstance(value, np.ndarray):
@@ -166,6 +176,37 @@ def _of_mat(path: Path) -> Iterator[tuple[str, Any, str]]:
     if variables and all(isinstance(value, scipy.io.matlab.MatlabOpaque) for value in variables.values()):
         raise InputError(f"{path}: {_OBJECTS}")
     yield from within("", variables)
+    yield from _on_one_clock(timed)
+
+
+def _on_one_clock(timed: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Array, str]]:
+    """Lay what Simulink logs as structures with time on the longest clock of them; NaN where one has no sample."""
+    clocks = {name: np.atleast_1d(np.asarray(own["time"], dtype=float)) for name, own in timed.items()}
+    clock = max(clocks.values(), key=len, default=np.empty(0))
+    if len(clock) < 2:
+        return
+    yield "time", clock, "s"
+    half = 0.5 * float(np.median(np.diff(clock)))
+    for name, time in clocks.items():
+        rows = np.minimum(np.searchsorted(clock, time - half), len(clock) - 1)
+        near, signals, named = np.abs(clock[rows] - time) < half, timed[name]["signals"], set[str]()
+        listed = [own for own in ([signals] if isinstance(signals, dict) else signals) if isinstance(own, dict)]
+        for own in listed:
+            values = np.asarray(own.get("values", ()))
+            if values.dtype.kind not in "iufb" or values.shape[:1] != time.shape or values.ndim > 2:
+                continue
+            laid = np.full((len(clock), *values.shape[1:]), np.nan)
+            laid[rows[near]] = values[near]
+            # A label may stand for two, as of an estimate and of a sensor.
+            label, block = str(own.get("label", "")).strip("<>[]"), str(own.get("blockName", "")).rpartition("/")[2]
+            part = block if not label or label in named else label
+            named.add(part)
+            if name in _BUSES and laid.ndim == 2:
+                yield from (
+                    (f"{name}/{part}", own, "") for part, own in zip(_BUSES[name].split(), laid.T, strict=False)
+                )
+            else:
+                yield f"{name}/{part}" if len(listed) > 1 else name, laid, ""
 
 
 def _refuse_inflated(path: Path) -> None:

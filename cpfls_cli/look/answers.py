@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -210,12 +210,15 @@ def _plants(found: Found) -> tuple[str, str, str, str]:
             "body rates, commands",
             "",
         )
+    return answer, _missing((own.axis, own.reason) for own in found.plants if not own.identified), "", found.sticks
+
+
+def _missing(lacking: Iterable[tuple[str, str]]) -> str:
+    """Say why something is not known about axes, each with its reason."""
     reasons: dict[str, list[str]] = {}
-    for plant in found.plants:
-        if not plant.identified:
-            reasons.setdefault(plant.reason, []).append(plant.axis)
-    missing = "; ".join(f"about {joined(axes)}, {reason}" for reason, axes in reasons.items())
-    return answer, missing, "", found.sticks
+    for axis, reason in lacking:
+        reasons.setdefault(reason, []).append(axis)
+    return "; ".join(f"about {joined(axes)}, {reason}" for reason, axes in reasons.items())
 
 
 def _loops(found: Found) -> tuple[str, str, str, str]:
@@ -233,7 +236,7 @@ def _loops(found: Found) -> tuple[str, str, str, str]:
             "body rates, rate setpoints",
             "",
         )
-    return "no", "rate setpoints move too little", "", found.sticks
+    return "no", _missing((own.axis, own.reason) for own in found.loops), "", found.sticks
 
 
 def _gains(found: Found) -> tuple[str, str, str, str]:

@@ -7,7 +7,7 @@ from cpfls_cli.arrays import BoolArray, runs
 NO_COMMAND = "what acts about the axis is not logged"
 NO_SETPOINT = "no rate setpoint is logged"
 NO_STICK = "no stick is logged that moves, so that setpoints may come from the state"
-AT_REST = "the stick rests, and setpoints come from the state"
+AT_REST = "the stick rests, so that setpoints may come from the state"
 TOO_SLOW = "logged too slowly"
 NOT_MOVED = "the instrument moves the vehicle too little"
 NO_MODEL = "no model of a multirotor fits"
