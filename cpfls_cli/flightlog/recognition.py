@@ -76,10 +76,13 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         raise InputError(f"no flight in it: the rotors ({dead[0].group.pattern}) never change")
     log, candidates, ended = _live_part(log, candidates)
     recognised.make_grid(log, candidates)
+    # Three columns of omega are a gyroscope where nothing else is.
+    turning = [own.group.columns for own in candidates.get("body_rate", ())[:1]]
     found = {
         str(name): [
             (own, log.values(own.group.columns)[0], log.without_spikes(own.group.columns))
             for own in candidates.get(name, ())
+            if own.group.columns not in turning
         ]
         for name in ROTORS
     }

@@ -57,6 +57,7 @@ _AT_REST, _DRIVES, _STANDS_S, _AWAY = 0.02, 0.25, 1.0, 0.25
 _RISES, _SWINGS, _SWING_S = 0.3, 2.5, 0.25
 _SURFACES = "before take-off one is off and the others stand in their middle"
 _FEWEST_BESIDE = 4  # Rotors of those whose columns hold more.
+_BELOW = 0.5  # Share of how far a collective rises above nothing by which none falls below it.
 _PX4_MOTORS = range(101, 113)  # Values of *_FUNCn of PX4 that are its motors.
 _RANGES = (
     ("MOT_PWM_MIN", "MOT_PWM_MAX"),
@@ -412,6 +413,10 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
         return _in_unit(named, unit, named.scale, f"{called}: a commanded speed", sure, *rivals)
     if named.unit == "1" and named.scale != 1.0:
         return _in_unit(named, "1", named.scale, f"{called}: per cent by its name", "named")
+    least, most = np.quantile(values.mean(axis=1), (0.1, 0.9))
+    if not named.known and least < -_BELOW * most:
+        # What carries a vehicle does not swing about nothing: these are asked of its axes.
+        return None
     own = next((own for own in RANGES if low >= own.low and own.high_from < high <= own.high), None)
     if own is None:
         return None

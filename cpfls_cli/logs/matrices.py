@@ -78,6 +78,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         raise InputError(f"{path}: cannot be read as {'HDF5' if hdf5 else 'MATLAB'}: {error}") from None
     if not columns:
         raise InputError(f"{path}: holds no vectors or matrices of numbers")
+    lengths = {len(own) for own in columns.values()} - {0, 1}
+    if len(lengths) == 2 and max(lengths) - min(lengths) == 1:
+        # States have one sample more than the inputs between them.
+        columns = {name: own[: min(lengths)] for name, own in columns.items()}
     read = {name.partition("[")[0] for name in columns}
     others = [name for name in names if name not in read] if wanted is None else []
     warnings = (f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}",) if others else ()
