@@ -41,7 +41,7 @@ _NO_STAMPS = (
 )
 # Of 1980-01-06, less the 18 leap seconds since.
 _GPS_BEGAN, _WEEK_S = 315_964_800 - 18, 604_800
-_INSTANCE = "#"
+_INSTANCE, _INSTANCES = "#", ("I", "Instance", "C", "IMU")  # And fields that hold it where no unit says so.
 _NO_FACTOR = "-?0"
 _SCALED = "cCeEL"
 # Our names of units that ArduPilot calls otherwise.
@@ -79,7 +79,62 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         raise InputError(
             f"{path}: not a DataFlash log: it does not start like one (encrypted, or of another kind?); {TABLE_ENDS}"
         )
-    stated = _stated_units(tables, kinds)
+    return _of_tables(path, kinds, tables, _stated_units(tables, kinds), lost)
+
+
+def exported(path: Path, variables: Mapping[str, Any]) -> LogContents | None:
+    """Read messages that a ground station made variables of MATLAB; None where no variables are messages.
+
+    A structure has a vector for each field; or a matrix, of each instance with its number behind the name, has a column
+    for each, which another variable names.
+    """
+    kinds: dict[int, _Kind] = {}
+    tables: dict[str, np.ndarray] = {}
+    stated: dict[str, dict[str, str]] = {}
+    for name, fields in _exported(variables).items():
+        stamps = np.atleast_1d(fields["TimeUS"])
+        own = {each: np.atleast_1d(values) for each, values in fields.items()}
+        own = {
+            each: values
+            for each, values in own.items()
+            if values.shape == stamps.shape and values.dtype.kind in "iufUO"
+        }
+        numbers = {"i": "q", "u": "q", "f": "d"}
+        letters = {each: numbers.get(values.dtype.kind, "Z") for each, values in own.items()}
+        # A matrix has all numbers alike.
+        letters |= {each: "q" for each in _INSTANCES if letters.get(each) == "d"} | {"TimeUS": "Q"}
+        record = np.dtype([(each, "S64" if letter == "Z" else _NUMBERS[letter][0]) for each, letter in letters.items()])
+        tables[name] = np.empty(len(stamps), dtype=record)
+        for each, values in own.items():
+            texts = letters[each] == "Z"
+            tables[name][each] = (
+                [str(value).strip().encode("latin-1", "replace") for value in values] if texts else values
+            )
+        kinds[len(kinds)] = _Kind(name, letters, record, [*range(len(stamps))], text=True)
+        stated[name] = {each: _INSTANCE for each in _INSTANCES if letters.get(each) == "q"}
+    return _of_tables(path, kinds, tables, stated, 0) if "ATT" in tables or "IMU" in tables else None
+
+
+def _exported(variables: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    messages = {name: own for name, own in variables.items() if isinstance(own, dict) and "TimeUS" in own}
+    for label in (own for own in variables if own.endswith("_label")):
+        name, fields = label.removesuffix("_label"), [str(own) for own in np.ravel(variables[label])]
+        parts = [own for each, own in variables.items() if re.fullmatch(rf"{re.escape(name)}(_\d+)?", each)]
+        parts = [own for own in parts if isinstance(own, np.ndarray) and own.shape[1:] == (len(fields),)]
+        if parts and "TimeUS" in fields:
+            rows = np.concatenate(parts)
+            order = np.argsort(rows[:, fields.index("TimeUS")], kind="stable")
+            messages[name] = dict(zip(fields, rows[order].T, strict=True))
+    return messages
+
+
+def _of_tables(
+    path: Path,
+    kinds: Mapping[int, _Kind],
+    tables: Mapping[str, np.ndarray],
+    stated: Mapping[str, Mapping[str, str]],
+    lost: int,
+) -> LogContents:
     stamps = _all_stamps(kinds, tables)
     topics = {
         topic: fields

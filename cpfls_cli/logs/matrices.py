@@ -20,6 +20,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import FileState, is_sealed, longest_read_s, most_held, state_of
 from cpfls_cli.flightlog.vocabulary import PARROT
+from cpfls_cli.logs.dataflash import exported
 from cpfls_cli.logs.formats import MOST_LISTED, LogContents
 from cpfls_cli.units import known_unit
 from cpfls_cli.words import some
@@ -70,7 +71,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
                 raise InputError(f"{path}: {found.fault}")
             if found.artifact:
                 raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
-        columns, units, names = _read(_of_hdf5(path) if hdf5 else _of_mat(path), wanted)
+        variables = {} if hdf5 else _variables(path)
+        if (messages := exported(path, variables)) is not None:
+            return messages
+        columns, units, names = _read(_of_hdf5(path) if hdf5 else _of_mat(variables), wanted)
     except InputError:
         raise
     except Exception as error:
@@ -85,7 +89,11 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     read = {name.partition("[")[0] for name in columns}
     others = [name for name in names if name not in read] if wanted is None else []
     warnings = (f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}",) if others else ()
-    system = f"{PARROT} minidrone" if any(name.startswith((*_BUSES, "rt_motor", "rt_yout/motors")) for name in columns) else ""
+    system = (
+        f"{PARROT} minidrone"
+        if any(name.startswith((*_BUSES, "rt_motor", "rt_yout/motors")) for name in columns)
+        else ""
+    )
     return LogContents({"": columns}, units, system=system, warnings=warnings)
 
 
@@ -159,7 +167,20 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, Any, str]]:
                 yield name, dataset, unit if isinstance(unit, str) else ""
 
 
-def _of_mat(path: Path) -> Iterator[tuple[str, Any, str]]:
+def _variables(path: Path) -> dict[str, Any]:
+    """Load a .mat of before 7.3: structures as mappings."""
+    _refuse_inflated(path)
+    with warnings.catch_warnings():
+        # Objects of MATLAB's own classes have no names, so that of several the last is kept: none of them is read.
+        warnings.simplefilter("ignore", scipy.io.matlab.MatReadWarning)
+        read = scipy.io.loadmat(str(path), simplify_cells=True)
+    variables = {name: value for name, value in read.items() if not name.startswith("__")}
+    if variables and all(isinstance(value, scipy.io.matlab.MatlabOpaque) for value in variables.values()):
+        raise InputError(f"{path}: {_OBJECTS}")
+    return variables
+
+
+def _of_mat(variables: Mapping[str, Any]) -> Iterator[tuple[str, Any, str]]:
     timed: dict[str, dict[str, Any]] = {}
 
     def within(prefix: str, value: Any) -> Iterator[tuple[str, Any, str]]:
@@ -171,14 +192,6 @@ def _of_mat(path: Path) -> Iterator[tuple[str, Any, str]]:
         elif isinstance(value, np.ndarray):
             yield prefix, value, ""
 
-    _refuse_inflated(path)
-    with warnings.catch_warnings():
-        # Objects of MATLAB's own classes have no names, so that of several the last is kept: none of them is read.
-        warnings.simplefilter("ignore", scipy.io.matlab.MatReadWarning)
-        read = scipy.io.loadmat(str(path), simplify_cells=True)
-    variables = {name: value for name, value in read.items() if not name.startswith("__")}
-    if variables and all(isinstance(value, scipy.io.matlab.MatlabOpaque) for value in variables.values()):
-        raise InputError(f"{path}: {_OBJECTS}")
     yield from within("", variables)
     yield from _on_one_clock(timed)
 
