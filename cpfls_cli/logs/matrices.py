@@ -82,10 +82,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         raise InputError(f"{path}: cannot be read as {'HDF5' if hdf5 else 'MATLAB'}: {error}") from None
     if not columns:
         raise InputError(f"{path}: holds no vectors or matrices of numbers")
-    lengths = {len(own) for own in columns.values()} - {0, 1}
-    if len(lengths) == 2 and max(lengths) - min(lengths) == 1:
-        # States have one sample more than the inputs between them.
-        columns = {name: own[: min(lengths)] for name, own in columns.items()}
+    columns = _of_one_length(columns)
     read = {name.partition("[")[0] for name in columns}
     others = [name for name in names if name not in read] if wanted is None else []
     warnings = (f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}",) if others else ()
@@ -95,6 +92,19 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         else ""
     )
     return LogContents({"": columns}, units, system=system, warnings=warnings)
+
+
+def _of_one_length(columns: dict[str, Array]) -> dict[str, Array]:
+    """Leave out zeros that fill the longest columns up, and of states the sample more than the inputs between them."""
+    longest = max(map(len, columns.values()), default=0)
+    held = np.zeros(longest, dtype=bool)
+    for own in columns.values():
+        if len(own) == longest:
+            held |= own != 0
+    longest = int(np.flatnonzero(held).max(initial=-1)) + 1
+    columns = {name: own[:longest] if len(own) == len(held) else own for name, own in columns.items()}
+    lengths = sorted({len(own) for own in columns.values()} - {0, 1})
+    return {name: own[: lengths[0]] for name, own in columns.items()} if np.diff(lengths).tolist() == [1] else columns
 
 
 def is_log(path: Path) -> bool:
