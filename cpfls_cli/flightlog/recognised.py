@@ -154,7 +154,9 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
             refused += [f"{back}: keep the rows of one flight, and leave out rows whose stamps are wrong"]
         if changes and not back and (named or units.get(name) == "s"):
             ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2 if named else 3
-    for name in sorted(ranks, key=ranks.__getitem__):
+    # Of as good names the one that most columns are as long as.
+    alike = Counter(len(values) for values in fields.values())
+    for name in sorted(ranks, key=lambda name: (ranks[name], -alike[len(fields[name])])):
         step = float(np.median(np.diff(fields[name][np.isfinite(fields[name])])))
         if name in units:
             return name, "s", ""

@@ -20,7 +20,7 @@ from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signa
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
 from cpfls_cli.flightlog.recognised import Load, LogTable, Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.repair import SignalTable
-from cpfls_cli.flightlog.rotor_columns import RotorColumns, find_mixed, find_rotors
+from cpfls_cli.flightlog.rotor_columns import Found, RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import take_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
 from cpfls_cli.flightlog.stated_vehicle import Parameters, VehicleKind, forward_flight, refuse_other_vehicle
@@ -76,17 +76,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         raise InputError(f"no flight in it: the rotors ({dead[0].group.pattern}) never change")
     log, candidates, ended = _live_part(log, candidates)
     recognised.make_grid(log, candidates)
-    # Three columns of omega are a gyroscope where nothing else is.
-    turning = [own.group.columns for own in candidates.get("body_rate", ())[:1]]
-    found = {
-        str(name): [
-            (own, log.values(own.group.columns)[0], log.without_spikes(own.group.columns))
-            for own in candidates.get(name, ())
-            if own.group.columns not in turning
-        ]
-        for name in ROTORS
-    }
-    rotors = find_rotors(found, parameters, system)
+    rotors = find_rotors(_of_rotors(log, candidates), parameters, system)
     rotors = rotors if rotors.driving else find_mixed(log) or rotors
     log, rotors, rebuilt = with_rebuilt(log, rotors, parameters, system)
     shares = None
@@ -126,6 +116,19 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     _list_unused(seen)
     taken = _gathered(seen, flown, speeds, moved)
     return replace(taken, winged=winged, rebuilt=rebuilt, kind=rotors.driving.kind if rotors.driving else "")
+
+
+def _of_rotors(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -> dict[str, list[Found]]:
+    # Three columns of omega are a gyroscope where nothing else is.
+    turning = [own.group.columns for own in candidates.get("body_rate", ())[:1]]
+    return {
+        name: [
+            (own, log.values(own.group.columns)[0], log.without_spikes(own.group.columns))
+            for own in candidates.get(name, ())
+            if own.group.columns not in turning
+        ]
+        for name in ROTORS
+    }
 
 
 def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:

@@ -116,7 +116,8 @@ def exported(path: Path, variables: Mapping[str, Any]) -> LogContents | None:
 
 
 def _exported(variables: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    messages = {name: own for name, own in variables.items() if isinstance(own, dict) and "TimeUS" in own}
+    messages: dict[str, Mapping[str, Any]] = {}
+    messages |= {name: own for name, own in variables.items() if isinstance(own, dict) and "TimeUS" in own}
     for label in (own for own in variables if own.endswith("_label")):
         name, fields = label.removesuffix("_label"), [str(own) for own in np.ravel(variables[label])]
         parts = [own for each, own in variables.items() if re.fullmatch(rf"{re.escape(name)}(_\d+)?", each)]

@@ -208,8 +208,8 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
             best = found
         if best.strength >= STRONG:
             break
-    left = eroded(usable, round(_SLOW_S * flight.rate_hz))
-    return best or _none(AXES[axis], chosen.reason or too_short(left, flight.rate_hz, _window_s(flight)[0]))
+    # What is long enough, and moved in too few windows.
+    return best or _none(AXES[axis], chosen.reason or NOT_MOVED)
 
 
 def _unusable(flight: LogFlight, usable: BoolArray, commanded: bool) -> str:

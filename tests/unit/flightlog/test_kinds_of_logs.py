@@ -121,3 +121,49 @@ def test_messages_of_ros_are_known_by_their_fields(own):
     assert "a velocity in body axes" in proposal.first.left_out[0]
     assert [rotor.name for rotor in proposal.airframe.rotors] == NAMES
     assert proposal.time_column == "/imu/data.timestamp"
+
+
+def test_a_parrot_minidrone_counts_motors_that_turn_the_other_way_downward(own):
+    turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
+    commands = 500 * (own.speed / 1000) ** 2 * [1.0, -1.0, 1.0, -1.0]
+    columns = {
+        "time": own.time,
+        **named(turned.as_euler("ZYX")[:, ::-1], *(f"rt_estim/{axis}" for axis in ("roll", "pitch", "yaw"))),
+        **named(own.rate @ FLIP, *(f"rt_estim/gyro_{axis}" for axis in "xyz")),
+        **named(own.position @ NED.T, *(f"rt_estim/{axis}" for axis in "xyz")),
+        **named(commands, *(f"rt_motor[{motor}]" for motor in range(4))),
+    }
+    proposal = proposed({"": columns}, "Parrot minidrone", units={"time": "s"})
+    found = maps(proposal)
+    assert (found["rotor_command"].scale, found["rotor_command"].sign) == (1 / 500, (1.0, -1.0, 1.0, -1.0))
+    choices = {choice.key: choice.value for choice in proposal.choices}
+    assert (choices["body_frame"], choices["world_frame"], choices["rotor_command_is"]) == ("FRD", "NED", "thrust")
+
+
+@pytest.mark.parametrize("before", ["", "rt_", "log/"])
+def test_p_q_and_r_are_rates_whatever_is_before_them(own, before):
+    columns = {
+        "time": own.time,
+        **named(own.rate, *(f"{before}{axis}" for axis in "pqr")),
+        **named(own.angles, *(f"{before}{axis}" for axis in ("roll", "pitch", "yaw"))),
+        **named(own.position, *(f"{before}{axis}" for axis in "xyz")),
+    }
+    found = maps(proposed({"": columns}, "", units={"time": "s"}))
+    assert found["body_rate"].columns == tuple(f"{before}{axis}" for axis in "pqr")
+    assert found["attitude"].columns == tuple(f"{before}{axis}" for axis in ("roll", "pitch", "yaw"))
+
+
+def test_neither_a_gyroscope_nor_what_is_asked_of_axes_is_taken_for_rotors(own):
+    wave = np.sign(np.sin(2 * np.pi * own.time / 4.0))
+    columns = {
+        "t": own.time,
+        **named(own.rate, *(f"omega[{axis}]" for axis in range(3))),
+        **named(own.angles, *(f"euler[{axis}]" for axis in range(3))),
+        **named(own.position, *(f"h[{axis}]" for axis in range(3))),
+        **named(own.velocity, *(f"v[{axis}]" for axis in range(3))),
+        **named(np.outer(wave, [0.4, -0.2, 0.1]), *(f"u_ref[{axis}]" for axis in range(3))),
+        **named(own.position, *(f"DesPosSave[{axis}]" for axis in range(3))),
+    }
+    found = maps(proposed({"": columns}, ""))
+    assert found["body_rate"].columns == ("omega[0]", "omega[1]", "omega[2]")
+    assert not found.keys() & {"rotor_speed", "rotor_command"}

@@ -343,3 +343,28 @@ def test_an_angle_is_followed_beyond_a_turn_and_chance_is_not(own, asked, crosse
     wished[:, 2] = (wished[:, 2] + np.pi) % (2 * np.pi) - np.pi
     known, _ = found(flat_log(turning, rate=None, wished=named(wished, "roll_sp", "pitch_sp", "yaw_sp")).topics, "")
     assert ("setpoint_attitude" in known) == crosses
+
+
+def test_short_moves_that_are_followed_are_setpoints(own):
+    # Doublets of 80 ms, which a gyroscope that lags and is looked at slowly follows at a fraction of their size.
+    time = np.arange(0.0, 30.0, 1e-3)
+    asked = np.zeros((len(time), 3))
+    for begin in np.arange(2.0, 28.0, 1.5):
+        asked[(time >= begin) & (time < begin + 0.04), 0] = 200.0
+        asked[(time >= begin + 0.04) & (time < begin + 0.08), 0] = -200.0
+    rate = np.zeros_like(asked)
+    for row in range(1, len(time)):
+        rate[row] = rate[row - 1] + (asked[row - 1] - rate[row - 1]) / 15
+    rate += np.random.default_rng(2).normal(0.0, 2.0, rate.shape)
+    rate[:, 1] += 30.0 * np.sin(2.0 * time)
+    speed = own.speed[(100 * time).astype(int) % len(own.time)]
+    columns = {
+        "time": time,
+        **named(rate, *(f"gyroADC[{axis}]" for axis in range(3))),
+        **named(asked, *(f"setpoint[{axis}]" for axis in range(3))),
+        **named(speed * 1.9 + 48, *(f"motor[{motor}]" for motor in range(4))),
+    }
+    given, proposal = found(
+        {"": columns}, "Betaflight 4.5.1", units={"time": "s"}, parameters={"motorOutput": "48,1948"}
+    )
+    assert "setpoint_body_rate" in given, proposal.left_out

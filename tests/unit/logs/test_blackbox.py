@@ -15,6 +15,7 @@ from tests.builders.blackbox_logs import (
     FACTS,
     FIELDS,
     NAMES,
+    PRODUCT,
     RESUMED,
     SLOW,
     flight,
@@ -265,3 +266,35 @@ def test_a_date_to_come_is_none(read):
         for year in (2025, 2091)
     ]
     assert [np.isfinite(own.flown_at) for own in dated] == [True, False]
+
+
+def test_what_the_log_viewer_exports_is_read_as_the_log(read, tmp_path):
+    rows = flight(begin_us=1_000_000)
+    facts = {"vbatcellvoltage": "330,350,430", "rollPID": "45,80,30", "pitchPID": "47,84,34", "yawPID": "45,80,0"}
+    log = read(header(**facts, d_min="40,46,0") + b"".join([*frames(rows), END]))
+    lines = {
+        **{name: FACTS[name] for name in ("Firmware revision", "motorOutput", "acc_1G", "vbatref", "motor_poles")},
+        "gyroScale": "1.7453292519943295e-8",
+        "vbatmincellvoltage": "330",
+        "vbatwarningcellvoltage": "350",
+        "vbatmaxcellvoltage": "430",
+        "rollPID": "45,80,30,40,120",
+        "pitchPID": "47,84,34,46,125",
+        "yawPID": "45,80,0,,120",
+        "pidSumLimit": "500",
+    }
+    text = f'"Product","{PRODUCT}"\n' + "".join(f'"{name}","{value}"\n' for name, value in lines.items())
+    # What is logged as it changes is no number before it first does; the heading is the viewer's.
+    text += ",".join(f'"{name}"' for name in (*NAMES, "flightModeFlags", "heading[0]")) + "\n"
+    for number, row in enumerate(rows.tolist()):
+        text += ",".join(map(str, [*row, "NaN" if number < 3 else 1, 0.25])) + "\n"
+    path = tmp_path / "log.bbl.csv"
+    path.write_text(text)
+    exported = log_contents(path)
+    for name, values in log.topics[""].items():
+        np.testing.assert_allclose(exported.topics[""][name], values, rtol=1e-6, atol=1e-9, err_msg=name)
+    assert exported.topics[""]["flightModeFlags"].tolist() == [1.0] * len(rows)
+    assert (exported.units, exported.system) == (log.units, log.system)
+    alike = {"motorOutput", "rollPID", "pitchPID", "d_min", "vbatcellvoltage"}
+    assert {name: exported.parameters[name] for name in alike} == {name: log.parameters[name] for name in alike}
+    assert exported.parameters["pidsum_limit"] == 500.0

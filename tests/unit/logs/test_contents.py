@@ -496,6 +496,60 @@ def test_columns_of_matlab_are_paths(tmp_path, version):
     assert columns_of(log_contents(tmp_path / "log.mat")) == expected
 
 
+def structure(time, values, label="", block="model/To Workspace"):
+    return {"time": time[:, None], "signals": {"values": values, "label": label}, "blockName": block}
+
+
+def test_what_simulink_logs_with_time_is_on_one_clock(tmp_path):
+    time = np.arange(40) * 0.005
+    several = np.array(
+        [
+            {"values": RATE[:5, :2], "label": "motors"},
+            {"values": RATE[:5, :1], "label": "<p>"},
+            {"values": RATE[:5, 1:2], "label": "<p>", "blockName": "model/pa"},
+        ],
+        dtype=object,
+    )
+    states = np.arange(480.0).reshape(40, 12)
+    data = {
+        "rt_estim": structure(time, states),
+        "rt_yout": {"time": time[35:, None], "signals": several},
+        "rt_u": structure(time[::10], np.arange(4.0)[:, None]),
+        "gain": 2.0,
+    }
+    scipy.io.savemat(tmp_path / "log.mat", data)
+    contents = log_contents(tmp_path / "log.mat")
+    columns = contents.topics[""]
+    assert columns["time"].tolist() == time.tolist()
+    assert contents.units == {"time": "s"}
+    assert columns["rt_estim/gyro_x"].tolist() == states[:, 9].tolist()
+    assert columns["rt_estim/yaw"].tolist() == states[:, 3].tolist()
+    nothing = [np.nan] * 35
+    np.testing.assert_equal(columns["rt_yout/motors[1]"], [*nothing, *RATE[:, 1]])
+    np.testing.assert_equal(columns["rt_yout/p"], [*nothing, *RATE[:, 0]])
+    np.testing.assert_equal(columns["rt_yout/pa"], [*nothing, *RATE[:, 1]])
+    known = np.isfinite(columns["rt_u"])
+    assert np.flatnonzero(known).tolist() == [0, 10, 20, 30]
+    assert columns["rt_u"][known].tolist() == [0, 1, 2, 3]
+    assert contents.system == "Parrot minidrone"
+
+
+def test_zeros_that_fill_a_buffer_of_matlab_and_the_last_state_are_left_out(tmp_path):
+    filled = np.concatenate([1.0 + np.arange(30.0), np.zeros(500)])
+    scipy.io.savemat(tmp_path / "log.mat", {"timer": filled, "pos": np.outer([1.0, 0.0, 2.0], filled)})
+    columns = log_contents(tmp_path / "log.mat").topics[""]
+    assert {len(values) for values in columns.values()} == {30}
+    scipy.io.savemat(tmp_path / "log.mat", {"t": 1.0 + np.arange(30.0), "x": np.ones((3, 31))})
+    columns = log_contents(tmp_path / "log.mat").topics[""]
+    assert {len(values) for values in columns.values()} == {30}
+
+
+def test_of_as_good_names_the_clock_is_the_one_that_most_columns_are_as_long_as():
+    columns = {"t": np.arange(900) * 0.01, "u": np.ones(900), "time": np.arange(600) * 0.005}
+    log = LogTable({"": columns | {f"rate[{axis}]": np.ones(600) for axis in range(3)}}, {})
+    assert log.time_column == "time"
+
+
 def test_matlab_is_read_whatever_its_name_ends_in(tmp_path):
     scipy.io.savemat(tmp_path / "log.mat", {"t": TIME[:, None]})
     (tmp_path / "log.mat").rename(tmp_path / "log.h5")

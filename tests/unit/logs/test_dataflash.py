@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.io
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import log_contents
@@ -206,3 +207,64 @@ def test_attitudes_without_stamps(read, more):
     kinds = {"ATT": ("cc", "RollIn,Roll"), "EV": OLD["EV"], "GPS": OLD["GPS"], "PARM": OLD["PARM"], "MSG": OLD["MSG"]}
     with pytest.raises(InputError, match="have no time stamps, as ArduCopter to 3"):
         read(dataflash(kinds, [("ATT", (1, 2)), ("EV", (10,)), *more]))
+
+
+def messages_of(contents):
+    return {(topic, each): values.tolist() for topic, own in contents.topics.items() for each, values in own.items()}
+
+
+@pytest.mark.parametrize("form", ["structures", "matrices"])
+def test_messages_that_a_ground_station_made_variables_of_matlab_are_those_of_the_log(read, tmp_path, form):
+    kinds = {
+        "IMU": ("QBff", "TimeUS,I,GyrX,AccX"),
+        "ATT": ("Qcc", "TimeUS,Roll,Yaw"),
+        "RCOU": ("QHH", "TimeUS,C1,C2"),
+    }
+    own = {
+        "IMU": [(5_000_000 + 1000 * row, row % 2, 0.5 * row, 9.5) for row in range(6)],
+        "ATT": [(5_000_500 + 2000 * row, 100 * row, -250) for row in range(3)],
+        "RCOU": [(5_000_700 + 2000 * row, 1100 + row, 1200) for row in range(3)],
+    }
+    rows = sorted(((name, values) for name, every in own.items() for values in every), key=lambda own: own[1][0])
+    log = read(dataflash(kinds, rows, {"FRAME_CLASS": 1.0}, ("ArduCopter V4.5.7",), {"IMU": ("s#Eo", "F---")}))
+    data = {}
+    for name, every in own.items():
+        fields, letters = kinds[name][1].split(","), kinds[name][0]
+        table = np.array(every, dtype=float) * [0.01 if letter == "c" else 1.0 for letter in letters]
+        if form == "structures":
+            whole = [letter in "QBH" for letter in letters]
+            data[name] = {
+                each: column.astype(int) if kept else column
+                for each, column, kept in zip(fields, table.T, whole, strict=True)
+            }
+        else:
+            data[f"{name}_label"] = np.array(fields, dtype=object)
+            parts = (
+                {f"{name}_{number}": table[table[:, 1] == number] for number in (0, 1)}
+                if name == "IMU"
+                else {name: table}
+            )
+            data |= parts
+    if form == "structures":
+        data["PARM"] = {
+            "TimeUS": np.array([1, 1]),
+            "Name": np.array(["FRAME_CLASS  ", "FRAME_TYPE "], dtype=object),
+            "Value": np.array([1.0, 3.0]),
+        }
+        data["MSG"] = {"TimeUS": 1, "Message": "ArduCopter V4.5.7"}
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, data)
+    exported = log_contents(path)
+    held = {
+        key: values
+        for key, values in messages_of(log).items()
+        if key[1] != "timestamp" and key[0] in own | {"IMU[1]": 0}
+    }
+    assert {key: pytest.approx(values) for key, values in held.items()} == {
+        key: values for key, values in messages_of(exported).items() if key in held
+    }
+    steps = [np.diff(each.topics["IMU[1]"]["timestamp"]) for each in (log, exported)]
+    np.testing.assert_allclose(*steps, atol=1e-9)
+    if form == "structures":
+        assert exported.system == log.system == "ArduCopter 4.5.7"
+        assert exported.parameters == {"FRAME_CLASS": 1.0, "FRAME_TYPE": 3.0}

@@ -9,6 +9,7 @@ from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.look.columns import LookedLog
 from cpfls_cli.look.flight import Samples
 from cpfls_cli.look.logged import what_is_logged
+from cpfls_cli.look.look import look_at
 from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.timeline import _at_limit, timeline
 from tests.builders import ended_flights as ended
@@ -244,6 +245,22 @@ def test_rate_setpoints_that_nothing_follows_are_logged():
     assert found.unfollowed
     log = LookedLog(contents.topics, contents.units, contents.system)
     assert "setpoint body rate" not in {row.signal for row in what_is_logged(found, log, recognition, 0.0, ()).signals}
+    own = look_at("log", contents.topics, contents.units, contents.parameters, contents.system)
+    (loop,) = [answer for answer in own.answers if answer.question == "loop response"]
+    assert (loop.answer, loop.log) == ("no", "")
+    assert "does not follow what is called a rate setpoint" in loop.why
+
+
+def test_a_loop_that_is_not_measured_says_why_about_its_axes():
+    contents = logs.WRITERS["betaflight"](OWN)
+    rates = np.column_stack([contents.topics[""][f"gyroADC[{axis}]"] for axis in range(3)])
+    contents.topics[""].update(named(rates, *(f"setpoint[{axis}]" for axis in range(3))))
+    contents.topics[""].update(named(np.full_like(rates, 3.0), *(f"rcCommand[{axis}]" for axis in range(3))))
+    own = look_at("log", contents.topics, contents.units, contents.parameters, contents.system)
+    assert {row.signal for row in own.logged.signals} >= {"setpoint body rate"}
+    (loop,) = [answer for answer in own.answers if answer.question == "loop response"]
+    assert loop.answer == "no"
+    assert "stick" in loop.why
 
 
 def test_readers_give_messages(tmp_path):
