@@ -94,6 +94,7 @@ IN_FULL: Final[dict[str, str]] = _TABLE["in_full"]
 ONE_WORD: Final[dict[str, str]] = _TABLE["one_word"]
 A_WORD, RATE_WORDS, WISHED, FAST = (_each(name) for name in ("a_word", "rate_words", "wished", "fast"))
 ASKED, NOT_MEASURED, SECOND_HAND = (_each(name) for name in ("asked", "not_measured", "second_hand"))
+TOPICS_OF_PX4: Final = _each("topics_of_px4")
 IN_RADIANS: Final = {word: signals for word, *signals in _rows("in_radians")}
 ALLOWED: Final = {signal: frozenset(words) for signal, *words in _rows("allowed")}
 MEANINGS: Final = tuple(

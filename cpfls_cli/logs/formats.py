@@ -159,7 +159,8 @@ def about_flight(path: Path) -> Iterator[None]:
         yield
     except InputError as error:
         why = str(error).removeprefix(f"{path.name}: ")
-        if topic := _ONE_TOPIC.search(path.name):
+        topics = "|".join(import_module("cpfls_cli.flightlog.vocabulary").TOPICS_OF_PX4)
+        if topic := re.search(rf"(?:^|_)({topics})_\d+\.csv(?:\.gz)?$", path.name):
             why = (
                 f"by its name {topic[1]} alone, one topic of a log of PX4 as ulog2csv writes them: give the log itself"
                 f" (.ulg), which holds all of them; if it is a whole log: {why}"
@@ -280,33 +281,6 @@ def _is_header(line: bytes) -> bool:
 
 
 _FIRST_BYTES, _BEGINS_WITHIN = 1024, 1 << 16
-# What PX4 logs by default, of today and of before.
-_TOPICS_OF_PX4: Final = """
-actuator_armed actuator_controls_0 actuator_controls_1 actuator_controls_status_0 actuator_motors actuator_outputs
-actuator_servos airspeed_validated airspeed_wind att_pos_mocap battery_status camera_capture camera_trigger
-commander_state control_allocator_status control_state cpuload differential_pressure distance_sensor ekf2_innovations
-ekf2_timestamps esc_status estimator_attitude estimator_baro_bias estimator_event_flags estimator_global_position
-estimator_innovation_test_ratios estimator_innovation_variances estimator_innovations estimator_local_position
-estimator_odometry estimator_optical_flow_vel estimator_selector_status estimator_sensor_bias estimator_states
-estimator_status estimator_status_flags estimator_visual_odometry_aligned estimator_wind failsafe_flags
-failure_detector_status home_position hover_thrust_estimate input_rc magnetometer_bias_estimate manual_control_setpoint
-manual_control_switches mission_result multirotor_motor_limits navigator_mission_item offboard_control_mode
-position_controller_status position_setpoint_triplet radio_status rate_ctrl_status rtl_time_estimate
-satellite_info sensor_accel sensor_baro sensor_combined sensor_correction sensor_gps sensor_gyro sensor_gyro_fft
-sensor_mag sensor_preflight sensor_preflight_mag sensor_selection sensors_status_imu system_power takeoff_status
-task_stack_info tecs_status telemetry_status trajectory_setpoint vehicle_acceleration vehicle_air_data
-vehicle_angular_acceleration vehicle_angular_velocity vehicle_angular_velocity_groundtruth vehicle_attitude
-vehicle_attitude_groundtruth vehicle_attitude_setpoint vehicle_command vehicle_command_ack vehicle_constraints
-vehicle_control_mode vehicle_global_position vehicle_global_position_groundtruth vehicle_gps_position vehicle_imu
-vehicle_imu_status vehicle_land_detected vehicle_local_position vehicle_local_position_groundtruth
-vehicle_local_position_setpoint vehicle_magnetometer vehicle_mocap_odometry vehicle_odometry vehicle_optical_flow
-vehicle_rates_setpoint vehicle_roi vehicle_status vehicle_status_flags vehicle_thrust_setpoint vehicle_torque_setpoint
-vehicle_trajectory_waypoint_desired vehicle_vision_attitude vehicle_vision_position vehicle_visual_odometry
-vtol_vehicle_status wind_estimate yaw_estimator_status
-"""
-_ONE_TOPIC: Final = re.compile(rf"(?:^|_)({'|'.join(_TOPICS_OF_PX4.split())})_\d+\.csv(?:\.gz)?$")
-
-
 _UNPACK: Final = "unpack it first, and give the log inside"
 _CONVERT_TLOG: Final = (
     "telemetry is too slow for a model; give the log that the autopilot writes itself (.bin of ArduPilot, .ulg of PX4)"
