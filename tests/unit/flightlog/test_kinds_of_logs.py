@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cpfls_cli.flightlog.airframe import usual_airframe
 from tests.builders.topic_logs import ardupilot, maps, proposed, topic
 from tests.builders.unknown_logs import FLIP, NED, flight, named, quaternion
 
@@ -138,6 +139,9 @@ def test_a_parrot_minidrone_counts_motors_that_turn_the_other_way_downward(own):
     assert (found["rotor_command"].scale, found["rotor_command"].sign) == (1 / 500, (1.0, -1.0, 1.0, -1.0))
     choices = {choice.key: choice.value for choice in proposal.choices}
     assert (choices["body_frame"], choices["world_frame"], choices["rotor_command_is"]) == ("FRD", "NED", "thrust")
+    usual = usual_airframe("Parrot", 4)
+    places = [("front left", -1), ("front right", 1), ("rear right", -1), ("rear left", 1)]
+    assert [(rotor.name, rotor.spin) for rotor in usual.rotors] == places
 
 
 @pytest.mark.parametrize("before", ["", "rt_", "log/"])
