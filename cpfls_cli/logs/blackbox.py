@@ -70,6 +70,8 @@ def flights(path: Path) -> list[LogContents]:
 
 def of_export(stated: Mapping[str, str], names: list[str], rows: Array) -> LogContents:
     """Read a flight that Betaflight's log viewer exported: lines of the header by the viewer's names, raw numbers."""
+    if names[:2] != ["loopIteration", "time"]:
+        raise ValueError("no columns loopIteration and time")
     header = {_EXPORTED.get(name, name): value for name, value in stated.items()}
     if "gyroScale" in header:
         # In rad and a microsecond, of whatever the log has it in.

@@ -46,8 +46,12 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     numeric = [name for name in names if name in first and _kind(first[name])]
     if stated:
         columns = read_csv(path, set(numeric))
-        ordered = sorted(numeric, key=lambda name: (name != "loopIteration", name != "time"))
-        return of_export(stated, ordered, np.column_stack([columns[name] for name in ordered]))
+        held = [name for name in numeric if np.isfinite(columns[name]).any()]
+        ordered = sorted(held, key=lambda name: (name != "loopIteration", name != "time"))
+        try:
+            return of_export(stated, ordered, np.column_stack([columns[name] for name in ordered]))
+        except (ValueError, OverflowError) as error:
+            raise InputError(f"{path}: a broken export of a blackbox log: its header: {error}") from None
     units = {name: "s" for name in numeric if _kind(first[name]) == "time"}
     if wanted is not None:
         return LogContents({"": read_csv(path, set(wanted))}, units)

@@ -298,3 +298,24 @@ def test_what_the_log_viewer_exports_is_read_as_the_log(read, tmp_path):
     alike = {"motorOutput", "rollPID", "pitchPID", "d_min", "vbatcellvoltage"}
     assert {name: exported.parameters[name] for name in alike} == {name: log.parameters[name] for name in alike}
     assert exported.parameters["pidsum_limit"] == 500.0
+
+
+@pytest.mark.parametrize(
+    ("line", "names", "what"),
+    [
+        ('"gyroScale","fast"', "loopIteration,time,motor[0]", "its header: could not convert"),
+        ('"acc_1G",2048', "frame,time,motor[0]", "no columns loopIteration and time"),
+    ],
+)
+def test_an_export_that_is_broken_is_refused(tmp_path, line, names, what):
+    rows = "".join(f"{row},{1000 * row},{row % 3}\n" for row in range(40))
+    (tmp_path / "log.csv").write_text(f'"Product","{PRODUCT}"\n{line}\n{names}\n{rows}')
+    with pytest.raises(InputError, match=rf"log\.csv: a broken export of a blackbox log: .*{what}"):
+        log_contents(tmp_path / "log.csv")
+
+
+def test_what_an_export_never_knows_is_no_column(tmp_path):
+    rows = "".join(f"{row},{1000 * row},{row % 3},NaN\n" for row in range(40))
+    text = f'"Product","{PRODUCT}"\n"acc_1G",2048\nloopIteration,time,motor[0],flightModeFlags\n{rows}'
+    (tmp_path / "log.csv").write_text(text)
+    assert log_contents(tmp_path / "log.csv").topics[""].keys() == {"time", "motor[0]"}
