@@ -93,8 +93,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         own = rotors.command or rotors.driving
         logged = as_mapped(log.on_grid(own.columns.columns, spikes=False), own.columns)
         shares = rotor_shares(logged, shares=own is rotors.command)
-    signs = _signs(log, candidates, shares, system)
-    flown = find_flown(signs).within(ended, (0.0, float(signs.time[-1])))
+    flown = find_flown(signs := _signs(log, candidates, shares, system)).within(ended, (0.0, float(signs.time[-1])))
     if not flown.flies:
         held = f"holds {joined([name.replace('_', ' ') for name in candidates])} alone: "
         raise InputError(held * (signs.rotors is signs.height is signs.rate is None) + flown.reasons[0])
