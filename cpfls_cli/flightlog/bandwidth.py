@@ -96,6 +96,19 @@ def _regular(updates: IntArray, fewest: int) -> bool:
     return bool(usual >= fewest and near.mean() >= _REGULAR_SHARE and (apart < fewest).mean() <= _LARGEST_SHARE_AT_ONCE)
 
 
+def between_updates(values: Array) -> Array:
+    """Put straight lines between updates that rows repeat, shape (row, column), each at its first row.
+
+    What is repeated comes late by half the time between updates, and its steps fold into slow motion where a window
+    moves on by about that time. An update that was put on another clock may take two rows, of which the second has it.
+    """
+    updates = np.flatnonzero(np.append(True, (np.diff(values, axis=0) != 0).any(axis=1)))
+    updates = updates[np.append(np.diff(updates) > 1, True)]
+    if len(updates) < _FEWEST_UPDATES:
+        return values
+    return np.column_stack([np.interp(np.arange(len(values)), updates, own) for own in values[updates].T])
+
+
 def warn_of_slow(slow: tuple[SlowSignal, ...], rate_hz: float) -> Iterator[str]:
     """Say of signals that are slower than the clock, and slower than 100 Hz, how slow they are and what that costs."""
     for signal in (own for own in slow if own.rate_hz < _FAST_HZ):

@@ -86,13 +86,14 @@ def read_signals(
     rows, incomplete_ends, beyond_gap = repair.longest_stretch(table.time, present, settings)
     table, repaired = table.rows(rows), repaired.rows(rows)
     resting = stretches.rotors_at_rest(table, settings)
-    counts = stretches.count_values(table, {name: marked[rows] for name, marked in spikes.items()}, resting, settings)
+    slow = bandwidth.slow_signals(table, stamped_hz)
+    spikes, updated_hz = {name: own[rows] for name, own in spikes.items()}, {own.name: own.rate_hz for own in slow}
+    counts = stretches.count_values(table, spikes, resting, settings, updated_hz)
     clock, rate_hz, hurried = _uniform_clock(table.time, settings.time_unit)
     on_clock = {name: repair.fill(table.time, values, clock) for name, values in repaired.signals.items()}
     stretches.refuse_steep_pitch(on_clock)
     converted: dict[str, Any] = {**conversion.to_program_frames(on_clock, settings)}
     setpoints, unknown = _setpoints(asked, clock, mapped, converted.get("attitude"))
-    slow = bandwidth.slow_signals(table, stamped_hz)
     filtered = bandwidth.cut_offs(on_clock, rate_hz, slow)
     dead = stretches.warn_of_dead(table, counts["saturated"], settings)
     warnings = (

@@ -16,7 +16,7 @@ from cpfls_cli.flightlog.attitude_columns import BODY_OF, Reading, doubt_reading
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, find_flown, rotor_shares
-from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, named_signals, nameless_signals
+from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, is_of, named_signals, nameless_signals
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
 from cpfls_cli.flightlog.recognised import Load, LogTable, Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.repair import SignalTable
@@ -26,6 +26,7 @@ from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
 from cpfls_cli.flightlog.stated_vehicle import Parameters, VehicleKind, forward_flight, refuse_other_vehicle
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
+from cpfls_cli.flightlog.vocabulary import KNOWN
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, known_unit
 from cpfls_cli.words import joined, some
@@ -85,7 +86,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         own = rotors.command or rotors.driving
         logged = as_mapped(log.on_grid(own.columns.columns, spikes=False), own.columns)
         shares = rotor_shares(logged, shares=own is rotors.command)
-    flown = find_flown(signs := _signs(log, candidates, shares)).within(ended, (0.0, float(log.grid[-1] - log.grid[0])))
+    flown = find_flown(signs := _signs(log, candidates, shares, system)).within(ended, (0.0, float(signs.time[-1])))
     if not flown.flies:
         held = f"holds {joined([name.replace('_', ' ') for name in candidates])} alone: "
         raise InputError(held * (signs.rotors is signs.height is signs.rate is None) + flown.reasons[0])
@@ -164,7 +165,7 @@ def _live_part(
     return log, candidates, ended
 
 
-def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None) -> Signs:
+def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], rotors: Array | None, system: str) -> Signs:
     """Gather what shows flight by the names of columns, before axes and frames are known."""
     first = {name: found[0] for name, found in candidates.items() if found and name in _SIGNS}
     values = {name: named.scale * log.on_grid(named.group.columns) for name, named in first.items()}
@@ -173,6 +174,11 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
         up = -1.0 if first["position"].frame == "NED" else 1.0
         stated = first["position"].unit or motion_columns.length_unit(height, 1 / float(log.grid[1] - log.grid[0]))
         height = up * known_unit(stated).factor * height[:, 2]
+    elif rotors is None and rate is None:
+        # A height that no config takes still says what flies.
+        known = (row for row in KNOWN if row.signal == "height" and is_of(system, row.system))
+        row = next((row for row in known if {*row.columns} <= {*log.names}), None)
+        height = None if row is None else row.scale * log.on_grid(row.columns)[:, 0]
     if rate is not None:
         unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(rate), 0.99)) > _FASTEST_RAD_S
         rate = rate / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)

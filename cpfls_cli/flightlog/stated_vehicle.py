@@ -316,10 +316,10 @@ FAST_HZ = 100.0  # At which motors are to be logged, which respond within some 5
 # within which they follow, and a half.
 SLOW_HZ = 25.0
 _COPTER = ("ArduCopter", "ArduPilot")
-_FAST_IMU, _WITH_FAST_IMU = 18, (3, 3)
+_IMU, _FAST_IMU, _WITH_FAST_IMU = 7, 18, (3, 3)
 _WITH_DSHOT = (4, 0)
-# Of LOG_BITMASK of ArduCopter; the last is newer than others.
-_BITS: Final[Mapping[int, str]] = {0: "fast attitude", 10: "outputs", _FAST_IMU: "fast IMU, from 3.3 on"}
+# Of LOG_BITMASK of ArduCopter; the last is newer than others, and takes the place of the second.
+_BITS: Final[Mapping[int, str]] = {0: "fast attitude", _IMU: "IMU", 10: "outputs", _FAST_IMU: "fast IMU, from 3.3 on"}
 _USUAL_BITS = 176126  # LOG_BITMASK of ArduCopter 4 by default.
 _NONE: Final[Parameters] = MappingProxyType({})
 
@@ -357,11 +357,14 @@ def _of_copter(system: str, parameters: Parameters) -> str:
     """Say what ArduPilot's copters can log: outputs are slow, whatever is set; what came later is asked of no other."""
     version, has = _version(system), parameters.get("LOG_BITMASK")
     new = version is not None and version >= _WITH_DSHOT
-    bits = [bit for bit in _BITS if bit != _FAST_IMU or version is None or version >= _WITH_FAST_IMU]
+    old = version is not None and version < _WITH_FAST_IMU
     has = _USUAL_BITS if has is None and new else has
+    mask = int(has) if isinstance(has, int | float) and has >= 0 else None
+    lacks = old and mask is not None and not mask >> _IMU & 1
+    bits = [bit for bit in _BITS if {_IMU: lacks, _FAST_IMU: not old}.get(bit, True)]
     named = "with"
-    if isinstance(has, int | float) and has >= 0:
-        named = f"= {int(has) | sum(1 << bit for bit in bits)}, which is {int(has)} with"
+    if mask is not None:
+        named = f"= {mask | sum(1 << bit for bit in bits)}, which is {mask} with"
     names = joined(f"{bit} ({_BITS[bit]})" for bit in bits)
     return (
         f"log motor speeds with bidirectional DShot ({'' if new else 'ArduPilot 4: '}SERVO_BLH_BDMASK), for {system} "

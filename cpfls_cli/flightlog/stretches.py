@@ -23,6 +23,7 @@ _CLIPPED_SAMPLES = 5
 _CLIPPED_TO_NEXT = 3
 # By signal: no sensor of a multirotor has its limit lower. A common smallest range of a gyroscope is 125 deg/s.
 _LOWEST_LIMIT = {"body_rate": 1.0, "attitude_rate": 1.0, "acceleration": 15.0, "rotor_command": 0.0}
+_UPDATES = 3  # In a row at an extreme, from which on that is no chance.
 _MEASURED = frozenset(
     {"attitude", "quaternion", "body_rate", "attitude_rate", "position", "velocity", "acceleration", "rotor_speed"}
 )
@@ -213,32 +214,42 @@ def _extrapolated(time: Array, values: Array, *, alone: bool) -> tuple[int, int]
 
 
 def count_values(
-    table: SignalTable, spikes: Mapping[str, BoolArray], resting: Mapping[str, BoolArray], settings: ImportSettings
+    table: SignalTable,
+    spikes: Mapping[str, BoolArray],
+    resting: Mapping[str, BoolArray],
+    settings: ImportSettings,
+    updated_hz: Mapping[str, float],
 ) -> dict[str, Any]:
     """Count bad values of each column of what is kept, by what they are in an `ImportReport`; others are left out.
 
-    Where no rotor turns is not saturated; nor is a quaternion at hover (1), or a coarse voltage.
+    Where no rotor turns is not saturated; nor is a quaternion at hover (1), or a coarse voltage, or what rows repeat
+    between two updates, which are `updated_hz` apart in signals that are slower than the rows.
     """
+    step_s = float(np.median(np.diff(table.time))) if len(table.time) > 1 else 0.0
 
-    def by_column(signals: Mapping[str, Array | BoolArray], count: Callable[[Any], int]) -> dict[str, int]:
+    def saturated(name: str, values: Array) -> int:
+        repeated = _UPDATES / (updated_hz[name] * step_s) if name in updated_hz and step_s else 0.0
+        length = max(settings.saturation_samples, ceil(repeated))
+        return count_saturated(values, length, rest=0.0 if name in rotors else None)
+
+    def by_column(signals: Mapping[str, Array | BoolArray], count: Callable[[str, Any], int]) -> dict[str, int]:
         counts = {
-            column: count(values)
+            column: count(name, values)
             for name, signal in settings.signals.items()
             if name in signals
             for column, values in zip(signal.names, signals[name].T, strict=True)
         }
         return {column: number for column, number in counts.items() if number}
 
-    length, repaired = settings.saturation_samples, settings.spike_deviations is not None
+    repaired = settings.spike_deviations is not None
     rotors = {name: np.where(rest[:, None], np.nan, table.signals[name]) for name, rest in resting.items()}
     others = {name: signal for name, signal in table.signals.items() if name not in _NEVER_SATURATED | rotors.keys()}
-    found = by_column(spikes, lambda column: int(column.sum()))
+    found = by_column(spikes, lambda _, column: int(column.sum()))
     return {
-        "missing": by_column(table.signals, lambda column: int(np.isnan(column).sum())),
+        "missing": by_column(table.signals, lambda _, column: int(np.isnan(column).sum())),
         "spikes": found if repaired else {},
         "suspected_spikes": {} if repaired else found,
-        "saturated": by_column(rotors, lambda column: count_saturated(column, length, rest=0.0))
-        | by_column(others, lambda column: count_saturated(column, length)),
+        "saturated": by_column(rotors, saturated) | by_column(others, saturated),
     }
 
 

@@ -21,6 +21,7 @@ from cpfls_cli.consistency.findings import Finding, contradictions
 from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
+from cpfls_cli.flightlog.bandwidth import between_updates
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import Imported
 from cpfls_cli.flightlog.settings import SETPOINTS
@@ -109,6 +110,7 @@ def commanded_speed(command: Array | None, unit: str, speed_max: float) -> Array
 
 
 _LOGGED = ("attitude", "velocity", "position", "acceleration", "specific_force")
+_INTEGRALS = ("velocity", "position")  # So smooth that straight lines between updates come near to them.
 _UNIFORM = 0.01
 _PAUSE = 1.5
 """Step over the usual one from which on the clock has paused."""
@@ -310,6 +312,7 @@ def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
         rate = np.zeros((len(time), 3))
         notes = ("neither body rates nor attitude; taken as level and at rest, so only the balance is judged",)
     optional: dict[str, Any] = {name: known.get(name) for name in _LOGGED}
+    optional |= {name: between_updates(known[name]) for name in _INTEGRALS if name in known and name in flight.repeated}
     asked = {short: known[name] for name, short in SETPOINTS.items() if name in known}
     made = Signals(
         time=time,

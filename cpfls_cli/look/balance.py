@@ -83,11 +83,8 @@ class Balance:
     @property
     def uneven(self) -> tuple[int, ...]:
         """Number the rotors whose share surely differs by more than sound rotors do, the most uneven first."""
-        apart = [
-            (max(each.share.low - each.expected, each.expected - each.share.high), each.rotor)
-            for each in self.rotors
-            if each.share
-        ]
+        known = [(each.rotor, each.expected, each.share) for each in self.rotors if each.share]
+        apart = [(float(_beyond(share.low, share.high, expected)), rotor) for rotor, expected, share in known]
         return tuple(rotor for by, rotor in sorted(apart, reverse=True) if by > SOUND)
 
     @property
@@ -181,6 +178,14 @@ def _expected(flight: LogFlight, rotors: int) -> Array:
     return np.asarray(thrust / thrust.mean())
 
 
+def _beyond(low: Array | float, high: Array | float, expected: Array | float) -> Array:
+    """Give how far shares surely lie beyond both the mean of all rotors and what their stated places ask for.
+
+    Rotors that all work alike are sound, whatever the autopilot was given for their places.
+    """
+    return np.asarray(np.maximum(low - np.maximum(expected, 1.0), np.minimum(expected, 1.0) - high))
+
+
 def _length(known: Known, first: int) -> Estimate:
     """Give the length of a vector of two numbers with its interval, not below 0."""
     value = known.value[first : first + 2]
@@ -206,7 +211,8 @@ class _Trims:
         self.lean = np.stack([columns[:, 0], columns[:, 1]]) / rotors
         # Of the arm, that makes half as much as sound rotors differ by.
         self.small = 0.5 * SOUND * float(np.sqrt(np.mean(columns[:, :2] ** 2)))
-        self.uneven = bool(np.any(np.abs(self.apart.value) - self.apart.half > SOUND))
+        beyond = _beyond(means.value - means.half, means.value + means.half, expected)
+        self.uneven = bool(np.any(beyond > SOUND))
 
     def leans(self, shares: Array, heading: Array) -> Known | None:
         """Part where the thrust acts, forward and right, into what turns with the body and what does not."""

@@ -64,9 +64,10 @@ class Look:
 
     @property
     def warned(self) -> list[Event]:
-        """Events that want a look, but for the autopilot's own; first what ended a flight, last what a log lacks."""
+        """Events that want a look, but for the autopilot's own; first how a flight ended, last what a log lacks."""
         found = [event for event in self.events if event.severity == "warning" and event.kind != "message"]
-        return sorted(found, key=lambda event: (event.kind not in MOMENTS, event.kind in ("gap", "restart")))
+        last = {"landing": 1, "gap": 3, "restart": 3}
+        return sorted(found, key=lambda event: 0 if event.kind in MOMENTS else last.get(event.kind, 2))
 
     @property
     def uneven(self) -> tuple[int, ...]:

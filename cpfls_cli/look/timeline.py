@@ -93,6 +93,7 @@ _COPTER_EVENTS: Final[Mapping[int, tuple[str, str]]] = {
     62: ("reset", "estimated yaw is reset"),
 }
 _NOT_LANDED, _LANDED = 28, 18
+_JUMP_DEG = 10.0  # From which on a reset of the yaw outweighs the turning of a flight.
 _COPTER_ERRORS: Final = {
     2: "radio",
     3: "compass",
@@ -161,6 +162,7 @@ def timeline(
     found = [
         *_flights(flight, topics, recognition),
         *_stated(flight.system, topics),
+        *_yaw_resets(flight, topics),
         *_of_messages(messages),
         *_limits(flight, _TRAILS_S if recognition.flown.moments else 0.0),
         *_losses(flight, topics),
@@ -315,6 +317,19 @@ def _of_px4(topics: Topics) -> Iterator[Event]:
     for at, on in _changes(*_field(topics, "vehicle_status", "failsafe")):
         if on:
             yield Event(time_s=at, kind="failsafe", text="failsafe", severity="danger")
+
+
+def _yaw_resets(flight: LogFlight, topics: Topics) -> Iterator[Event]:
+    """Say by how much PX4 turns its estimate at once: the attitudes before and after are not of one motion."""
+    time, counted = _field(topics, "vehicle_attitude", "quat_reset_counter")
+    half = np.clip(_field(topics, "vehicle_attitude", "delta_q_reset[3]")[1], -1, 1)
+    for row in np.flatnonzero(np.diff(counted)) + 1 if len(half) == len(counted) else ():
+        turn, at = float(np.degrees(2 * np.arcsin(half[row]))), float(time[row])
+        flies = flight.flown[min(int(np.searchsorted(flight.time, at)), len(flight.time) - 1)]
+        if flies and abs(turn) > _JUMP_DEG:
+            text = f"estimated yaw is reset by {turn:.0f} deg".replace("-", "−")
+            text += ", which no gyroscope shows: keep one side of it (import.crop_s)"
+            yield Event(time_s=at, kind="reset", text=text, severity="warning")
 
 
 def _modes(changes: Iterator[tuple[float, float]], names: str) -> Iterator[Event]:

@@ -193,7 +193,8 @@ def _factors(sums: Array) -> Array:
 def _explained(sums: Array) -> Array:
     """Compute the share of the rotation that a torque explains, of any size: their squared correlation."""
     torque, both, turning = _without_noise(sums)
-    return np.asarray(np.minimum(np.maximum(both, 0.0) / np.sqrt(torque) / np.sqrt(turning), 1.0) ** 2)
+    most = np.sqrt(torque) * np.sqrt(turning)
+    return np.asarray((np.clip(both, 0.0, most) / most) ** 2)
 
 
 def _without_noise(sums: Array) -> tuple[Array, Array, Array]:

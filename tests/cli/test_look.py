@@ -242,3 +242,5 @@ def test_what_the_vehicle_did_comes_before_what_the_log_lacks():
     limit = Event(time_s=21.0, until_s=36.0, kind="limit", text="M3 at its upper limit 6 times", severity="warning")
     said = words_of(events=(gap, limit))
     assert said.startswith("# Flies; from 21.0 s on: M3 at its upper limit 6 times; and 1 more warning")
+    hard = Event(time_s=37.0, kind="landing", text="lands hard, with 9 g", severity="warning")
+    assert words_of(events=(gap, limit, hard)).startswith("# Flies; at 37.0 s: lands hard, with 9 g; and 2 more")

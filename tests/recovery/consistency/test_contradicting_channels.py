@@ -12,16 +12,19 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli import store
 from cpfls_cli.artifacts.diagnosis import Extended
+from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import audit
 from cpfls_cli.consistency.repairs import accelerated
+from cpfls_cli.flights import recordings
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rotations import euler_angles
 from cpfls_cli.weak_form.windows import windows
 from tests.builders import gap_artifacts
-from tests.builders.closed_loop_flights import COARSE, PERIOD, flown, signals_of
+from tests.builders.closed_loop_flights import COARSE, PERIOD, VEHICLE, flown, signals_of
 
 WINDOWS = windows(PERIOD, 0.4, 0.5)
+STUDY = Study(vehicle=VEHICLE)
 UP = np.array([0.0, 0.0, 9.81])
 EAST, NORTH = np.eye(3)[:2]
 DRAG = 2e-3
@@ -509,3 +512,28 @@ def test_a_low_passed_log_has_the_floors_of_the_raw_one_and_says_so_first(flight
 def test_a_log_without_noise_has_no_floor_that_is_known():
     found = audit([signals_of(flown(8.0))], WINDOWS)
     assert "noise floor is not known" in found.filtered[0]
+
+
+def read_with_repeats(flight, updates_hz, channels, late_s):
+    """Read a flight whose rows repeat updates of some channels, of which the velocity is late."""
+    stamps = np.arange(flight.time[0], flight.time[-1], 1 / updates_hz)
+    last = np.searchsorted(stamps, flight.time, side="right") - 1
+    names = ("time", "attitude", "body_rate", "position", "velocity", "acceleration", "rotor_speed")
+    known = {name: getattr(flight, name) for name in names}
+    for name in channels:
+        taken = np.maximum(stamps - (late_s if name == "velocity" else 0.0), stamps[0])
+        known[name] = CubicSpline(flight.time, known[name])(taken)[last]
+    slow = {"updated_hz": dict.fromkeys(channels, updates_hz), "repeated": channels}
+    return recordings.signals_of(recordings.ReadFlight("flight.csv", known, {}, (), **slow), known, STUDY)[0]
+
+
+@pytest.mark.parametrize("updates_hz", [5.0, 10.0])
+@pytest.mark.parametrize("channels", [("velocity",), ("velocity", "position")])
+@pytest.mark.parametrize("late_s", [0.0, 0.06])
+def test_a_velocity_that_rows_repeat_is_as_late_as_it_was_measured(lively, updates_hz, channels, late_s):
+    """What they repeat looked late by half the time between two updates, and its steps like another scale."""
+    made = [read_with_repeats(flight, updates_hz, channels, late_s) for flight in lively]
+    found = [(repair.channel, repair.dropped) for repair in audit(made, WINDOWS).repairs]
+    assert found == ([("velocity", False)] if late_s else [])
+    for repair in audit(made, WINDOWS).repairs:
+        assert repair.delay_s == pytest.approx(late_s, abs=0.01)

@@ -271,6 +271,16 @@ def test_rotors_at_their_largest_speed_are_saturated():
     assert saturated["u"] > 80
 
 
+@pytest.mark.parametrize(("limit", "found"), [(2000.0, set()), (700.0, {"u"})])
+def test_an_update_that_rows_repeat_is_at_no_limit_until_several_are(limit, found):
+    """Rows of 100 Hz repeat each update of 4 Hz 25 times: its largest alone would look like a limit."""
+    columns = log(2001)
+    updates = 800 + 200 * np.sin(0.2 * np.arange(81))
+    columns["u"] = np.minimum(updates, limit)[np.floor(4 * columns["t"] + 1e-9).astype(int)]
+    mapped = RATE | {"rotor_speed": SignalMap(columns=("u",), unit="rad/s")}
+    assert set(read_signals(columns, settings(signals=mapped)).saturated) == found
+
+
 @pytest.mark.parametrize("rule", ["stop", "longest-part"])
 def test_a_step_longer_than_the_gap_asks_for_the_unit_of_time(rule):
     """A log at 100 Hz whose stamps are milliseconds, taken for seconds."""

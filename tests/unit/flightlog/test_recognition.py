@@ -387,6 +387,21 @@ def test_what_shows_no_flight_is_said_with_what_it_holds(own):
         seen(bare)
 
 
+def test_a_height_that_no_config_takes_shows_what_flies():
+    """Telemetry of a copter without rates and outputs stands, climbs to 20 m and lands."""
+    time = 0.1 * np.arange(600)
+    angles = 8 * np.sin(np.outer(time, [1.1, 0.9, 0.3]))
+    height = 20 * np.clip(np.minimum(time - 10, 50 - time) / 5, 0, 1)
+    topics = {
+        "ATT": {"timestamp": time, **dict(zip(("Roll", "Pitch", "Yaw"), angles.T, strict=True))},
+        "CTUN": {"timestamp": time, "Alt": height},
+    }
+    found = recognise(topics, {}, {}, "ArduCopter 3.2.1")
+    assert [guess.signal for guess in found.signals] == ["attitude"]
+    begin, end = found.flown.span_s
+    assert (begin, end) == (pytest.approx(10, abs=1.5), pytest.approx(50, abs=1.5))
+
+
 def test_every_column_of_stamps_that_is_refused_is_said_with_what_else_helps(own):
     stamps = {"t": np.arange(2000) % 1500 * 0.015, "time": np.arange(2000) // 60 * 1.0}
     with pytest.raises(InputError, match=r"^t falls once.*; time rises by 0.*write the config by hand"):

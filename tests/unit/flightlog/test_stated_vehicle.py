@@ -93,6 +93,8 @@ def test_the_log_s_own_mask_keeps_its_bits():
     words = log_faster("them", 100.0, "ArduCopter 3.1.3", parameters={"LOG_BITMASK": 958.0})
     assert "LOG_BITMASK = 1983, which is 958 with bits 0 (fast attitude) and 10 (outputs)" in words
     assert "for ArduCopter 3.1.3 logs outputs (RCOU) 10 times a second at most" in words
+    without = log_faster("them", 100.0, "ArduCopter 3.1.3", parameters={"LOG_BITMASK": 958.0 - 128.0})
+    assert "LOG_BITMASK = 1983, which is 830 with bits 0 (fast attitude), 7 (IMU) and 10 (outputs)" in without
 
 
 def test_a_crazyflie_that_logs_fast_enough_gets_no_setting_that_slows_it():

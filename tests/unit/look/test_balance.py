@@ -113,6 +113,19 @@ def test_sound_rotors_need_no_cause():
     assert not blurred.even
 
 
+def test_rotors_that_work_alike_are_sound_wherever_the_autopilot_has_them():
+    """About stated places that are 5 % of the arm too far back, rotors ahead would have to work less than others."""
+    even = hovering(EVEN, gusts=0.005, **CURVE)
+    back = balance_of(replace(even, places=even.places - [0.05, 0.0]))
+    expected = np.array([rotor.expected for rotor in back.rotors])
+    assert np.abs(expected - 1).max() > 0.05
+    assert (back.uneven, back.causes, back.even) == ((), (), True)
+    asked = balance_of(replace(hovering(expected, gusts=0.005, **CURVE), places=even.places - [0.05, 0.0]))
+    assert (asked.uneven, asked.causes) == ((), ())
+    weak = hovering(EVEN, weak={2: 0.75}, gusts=0.005, **CURVE)
+    assert balance_of(replace(weak, places=even.places - [0.05, 0.0])).uneven[0] == 3
+
+
 def test_unknown_thrust_curves_widen_the_centre_of_mass():
     """Between straight and square, a share of commands is one to two of thrust."""
     ahead = 0.05 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0]

@@ -143,6 +143,19 @@ def test_what_climbs_has_not_landed():
         assert bool(of(events(contents), "landing")) == lands
 
 
+def test_a_yaw_that_px4_resets_in_flight_is_said_with_its_size():
+    contents = logs.WRITERS["px4"](HOP)
+    attitude = contents.topics["vehicle_attitude"]
+    stamps = attitude["timestamp"]
+    for at, half_deg, said in ((2.0, 30, []), (12.0, 2, []), (12.0, -15, ["estimated yaw is reset by −30 deg"])):
+        after = stamps > at
+        reset = {"quat_reset_counter": 1.0 * after, "delta_q_reset[3]": np.sin(np.radians(half_deg)) * after}
+        more = replace(contents, topics=contents.topics | {"vehicle_attitude": attitude | reset})
+        found = [event for event in events(more) if event.kind == "reset"]
+        assert [event.text.partition(",")[0] for event in found] == said
+        assert [round(event.time_s) for event in found] == [12] * len(said)
+
+
 def test_a_failsafe_on_the_ground_is_no_danger():
     for at, severity in ((1.0, "note"), (12.0, "danger")):
         more = {"vehicle_status": state([0, at, at + 0.5], nav_state=[2, 2, 2], failsafe=[0, 1, 0])}

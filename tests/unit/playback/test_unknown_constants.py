@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.config.load import validate
 from cpfls_cli.playback.fit import Fitted
-from cpfls_cli.playback.loop import LoopBounds, _factors
+from cpfls_cli.playback.loop import LoopBounds, _explained, _factors
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.vehicle import FoundNumber, bodily, carrying_weight, find_vehicle, widened_by_loop
@@ -142,6 +142,7 @@ def test_where_nothing_turns_no_factor_of_the_loop_overflows():
     """Warnings are errors here."""
     sums = np.array([[1e200, 1e200, 0.0, 0.0, 0.0], [0.0, 0.0, 1e200, 0.0, 0.0]])
     assert _factors(sums).tolist() == [[10.0, 0.1], [1.0, 1.0]]
+    assert _explained(np.array([[0.0, 1e10, 0.0, 0.0, 0.0], [4.0, 1.0, 1.0, 0.0, 0.0]])) == pytest.approx([1, 0.25])
     assert Fitted(None, np.zeros(2), 0.0, np.diag([0.0, 1e300])).condition_number < 1e17
 
 
