@@ -162,13 +162,7 @@ class Autopilot:
         return next((each for each in self.parameters if each.role == role), None)
 
     def named(self, name: str) -> Parameter:
-        """Give a parameter by its name.
-
-        Raises
-        ------
-        InputError
-            If the law has no such parameter.
-        """
+        """Give a parameter by its name; InputError if the law has no such parameter."""
         for each in self.parameters:
             if each.name == name:
                 return each

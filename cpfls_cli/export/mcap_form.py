@@ -200,10 +200,7 @@ _FRAME_TRANSFORM = _whole(
 def mcap_bytes(view: View) -> bytes:
     """Write a view as MCAP.
 
-    Raises
-    ------
-    InputError
-        If the package is missing, or a stamp is before 0, which MCAP has no number for.
+    InputError if the package is missing, or a stamp is before 0, which MCAP has no number for.
     """
     try:
         writer_of = import_module("mcap.writer").Writer

@@ -44,13 +44,7 @@ _OF_CONFIG = ("rotor_command", "voltage", "setpoint_thrust")
 
 
 def view_of(path: Path, given: Any, config: str) -> View:
-    """Gather what is to be drawn of an artifact that was made with a config.
-
-    Raises
-    ------
-    InputError
-        If there is nothing.
-    """
+    """Gather what is to be drawn of an artifact that was made with a config; InputError if there is nothing."""
     study = stored_study(config, path)
     for kind, made in _KINDS.items():
         if isinstance(given, kind):

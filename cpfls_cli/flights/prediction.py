@@ -136,10 +136,7 @@ class AlongFlight:
 def along_flight(model: Path, flight: Path, study: Study) -> tuple[AlongFlight, tuple[str, ...]]:
     """Predict along a flight, and say what speaks against model and flight.
 
-    Raises
-    ------
-    InputError
-        If the flight lacks the attitude or a signal that the model needs.
+    InputError if the flight lacks the attitude or a signal that the model needs.
     """
     require_known(study, "predict", whole=is_found(model))
     record = any_model(model)

@@ -51,10 +51,7 @@ def find_model(
 ) -> FoundModel:
     """Search for a model and solve it, as `identify` does, which then judges it; parameters are those of `identify`.
 
-    Raises
-    ------
-    ComputationError
-        If no chromosome gives a finite model.
+    ComputationError if no chromosome gives a finite model.
     """
     freed = freed_torque(training, learned)
     evaluator = model_evaluator(*source_of(freed, training, learned), settings)

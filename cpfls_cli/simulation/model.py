@@ -247,13 +247,7 @@ def with_effects(model: VehicleModel | None, asked: SimulatedEffects) -> tuple[V
 
 
 def played_gusts(model: VehicleModel | None, asked: bool) -> Gusts | None:
-    """Give the gusts of a model where they are asked for.
-
-    Raises
-    ------
-    SettingError
-        If it holds none.
-    """
+    """Give the gusts of a model where they are asked for; SettingError if it holds none."""
     if not asked:
         return None
     if model is None or model.gusts is None:

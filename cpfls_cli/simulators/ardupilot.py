@@ -46,13 +46,7 @@ CANNOT = (
 
 
 def read_ardupilot(file: Path) -> SimulatorModel:
-    """Read the JSON of a frame.
-
-    Raises
-    ------
-    InputError
-        If it is of no multicopter.
-    """
+    """Read the JSON of a frame; InputError if it is of no multicopter."""
     numbers = json_numbers(file)
     if not any(numbers.get(key) for key in KEYS):
         raise InputError(f"{file}: states none of {', '.join(KEYS)}, so it is no frame of ArduPilot's SITL; give one")

@@ -33,10 +33,7 @@ CANNOT = (
 def read_crazyflie(file: Path, option: str) -> SimulatorModel:
     """Read a header as it is with the battery compensated, and another option where one is named.
 
-    Raises
-    ------
-    InputError
-        If it states no mass or no arm.
+    InputError if it states no mass or no arm.
     """
     option = (option or _USUAL).removeprefix("CONFIG_")
     numbers = header_numbers(file, (_ALWAYS, f"CONFIG_{option}"))

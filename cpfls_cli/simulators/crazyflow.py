@@ -32,10 +32,7 @@ CANNOT = (
 def read_crazyflow(file: Path, section: str) -> SimulatorModel:
     """Read a section of parameters, the only one where none is named.
 
-    Raises
-    ------
-    InputError
-        If it has no such section, or several and none is named.
+    InputError if it has no such section, or several and none is named.
     """
     numbers = toml_numbers(file)
     sections = [str(name) for name in numbers.below() if "mass" in numbers.below(name)]

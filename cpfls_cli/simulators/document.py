@@ -205,13 +205,7 @@ class _Builder:
 
 
 def read_bytes(file: Path) -> bytes:
-    """Read a file, and keep its bytes to correct them.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or is larger than any model.
-    """
+    """Read a file, and keep its bytes to correct them; InputError if it cannot be read, or is larger than any model."""
     try:
         with file.open("rb") as stream:
             raw = stream.read(_LARGEST + 1)
@@ -226,10 +220,7 @@ def read_bytes(file: Path) -> bytes:
 def read_xml(file: Path) -> Node:
     """Read a file of XML; entities and document types, which no model needs, are refused.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or is no XML.
+    InputError if it cannot be read, or is no XML.
     """
     raw = read_bytes(file)
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in raw[:4]:

@@ -148,10 +148,7 @@ def is_simulator_file(path: Path) -> bool:
 def read_model(path: Path) -> SimulatorModel:
     """Read the vehicle in a simulator's file, checked: it has mass, no body's inertia is impossible, and it can hover.
 
-    Raises
-    ------
-    InputError
-        If the file is of no known format, or states no such vehicle.
+    InputError if the file is of no known format, or states no such vehicle.
     """
     return checked(as_stated(path))
 

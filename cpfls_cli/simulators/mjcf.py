@@ -160,13 +160,7 @@ def _floats(node: Node, own: Mapping[str, str], name: str, counts: Collection[in
 
 
 def read_mjcf(file: Path) -> SimulatorModel:
-    """Read MJCF of a vehicle.
-
-    Raises
-    ------
-    InputError
-        If there is no body that flies, or it is not one rigid body.
-    """
+    """Read MJCF of a vehicle; InputError if there is no body that flies, or it is not one rigid body."""
     root = read_xml(file)
     whole, notes = _File(root), list[str]()
     whole.read()

@@ -343,13 +343,7 @@ def turning(node: Node, what: str) -> InputError:
 
 
 def unit(node: Node, name: str, direction: Sequence[float] | Array) -> Array:
-    """Scale what an element states to length 1.
-
-    Raises
-    ------
-    InputError
-        If it has no length.
-    """
+    """Scale what an element states to length 1; InputError if it has no length."""
     length = float(np.linalg.norm(direction))
     if not length > _SHORTEST:
         raise node.error(f"{name} has no direction; write one whose length is not 0")

@@ -25,10 +25,7 @@ _ENTRIES = ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 def read_rotorpy(file: Path) -> SimulatorModel:
     """Read a module with RotorPy's dictionary.
 
-    Raises
-    ------
-    InputError
-        If it does anything else than state numbers, or has none or several such dictionaries.
+    InputError if it does anything else than state numbers, or has none or several such dictionaries.
     """
     numbers = python_numbers(file)
     names = [str(name) for name in numbers.below() if {"mass", "k_eta"} <= set(numbers.below(name))]

@@ -188,10 +188,7 @@ def _model_of(root: Node) -> Node:
 def read_sdf(file: Path) -> SimulatorModel:
     """Read SDF of a vehicle with Gazebo's motor plugins.
 
-    Raises
-    ------
-    InputError
-        If there is no motor plugin, or the vehicle is not one rigid body with rotors.
+    InputError if there is no motor plugin, or the vehicle is not one rigid body with rotors.
     """
     root = read_xml(file)
     model = _model_of(root)
@@ -221,10 +218,7 @@ def no_motor(file: Path, plugins: Sequence[Node]) -> InputError:
 def in_order(motors: Sequence[tuple[str, Node]]) -> list[tuple[str, Node]]:
     """Sort motor plugins, each with the scope of the names in it, by the numbers of their motors.
 
-    Raises
-    ------
-    InputError
-        If one has none, or that of another.
+    InputError if one has none, or that of another.
     """
     numbered: dict[float, tuple[str, Node]] = {}
     for scope, plugin in motors:
@@ -305,10 +299,7 @@ def _body(link: Node, name: str, placed: Array, notes: list[str]) -> Body:
 def rotor_of(plugin: Node, link: Body | None) -> Rotor:
     """Make the rotor of a motor plugin, of the link that it names.
 
-    Raises
-    ------
-    InputError
-        If that is no part of the vehicle, or the plugin states a number that it does not take.
+    InputError if that is no part of the vehicle, or the plugin states a number that it does not take.
     """
     if link is None:
         raise plugin.error(f"its link {text_of(plugin, 'linkName')!r} is not a part of the vehicle; correct <linkName>")

@@ -190,12 +190,7 @@ def of_log(
     """Make the vehicle of a study; a log says in which order its rotors are, and how fast they turned.
 
     What hangs on the log, the largest speed and thrust by volts, is that of a vehicle made of this file with other
-    logs, where one is given.
-
-    Raises
-    ------
-    InputError
-        If the log has another number of rotors than the file.
+    logs, where one is given; InputError if the log has another number of rotors than the file.
     """
     airframe = None if proposal is None else proposal.airframe
     logged = 0 if proposal is None else proposal.rotors

@@ -38,10 +38,7 @@ CANNOT = (
 def read_urdf(file: Path) -> SimulatorModel:
     """Read URDF of a vehicle; without motor plugins or the properties of gym-pybullet-drones it states no rotors.
 
-    Raises
-    ------
-    InputError
-        If the vehicle is not one rigid body, or a plugin states what it does not take.
+    InputError if the vehicle is not one rigid body, or a plugin states what it does not take.
     """
     root, notes = read_xml(file), list[str]()
     links = {link.name: link for link in root.all("link")}

@@ -35,11 +35,7 @@ def kept_numbers(
     """Give the numbers of a flight or log as they are kept in a folder, or compute them and keep them there.
 
     Those that are kept are taken where content, vehicle and import are the same, and the code of the program.
-
-    Raises
-    ------
-    InputError
-        If the flight has none.
+    InputError if the flight has none.
     """
     kept = find_kept(flight, file, study, folder)
     if kept is not None:

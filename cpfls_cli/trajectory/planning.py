@@ -347,10 +347,7 @@ def held_rotation(path: RotationPath, sample_time: float) -> PlannedRotation:
 def sample_interval(time: Array) -> float:
     """Find the time between the samples of a plan that is flown in closed loop, s.
 
-    Raises
-    ------
-    ComputationError
-        If there are fewer than two samples, or they are not uniform.
+    ComputationError if there are fewer than two samples, or they are not uniform.
     """
     if len(time) < 2 or np.ptp(np.diff(time)) > _UNIFORM * (time[1] - time[0]):
         raise ComputationError("a flight in closed loop needs a trajectory with at least two samples at one rate")

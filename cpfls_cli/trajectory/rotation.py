@@ -244,10 +244,7 @@ class RotationLimits:
     def fitted(self, path: RotationPath) -> RotationPath:
         """Scale the harmonics of a path to the largest amplitudes that the limits allow, which uses up one of them.
 
-        Raises
-        ------
-        SettingError
-            If the turns alone exceed a limit.
+        SettingError if the turns alone exceed a limit.
         """
         from scipy.optimize import brentq
 

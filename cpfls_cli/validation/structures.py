@@ -127,10 +127,7 @@ class StructureFolds:
     def of(cls, training: TorqueSource, learned: TorqueSource, settings: IdentificationSettings) -> StructureFolds:
         """Thin out the samples where there are many, and label them by fold.
 
-        Raises
-        ------
-        SettingError
-            If there are too few samples for the blocks.
+        SettingError if there are too few samples for the blocks.
         """
         validation = settings.validation
         structure = model_structure(_RIGID_ONLY)

@@ -369,13 +369,7 @@ class Serial(Workforce):
 
 
 def require_address(address: str) -> None:
-    """Require that a text is an address.
-
-    Raises
-    ------
-    InputError
-        If it is not of the form tcp://host:port, or tls://host:port.
-    """
+    """Require that a text is an address; InputError if it is not of the form tcp://host:port, or tls://host:port."""
     try:
         parts = urlsplit(address)
         complete = parts.scheme in _SCHEMES and bool(parts.hostname) and bool(parts.port)
