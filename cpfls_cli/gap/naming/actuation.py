@@ -36,9 +36,10 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
 
     In gusts a fit of all motion takes the loop for the rotors, and a lag for a delay. Effects of one number are tried
     alone and together: both are named where each is significant conditional on the other, else one that is significant.
-    Where the past predicts the residual of these, more numbers are tried: it predicts nothing under the right set. Of
-    sets that leave as little the one with the fewest numbers is named, and of as many the first of the catalogue, which
-    is the usual one. `found` is a fit by instruments, and `effects` are those that the search tried.
+    Where the past predicts the residual of these, more numbers are tried: it predicts nothing under the right set; and
+    where a delay has no lag with it, because no rotor follows at once: a drive of second order is late like a delay.
+    Of sets that leave as little the one with the fewest numbers is named, and of as many the first of the catalogue,
+    which is the usual one. `found` is a fit by instruments, and `effects` are those that the search tried.
     """
     lags = [each for each in effects if each.is_lag and found.hypothesis.can(Candidate(each, {}))]
     # A clock is no part of the vehicle: its shift is asked where the search found one.
@@ -50,12 +51,12 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
     best, rivals = sets.usual()
     more = sum(len(each.effect.shapes) for each in found.hypothesis.chosen if each.effect.is_lag)
     for count in range(2, max(2, more) + 1):
-        if best and (sets.count(best) == count or sets.is_predictable(best)):
+        if best and (sets.count(best) == count or sets.is_lacking(best)):
             untried = [each for each in sets.all if sets.count(each) == count and each not in sets.predictable]
             rivals += sets.fit(untried)
             best = sets.least([best, *(names for names in rivals if sets.count(names) == count and names != best)])
     alike = []
-    lacking = bool(best) and sets.is_predictable(best)
+    lacking = bool(best) and sets.is_lacking(best)
     for names in rivals:
         # More numbers are a rival where they leave nothing and the named ones something.
         if sets.count(names) > sets.count(best) and not (lacking and not sets.is_predictable(names)):
@@ -133,6 +134,10 @@ class _Sets:
     def is_predictable(self, names: _Names) -> bool:
         """Check whether the past predicts the residual of a set, which makes an answer more careful."""
         return self._more(self.predictable[names], CHANCE)
+
+    def is_lacking(self, names: _Names) -> bool:
+        """Check whether a set lacks a number: the past predicts its residual, or its rotors follow at once."""
+        return (self.count(names) == 1 and next(iter(self.effects)) not in names) or self.is_predictable(names)
 
     def surely_more(self, one: _Names, other: _Names, tried: int = 1) -> bool:
         """Check whether it surely leaves more than another; the right one leaves nothing, and less than that chance.

@@ -71,8 +71,8 @@ def test_what_is_needed_next_to_the_other_is_named_whatever_was_found(own, toget
     found, alike, result, tried = apart(monkeypatch, own, left, {BOTH: together})
     assert (found, alike) == (names, rivals)
     assert result.chances[names[0]] < 1e-6
-    # A filter has a number more, and nothing is left for it.
-    assert not {"low_pass_filter", "notch_filter"} & {*sum(tried, ())}
+    # A filter has a number more, and nothing is left for it but the lag that a delay alone lacks.
+    assert bool({"low_pass_filter", "notch_filter"} & {*sum(tried, ())}) == (names == DELAY)
 
 
 def test_the_one_that_leaves_more_is_no_rival(monkeypatch):
@@ -112,6 +112,12 @@ def test_a_filter_that_leaves_nothing_is_a_rival_of_one_that_surely_leaves_somet
     some = np.where(np.arange(BLOCKS) < 10, 3.0, -2.0)
     left = {(): 90.0, DELAY: some, ("low_pass_filter",): 4.5 * LITTLE + 0.5, ("notch_filter",): 30.0}
     names, rivals, *_ = apart(monkeypatch, DELAY, left)
+    assert (names, rivals) == (DELAY, {("low_pass_filter", "command_delay", "")})
+
+
+def test_a_filter_that_leaves_as_little_is_a_rival_of_a_delay_without_a_lag(monkeypatch):
+    left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE, ("low_pass_filter",): LITTLE, ("notch_filter",): 30.0}
+    names, rivals, *_ = apart(monkeypatch, DELAY, left, {BOTH: [ABSENT, SURE]})
     assert (names, rivals) == (DELAY, {("low_pass_filter", "command_delay", "")})
 
 
