@@ -212,8 +212,49 @@ def _mended(now: _Compared) -> tuple[tuple[ChannelRepair, ...], tuple[Finding, .
             return _outvoted(now, *read, [*witnesses, CHANNELS["thrust"].words]), ()
         # Noise on both sides can look like one contradiction, not like two.
         elif sure and read is None and len(set(witnesses)) > 1:
-            return (_left_out(now, channel, witnesses),), ()
+            return _of_fewest_mistakes(now) or (_left_out(now, channel, witnesses),), ()
     return (), tuple(dropped)
+
+
+def _of_fewest_mistakes(now: _Compared) -> tuple[ChannelRepair, ...]:
+    """Repair the velocity, or what it contradicts next to the position, where that takes the fewest mistakes.
+
+    Between two others, it contradicts both where one of them is wrong as well. Each of the three is taken for right in
+    turn, and the two others are read by it. Nothing is repaired where two ways take as few mistakes.
+    """
+    exact = {name for check in now.checks if check.problems and check.pair.exact for name in check.pair[:2]}
+    sensors = exact - {"position", "velocity"}
+    if len(exact) != 3 or len(sensors) != 1:
+        return ()
+    (sensor,) = sensors
+    by_velocity = (("position", sensor), (sensor, "position"))
+    by_position = (("velocity", sensor), (sensor, "position"))
+    by_sensor = (("velocity", "position"), ("position", sensor))
+    ways = [way for steps in (by_velocity, by_position, by_sensor) if (way := _mistakes(now, steps)) is not None]
+    fewest = [repairs for count, repairs in ways if count == min(count for count, _ in ways)]
+    return fewest[0] if len(fewest) == 1 else ()
+
+
+def _mistakes(now: _Compared, steps: Sequence[tuple[str, str]]) -> tuple[int, tuple[ChannelRepair, ...]] | None:
+    """Count the mistakes of channels that are read one after the other, each without a third; None where one is not.
+
+    With the count comes the repair of the first that can be set right.
+    """
+    count, first, repairs = 0, tuple[ChannelRepair, ...](), tuple[ChannelRepair, ...]()
+    for channel, third in steps:
+        alone = _Compared.of(now.repaired(*repairs, ChannelRepair(third, dropped=True)), now.windows)
+        exact = [check for check in alone.checks if check.pair.exact and check.problems]
+        if not exact:
+            continue
+        read = _read_rightly(alone, channel)
+        if read is None or _opposed(alone, read[0]):
+            return None
+        count += len(read[1]) + bool(read[0].delay_s)
+        repairs = (*repairs, read[0])
+        if CHANNELS[channel].without and not first:
+            words = [CHANNELS[name].words for name in exact[0].pair[:2] if name != channel]
+            first = _outvoted(alone, *read, words)
+    return (count, first) if first else None
 
 
 def _suspects(checks: Sequence[PairCheck]) -> list[tuple[str, bool]]:

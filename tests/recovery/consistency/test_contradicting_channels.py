@@ -369,6 +369,14 @@ SEVERAL = {
         lambda s: WRONG["velocity in km/h"][0](WRONG["in g"][0](s)),
     ),
     "axes": (("velocity has y, x, -z",), WRONG["velocity in NED"][0]),
+    "sign of the velocity, delay": (
+        ("velocity has -x, y, z", "acceleration is late by"),
+        lambda s: replace(s, velocity=s.velocity * [-1, 1, 1], acceleration=late(s.acceleration, 0.05)),
+    ),
+    "sign of the velocity, unit": (
+        ("velocity has x, y, -z", "acceleration is in g"),
+        lambda s: replace(WRONG["in g"][0](s), velocity=s.velocity * [1, 1, -1]),
+    ),
     "offset": (
         ("acceleration has a constant offset of",),
         of_acceleration(lambda _, a: a + np.array([0.3, -0.2, 0.4])),
@@ -385,6 +393,29 @@ def test_each_of_several_faults_is_set_right_and_nothing_else(flights, several):
     for sentence in words:
         assert sum(sentence in settled for settled in found.settled) == 1
     assert len(found.settled) == 1 + len(words)
+
+
+@pytest.mark.parametrize(
+    ("position", "change", "words"),
+    [
+        (lambda p: late(p, 0.1), WRONG["in g"][0], "acceleration is in g, judged by the velocity"),
+        (lambda p: 100 * p, WRONG["late"][0], "acceleration is late by"),
+        (lambda p: 100 * p, WRONG["velocity late"][0], "velocity is late by"),
+    ],
+    ids=["late, in g", "in cm, late", "in cm, velocity late"],
+)
+def test_a_velocity_is_not_left_out_for_what_two_others_have_wrong(flights, position, change, words):
+    wrong = [change(replace(signals, position=position(signals.position))) for signals in flights]
+    found = audit(wrong, WINDOWS)
+    [sentence] = found.settled
+    assert words in sentence
+    # Nothing corrects a position.
+    assert any("position and velocity" in said for said in (*found.warnings, *found.contradictions))
+    for given, true in zip(wrong, flights, strict=True):
+        mended = found.repaired(given)
+        for name, most in (("velocity", 0.05), ("acceleration", 0.1)):
+            now, known = (WINDOWS.average(getattr(each, name)) for each in (mended, true))
+            assert np.sqrt(((now - known) ** 2).mean()) < most
 
 
 def test_rotors_and_attitude_that_are_late_are_both_set_right(lively):
