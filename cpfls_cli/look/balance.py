@@ -83,9 +83,9 @@ class Balance:
     @property
     def uneven(self) -> tuple[int, ...]:
         """Number the rotors whose share surely differs by more than sound rotors do, the most uneven first."""
-        known = [(each.rotor, each.expected, each.share) for each in self.rotors if each.share]
-        apart = [(float(_beyond(share.low, share.high, expected)), rotor) for rotor, expected, share in known]
-        return tuple(rotor for by, rotor in sorted(apart, reverse=True) if by > SOUND)
+        known = [(each.share.value, each.share.half, each.expected) for each in self.rotors if each.share]
+        by = _beyond(*np.array(known).T) if known else np.empty(0)
+        return tuple(int(k) + 1 for k in np.argsort(-by) if by[k] > SOUND)
 
     @property
     def even(self) -> bool:
@@ -178,12 +178,15 @@ def _expected(flight: LogFlight, rotors: int) -> Array:
     return np.asarray(thrust / thrust.mean())
 
 
-def _beyond(low: Array | float, high: Array | float, expected: Array | float) -> Array:
-    """Give how far shares surely lie beyond both the mean of all rotors and what their stated places ask for.
+def _beyond(shares: Array, half: Array, expected: Array) -> Array:
+    """Give how far shares surely lie beyond both the mean of all rotors and what hover asks of each.
 
-    Rotors that all work alike are sound, whatever the autopilot was given for their places.
+    Rotors that all work alike are sound, whatever the autopilot was given for their places: hover asks for what is
+    nearest to the shares between that and what these places ask for.
     """
-    return np.asarray(np.maximum(low - np.maximum(expected, 1.0), np.minimum(expected, 1.0) - high))
+    apart, toward = shares - 1.0, expected - 1.0
+    asked = toward * np.clip(apart @ toward / max(float(toward @ toward), 1e-12), 0.0, 1.0)
+    return np.asarray(np.maximum(apart - np.maximum(asked, 0.0), np.minimum(asked, 0.0) - apart) - half)
 
 
 def _length(known: Known, first: int) -> Estimate:
@@ -211,8 +214,7 @@ class _Trims:
         self.lean = np.stack([columns[:, 0], columns[:, 1]]) / rotors
         # Of the arm, that makes half as much as sound rotors differ by.
         self.small = 0.5 * SOUND * float(np.sqrt(np.mean(columns[:, :2] ** 2)))
-        beyond = _beyond(means.value - means.half, means.value + means.half, expected)
-        self.uneven = bool(np.any(beyond > SOUND))
+        self.uneven = bool(np.any(_beyond(means.value, means.half, expected) > SOUND))
 
     def leans(self, shares: Array, heading: Array) -> Known | None:
         """Part where the thrust acts, forward and right, into what turns with the body and what does not."""

@@ -31,7 +31,7 @@ from cpfls_cli.estimation.spectra import (
 )
 from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.law import flown_law, gyroscope_filters
-from cpfls_cli.look.reasons import NO_COMMAND, NO_MODEL, NOT_MOVED, TOO_SLOW, TOO_WIDE, needed_s, too_short
+from cpfls_cli.look.reasons import NO_COMMAND, NO_MODEL, NOT_MOVED, TOO_SLOW, TOO_WIDE, needed_s, too_little
 from cpfls_cli.look.setpoints import exogenous
 from cpfls_cli.result import Estimate, about, part, result
 
@@ -192,7 +192,7 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
     usable = flight.usable & np.isfinite(flight.command[:, axis]) & np.isfinite(flight.body_rate[:, axis])
     if reason := _unusable(flight, usable, bool(np.isfinite(flight.command[:, axis]).any())):
         return _none(AXES[axis], reason)
-    chosen, law = exogenous(flight, axis, usable), flown_law(flight)
+    chosen, law, known = exogenous(flight, axis, usable), flown_law(flight), usable
     best: AxisPlant | None = None
     for source, values in chosen.candidates:
         known = usable & np.isfinite(values)
@@ -208,8 +208,8 @@ def axis_effectiveness(flight: LogFlight, axis: int) -> AxisPlant:
             best = found
         if best.strength >= STRONG:
             break
-    # What is long enough, and moved in too few windows.
-    return best or _none(AXES[axis], chosen.reason or NOT_MOVED)
+    left = eroded(known, round(_SLOW_S * flight.rate_hz))
+    return best or _none(AXES[axis], chosen.reason or too_little(left, flight.rate_hz, _window_s(flight)[0]))
 
 
 def _unusable(flight: LogFlight, usable: BoolArray, commanded: bool) -> str:
@@ -220,7 +220,7 @@ def _unusable(flight: LogFlight, usable: BoolArray, commanded: bool) -> str:
         return TOO_SLOW
     shortest = _window_s(flight)[0]
     if usable.sum() < needed_s(shortest) * flight.rate_hz:
-        return too_short(usable, flight.rate_hz, shortest)
+        return too_little(usable, flight.rate_hz, shortest)
     return ""
 
 

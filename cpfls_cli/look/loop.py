@@ -22,7 +22,7 @@ from cpfls_cli.estimation.spectra import (
 from cpfls_cli.look.effectiveness import AxisPlant, PlantModel
 from cpfls_cli.look.flight import AXES, LogFlight
 from cpfls_cli.look.law import flown_law, gyroscope_filters
-from cpfls_cli.look.reasons import NO_SETPOINT, NOT_MOVED, TOO_SLOW, too_short
+from cpfls_cli.look.reasons import NO_SETPOINT, TOO_SLOW, too_little
 from cpfls_cli.look.setpoints import Exogenous, exogenous
 from cpfls_cli.result import Estimate, about, part, result
 
@@ -31,7 +31,7 @@ CLEAR = 0.2
 _WINDOW_S, _SHOWN_S, _SETTLES_S = 2.0, 0.6, (0.3, 0.5)
 _TOP_HZ, _OF_CLOCK, _FADES = 60.0, 0.2, 1.6
 """Top of the band; the same, share of the clock; frequencies over which a cut step fades, by its end."""
-_SLOWEST_HZ, _FEWEST_WINDOWS, _USUAL_LATE_S = 20.0, 18, 0.04
+_SLOWEST_HZ, _USUAL_LATE_S = 20.0, 0.04
 _CERTAIN = 0.975
 _AGREES = 0.05
 """Share of a step by which plant and law may leave the interval of the measured one."""
@@ -101,7 +101,7 @@ def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) 
         found, source = _response(flight, values, asked, rate, usable & np.isfinite(values), length), name
         if found is not None:
             break
-        reason = _why_not(flight, usable & np.isfinite(values))
+        reason = too_little(usable & np.isfinite(values), flight.rate_hz, _WINDOW_S)
     every = _measured(found, time, length) if found else {}
     loop = PlantAndLaw.of(plant, law, axis) if found else None
     return AxisLoop(
@@ -119,11 +119,6 @@ def _instruments(flight: LogFlight, axis: int, usable: BoolArray) -> Exogenous:
     if 0.5 * flight.rate_hz < _SLOWEST_HZ:
         return Exogenous((), TOO_SLOW)
     return exogenous(flight, axis, usable)
-
-
-def _why_not(flight: LogFlight, usable: BoolArray) -> str:
-    short = len(window_starts(usable, round(_WINDOW_S * flight.rate_hz))) < _FEWEST_WINDOWS
-    return too_short(usable, flight.rate_hz, _WINDOW_S) if short else NOT_MOVED
 
 
 def _whole(given: dict[str, Any]) -> dict[str, Any]:

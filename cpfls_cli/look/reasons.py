@@ -21,8 +21,10 @@ def needed_s(window_s: float) -> float:
     return _WINDOWS * window_s
 
 
-def too_short(usable: BoolArray, rate_hz: float, window_s: float) -> str:
-    """Say how much of a log is usable in pieces that hold a window, and how much is needed."""
+def too_little(usable: BoolArray, rate_hz: float, window_s: float) -> str:
+    """Say how much of a log is usable in pieces that hold a window, and how much is needed; or that it moves little."""
     pieces = [(after - first) / rate_hz for first, after in runs(usable)]
-    whole = sum(piece for piece in pieces if piece >= window_s)
-    return f"{whole:.0f} s are usable in pieces of at least {window_s:.0f} s; {needed_s(window_s):.0f} s are needed"
+    whole, needed = sum(piece for piece in pieces if piece >= window_s), needed_s(window_s)
+    if whole >= needed:
+        return NOT_MOVED
+    return f"{whole:.0f} s are usable in pieces of at least {window_s:.0f} s; {needed:.0f} s are needed"

@@ -8,7 +8,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.look.flight import LogFlight
-from cpfls_cli.look.reasons import AT_REST, NO_STICK, too_short
+from cpfls_cli.look.reasons import AT_REST, NO_STICK, needed_s, too_little
 
 MADE_BY_STICKS = 0.95
 """Share of the variance of a setpoint that the stick explains, from which it is not fed by the state."""
@@ -16,7 +16,6 @@ _RATE_HZ = 25.0
 _LAGS_S = (0.0, 0.04, 0.08, 0.12, 0.2, 0.32)
 _SLOW_S = 2.0
 """Slower motion of a setpoint, such as trim and heading, is left out."""
-_FEWEST_S = 10.0
 _AT_REST = 0.01
 """Standard deviation of a stick, share of its full throw, below which it rests."""
 
@@ -35,9 +34,9 @@ def exogenous(flight: LogFlight, axis: int, usable: BoolArray) -> Exogenous:
     only as far as the state follows the stick; one that it explains all but wholly is its image.
     """
     stick, every = flight.stick[:, axis], usable & np.isfinite(flight.stick[:, axis])
-    if every.sum() < _FEWEST_S * flight.rate_hz:
+    if every.sum() < needed_s(1.0) * flight.rate_hz:
         short = np.isfinite(stick).any()
-        return Exogenous((), too_short(every, flight.rate_hz, 1.0) if short else NO_STICK)
+        return Exogenous((), too_little(every, flight.rate_hz, 1.0) if short else NO_STICK)
     if float(np.std(stick[every])) < _AT_REST:
         return Exogenous((), AT_REST)
     found = [("stick", stick)]

@@ -322,9 +322,11 @@ def _of_px4(topics: Topics) -> Iterator[Event]:
 def _yaw_resets(flight: LogFlight, topics: Topics) -> Iterator[Event]:
     """Say by how much PX4 turns its estimate at once: the attitudes before and after are not of one motion."""
     time, counted = _field(topics, "vehicle_attitude", "quat_reset_counter")
-    half = np.clip(_field(topics, "vehicle_attitude", "delta_q_reset[3]")[1], -1, 1)
-    for row in np.flatnonzero(np.diff(counted)) + 1 if len(half) == len(counted) else ():
-        turn, at = float(np.degrees(2 * np.arcsin(half[row]))), float(time[row])
+    cosine, sine = (_field(topics, "vehicle_attitude", f"delta_q_reset[{each}]")[1] for each in (0, 3))
+    for row in np.flatnonzero(np.diff(counted)) + 1 if len(cosine) == len(sine) == len(counted) else ():
+        # A quaternion and its negative are one turn.
+        half, at = np.arctan2(np.copysign(sine[row], sine[row] * cosine[row]), abs(cosine[row])), float(time[row])
+        turn = float(np.degrees(2 * half))
         flies = flight.flown[min(int(np.searchsorted(flight.time, at)), len(flight.time) - 1)]
         if flies and abs(turn) > _JUMP_DEG:
             text = f"estimated yaw is reset by {turn:.0f} deg".replace("-", "−")
@@ -564,6 +566,5 @@ def _in_words(kind: str, many: Sequence[Event]) -> str:
     return f"{many[0].text}, {len(many)} times"
 
 
-_KEPT: Final = frozenset(
-    ("flown", "take-off", "landing", "end", "impact", "loss of control", "free fall", "limit", "clipping", "armed")
-)
+_MOVES: Final = ("flown", "take-off", "landing", "end", "impact", "loss of control", "free fall")
+_KEPT: Final = frozenset((*_MOVES, "limit", "clipping", "armed", "reset"))

@@ -2,6 +2,7 @@
 
 import gzip
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -235,6 +236,19 @@ def test_a_headline_says_when_before_what():
     text = "the accelerometer reads 0.79 g at rest: calibrate it"
     found = (Event(time_s=0.0, kind="calibration", text=text, severity="warning"),)
     assert words_of(events=found).startswith(f"# Flies; at 0.0 s: {text}")
+
+
+def test_balanced_rotors_are_within_what_hover_asks_of_each():
+    curve = {
+        "parameters": {"MOT_THST_EXPO": 0.0001, "MOT_SPIN_MIN": 0.0, "MOT_SPIN_MAX": 1.0},
+        "autopilot": "ardupilot",
+    }
+    places = CROSS - [0.1, 0.0]
+    alike = replace(hovering(np.ones(4), gusts=0.005, **curve), places=places)
+    expected = np.array([rotor.expected for rotor in balance_of(alike).rotors])
+    asked = replace(hovering(expected, gusts=0.005, **curve), places=places)
+    for flown, of in ((alike, "their mean"), (asked, "what hover asks of each")):
+        assert re.search(rf"balanced: within [12] % of {of}$", words_of(balance=balance_of(flown)), re.MULTILINE)
 
 
 def test_what_the_vehicle_did_comes_before_what_the_log_lacks():

@@ -126,6 +126,19 @@ def test_rotors_that_work_alike_are_sound_wherever_the_autopilot_has_them():
     assert balance_of(replace(weak, places=even.places - [0.05, 0.0])).uneven[0] == 3
 
 
+def test_a_weak_rotor_that_is_asked_for_less_is_not_sound_by_working_as_much_as_the_mean():
+    """What it works more is shown by the rotor that balances it, of the same spin."""
+    places = CROSS - [0.05, 0.0]
+    expected = np.array(
+        [rotor.expected for rotor in balance_of(replace(hovering(EVEN, **CURVE), places=places)).rotors]
+    )
+    assert expected[1] < 0.95
+    weak = balance_of(replace(hovering(expected, weak={1: 0.9}, gusts=0.005, **CURVE), places=places))
+    assert shares(weak)[1] == pytest.approx(1, abs=0.02)
+    assert (weak.uneven, weak.even) == ((4,), False)
+    assert weak.causes[0].rotor == 2
+
+
 def test_unknown_thrust_curves_widen_the_centre_of_mass():
     """Between straight and square, a share of commands is one to two of thrust."""
     ahead = 0.05 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0]

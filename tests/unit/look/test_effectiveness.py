@@ -146,6 +146,12 @@ def test_reasons_name_what_is_missing(flight):
     assert found.reason.startswith("no stick is logged that moves,")
     short = axis_effectiveness(replace(flight, usable=flight.time < 7), 0).reason
     assert short == "7 s are usable in pieces of at least 1 s; 10 s are needed"
+    # What slow motion is taken out of has no ends left.
+    pieces = axis_effectiveness(replace(flight, usable=flight.time % 1.5 < 1.4), 0).reason
+    assert pieces == "0 s are usable in pieces of at least 1 s; 10 s are needed"
+    stick = np.where(flight.time[:, None] % 1.5 < 1.4, flight.stick, np.nan)
+    unknown = np.full_like(flight.rate_setpoint, np.nan)
+    assert axis_effectiveness(replace(flight, stick=stick, rate_setpoint=unknown), 0).reason == pieces
 
 
 def test_a_setpoint_whose_changes_answer_the_state_is_no_instrument():

@@ -147,13 +147,27 @@ def test_a_yaw_that_px4_resets_in_flight_is_said_with_its_size():
     contents = logs.WRITERS["px4"](HOP)
     attitude = contents.topics["vehicle_attitude"]
     stamps = attitude["timestamp"]
-    for at, half_deg, said in ((2.0, 30, []), (12.0, 2, []), (12.0, -15, ["estimated yaw is reset by −30 deg"])):
-        after = stamps > at
-        reset = {"quat_reset_counter": 1.0 * after, "delta_q_reset[3]": np.sin(np.radians(half_deg)) * after}
+    back = ["estimated yaw is reset by −30 deg"]
+    # The negative of a quaternion is the same turn.
+    for at, half_deg, said in ((2.0, 30, []), (12.0, 2, []), (12.0, -15, back), (12.0, 165, back)):
+        after, half = stamps > at, np.radians(half_deg)
+        turn = {"delta_q_reset[0]": np.where(after, np.cos(half), 1.0), "delta_q_reset[3]": np.sin(half) * after}
+        reset = {"quat_reset_counter": 1.0 * after, **turn}
         more = replace(contents, topics=contents.topics | {"vehicle_attitude": attitude | reset})
         found = [event for event in events(more) if event.kind == "reset"]
         assert [event.text.partition(",")[0] for event in found] == said
         assert [round(event.time_s) for event in found] == [12] * len(said)
+
+
+def test_each_reset_of_the_yaw_is_said_with_its_own_size():
+    contents = logs.WRITERS["px4"](HOP)
+    attitude = contents.topics["vehicle_attitude"]
+    counted = np.clip(np.floor(attitude["timestamp"] - 11.0), 0, 6)
+    half = np.radians(6.0 + counted)
+    turns = {"quat_reset_counter": counted, "delta_q_reset[0]": np.cos(half), "delta_q_reset[3]": np.sin(half)}
+    more = replace(contents, topics=contents.topics | {"vehicle_attitude": attitude | turns})
+    found = [event.text.partition(",")[0] for event in events(more) if event.kind == "reset"]
+    assert found == [f"estimated yaw is reset by {12 + 2 * each} deg" for each in range(1, 7)]
 
 
 def test_a_failsafe_on_the_ground_is_no_danger():
