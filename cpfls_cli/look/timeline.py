@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from math import atan2, degrees
 from typing import Final, Literal
 
 import numpy as np
@@ -322,9 +323,10 @@ def _of_px4(topics: Topics) -> Iterator[Event]:
 def _yaw_resets(flight: LogFlight, topics: Topics) -> Iterator[Event]:
     """Say by how much PX4 turns its estimate at once: the attitudes before and after are not of one motion."""
     time, counted = _field(topics, "vehicle_attitude", "quat_reset_counter")
-    half = np.clip(_field(topics, "vehicle_attitude", "delta_q_reset[3]")[1], -1, 1)
-    for row in np.flatnonzero(np.diff(counted)) + 1 if len(half) == len(counted) else ():
-        turn, at = float(np.degrees(2 * np.arcsin(half[row]))), float(time[row])
+    real, upward = (_field(topics, "vehicle_attitude", f"delta_q_reset[{part}]")[1] for part in (0, 3))
+    for row in np.flatnonzero(np.diff(counted)) + 1 if len(real) == len(upward) == len(counted) else ():
+        # A quaternion and its negative are one turn.
+        turn, at = 2 * degrees(atan2(upward[row] * np.copysign(1, real[row]), abs(real[row]))), float(time[row])
         flies = flight.flown[min(int(np.searchsorted(flight.time, at)), len(flight.time) - 1)]
         if flies and abs(turn) > _JUMP_DEG:
             text = f"estimated yaw is reset by {turn:.0f} deg".replace("-", "−")

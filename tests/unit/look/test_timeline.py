@@ -147,9 +147,11 @@ def test_a_yaw_that_px4_resets_in_flight_is_said_with_its_size():
     contents = logs.WRITERS["px4"](HOP)
     attitude = contents.topics["vehicle_attitude"]
     stamps = attitude["timestamp"]
-    for at, half_deg, said in ((2.0, 30, []), (12.0, 2, []), (12.0, -15, ["estimated yaw is reset by −30 deg"])):
+    turned = ["estimated yaw is reset by −30 deg"]
+    for at, half_deg, said in ((2.0, 30, []), (12.0, 2, []), (12.0, -15, turned), (12.0, 165, turned)):
         after = stamps > at
         reset = {"quat_reset_counter": 1.0 * after, "delta_q_reset[3]": np.sin(np.radians(half_deg)) * after}
+        reset["delta_q_reset[0]"] = np.cos(np.radians(half_deg)) * after
         more = replace(contents, topics=contents.topics | {"vehicle_attitude": attitude | reset})
         found = [event for event in events(more) if event.kind == "reset"]
         assert [event.text.partition(",")[0] for event in found] == said
