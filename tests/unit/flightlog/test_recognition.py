@@ -388,7 +388,7 @@ def test_what_shows_no_flight_is_said_with_what_it_holds(own):
 
 
 def test_a_height_that_no_config_takes_shows_what_flies():
-    """Telemetry of a copter without rates and outputs stands, climbs to 20 m and lands."""
+    """Telemetry of a copter without rates and outputs waits, climbs to 20 m and lands."""
     time = 0.1 * np.arange(600)
     angles = 8 * np.sin(np.outer(time, [1.1, 0.9, 0.3]))
     height = 20 * np.clip(np.minimum(time - 10, 50 - time) / 5, 0, 1)
