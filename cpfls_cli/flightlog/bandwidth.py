@@ -103,7 +103,8 @@ def between_updates(values: Array) -> Array:
     moves on by about that time. An update that was put on another clock may take two rows, of which the second has it.
     """
     updates = np.flatnonzero(np.append(True, (np.diff(values, axis=0) != 0).any(axis=1)))
-    updates = updates[np.append(np.diff(updates) > 1, True)]
+    at_once = np.diff(updates) == 1
+    updates = updates[~np.append(at_once, False) | np.append(False, at_once)]
     if len(updates) < _FEWEST_UPDATES:
         return values
     return np.column_stack([np.interp(np.arange(len(values)), updates, own) for own in values[updates].T])

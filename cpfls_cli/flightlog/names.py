@@ -155,6 +155,8 @@ def _numbered(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
 
 _BY_WORDS, _OF_OTHER_INSTANCE = 100.0, 50.0
 _AXES_OF_A_BODY = 3
+# What else p, q and r may name, by a word before them.
+_ABOUT_AXES = frozenset({"torque", "tau", "moment", "m", "i", "alpha", "acc", "acceleration", "dot", "pid", "int"})
 
 
 def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Named, ...]:
@@ -271,8 +273,10 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     if signal == "position" and group.kind != "numbers":
         return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
-        turns = group.pqr or ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
-        return turns if signal == "body_rate" else not turns and not own & {"torque", "tau", "moment"}
+        turns = ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
+        if signal == "body_rate":
+            return turns or (group.pqr and not own & _ABOUT_AXES)
+        return not turns and not group.pqr and not own & {"torque", "tau", "moment"}
     return bool({*words[-meaning.last :]} & meaning.words)
 
 

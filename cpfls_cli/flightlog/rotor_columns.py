@@ -403,7 +403,7 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
         reason, scale = f"{called}: {begin:g} to {end:g} by {where}", 1 / (end - begin)
         sure: Sure = "guess" if where == _USUAL_PULSES else "named"
         return _in_unit(named, "1", scale, reason, sure, offset=-begin / (end - begin))
-    if named.known in (CRAZYFLIE, PARROT):
+    if named.known in (CRAZYFLIE, PARROT) and 1 < high <= 1 / named.scale:
         return _in_unit(named, "1", named.scale, f"{called}: of {1 / named.scale:.0f}, as on a {named.known}", "named")
     words = {*named.group.words}
     if named.unit in SPEED_UNITS or words & {"om", "omega", "omcmd", "rpm", "rads", "speed", "rad"}:
@@ -411,10 +411,10 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
         rivals = () if named.unit or unit == "rpm" else (Rival("unit: rpm", "its size fits both"),)
         sure = "guess" if rivals else "named"
         return _in_unit(named, unit, named.scale, f"{called}: a commanded speed", sure, *rivals)
-    if named.unit == "1" and named.scale != 1.0:
+    if named.unit == "1" and named.scale != 1.0 and named.known != PARROT:
         return _in_unit(named, "1", named.scale, f"{called}: per cent by its name", "named")
     least, most = np.quantile(values.mean(axis=1), (0.1, 0.9))
-    if not named.known and least < -_BELOW * most:
+    if not named.known and not words & {"motor", "motors", "rotor", "rotors"} and least < -_BELOW * most:
         # What carries a vehicle does not swing about nothing: these are asked of its axes.
         return None
     own = next((own for own in RANGES if low >= own.low and own.high_from < high <= own.high), None)

@@ -42,6 +42,7 @@ _NO_STAMPS = (
 # Of 1980-01-06, less the 18 leap seconds since.
 _GPS_BEGAN, _WEEK_S = 315_964_800 - 18, 604_800
 _INSTANCE, _INSTANCES = "#", ("I", "Instance", "C", "IMU")  # And fields that hold it where no unit says so.
+_MOST_INSTANCES = 16
 _NO_FACTOR = "-?0"
 _SCALED = "cCeEL"
 # Our names of units that ArduPilot calls otherwise.
@@ -93,6 +94,8 @@ def exported(path: Path, variables: Mapping[str, Any]) -> LogContents | None:
     stated: dict[str, dict[str, str]] = {}
     for name, fields in _exported(variables).items():
         stamps = np.atleast_1d(fields["TimeUS"])
+        if stamps.dtype.kind not in "iuf" or stamps.ndim != 1 or not len(stamps) or not np.isfinite(stamps).all():
+            continue
         own = {each: np.atleast_1d(values) for each, values in fields.items()}
         own = {
             each: values
@@ -101,8 +104,9 @@ def exported(path: Path, variables: Mapping[str, Any]) -> LogContents | None:
         }
         numbers = {"i": "q", "u": "q", "f": "d"}
         letters = {each: numbers.get(values.dtype.kind, "Z") for each, values in own.items()}
-        # A matrix has all numbers alike.
-        letters |= {each: "q" for each in _INSTANCES if letters.get(each) == "d"} | {"TimeUS": "Q"}
+        # A matrix has all numbers alike, and I is an integral too.
+        instances = [each for each in _INSTANCES if each in own and np.isin(own[each], range(_MOST_INSTANCES)).all()]
+        letters |= dict.fromkeys(instances, "q") | {"TimeUS": "Q"}
         record = np.dtype([(each, "S64" if letter == "Z" else _NUMBERS[letter][0]) for each, letter in letters.items()])
         tables[name] = np.empty(len(stamps), dtype=record)
         for each, values in own.items():
@@ -111,7 +115,7 @@ def exported(path: Path, variables: Mapping[str, Any]) -> LogContents | None:
                 [str(value).strip().encode("latin-1", "replace") for value in values] if texts else values
             )
         kinds[len(kinds)] = _Kind(name, letters, record, [*range(len(stamps))], text=True)
-        stated[name] = {each: _INSTANCE for each in _INSTANCES if letters.get(each) == "q"}
+        stated[name] = dict.fromkeys(instances, _INSTANCE)
     return _of_tables(path, kinds, tables, stated, 0) if "ATT" in tables or "IMU" in tables else None
 
 

@@ -191,11 +191,11 @@ def _variables(path: Path) -> dict[str, Any]:
 
 
 def _of_mat(variables: Mapping[str, Any]) -> Iterator[tuple[str, Any, str]]:
-    timed: dict[str, dict[str, Any]] = {}
+    timed: dict[str, tuple[Array, list[Mapping[str, Any]]]] = {}
 
     def within(prefix: str, value: Any) -> Iterator[tuple[str, Any, str]]:
-        if isinstance(value, dict) and {"time", "signals"} <= value.keys():
-            timed[prefix] = value
+        if own := _with_time(value):
+            timed[prefix] = own
         elif isinstance(value, dict):
             for name, own in value.items():
                 yield from within(f"{prefix}/{name}" if prefix else name, own)
@@ -203,23 +203,37 @@ def _of_mat(variables: Mapping[str, Any]) -> Iterator[tuple[str, Any, str]]:
             yield prefix, value, ""
 
     yield from within("", variables)
-    yield from _on_one_clock(timed)
+    if timed:
+        longest = max(timed, key=lambda name: len(timed[name][0]))
+        clock = timed[longest][0]
+        yield "time" if "time" not in variables else f"{longest}/time", clock, "s"
+        yield from _on_one_clock(timed, clock)
 
 
-def _on_one_clock(timed: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Array, str]]:
-    """Lay what Simulink logs as structures with time on the longest clock of them; NaN where one has no sample."""
-    clocks = {name: np.atleast_1d(np.asarray(own["time"], dtype=float)) for name, own in timed.items()}
-    clock = max(clocks.values(), key=len, default=np.empty(0))
-    if len(clock) < 2:
-        return
-    yield "time", clock, "s"
+def _with_time(value: Any) -> tuple[Array, list[Mapping[str, Any]]] | None:
+    """Take the time and the signals of what Simulink logs as a structure with time; None if it is none."""
+    time = value.get("time") if isinstance(value, dict) else None
+    if not isinstance(time, np.ndarray) or time.dtype.kind not in "iuf" or time.ndim != 1 or len(time) < 2:
+        return None
+    signals = value.get("signals")
+    listed: list[Mapping[str, Any]] = [
+        own for own in np.atleast_1d(signals) if isinstance(own, dict) and "values" in own
+    ]
+    return (time.astype(float), listed) if listed else None
+
+
+def _on_one_clock(
+    timed: Mapping[str, tuple[Array, list[Mapping[str, Any]]]], clock: Array
+) -> Iterator[tuple[str, Array, str]]:
+    """Lay what Simulink logs as structures with time on one clock; NaN where one has no sample."""
     half = 0.5 * float(np.median(np.diff(clock)))
-    for name, time in clocks.items():
+    for name, (time, listed) in timed.items():
         rows = np.minimum(np.searchsorted(clock, time - half), len(clock) - 1)
-        near, signals, named = np.abs(clock[rows] - time) < half, timed[name]["signals"], set[str]()
-        listed = [own for own in ([signals] if isinstance(signals, dict) else signals) if isinstance(own, dict)]
+        near, named = np.abs(clock[rows] - time) < half, set[str]()
         for own in listed:
-            values = np.asarray(own.get("values", ()))
+            values = np.asarray(own["values"])
+            # Samples of a vector that is a column are along the last axis.
+            values = values if values.shape[:1] == time.shape else values.T
             if values.dtype.kind not in "iufb" or values.shape[:1] != time.shape or values.ndim > 2:
                 continue
             laid = np.full((len(clock), *values.shape[1:]), np.nan)

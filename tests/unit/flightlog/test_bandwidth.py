@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.flightlog.bandwidth import cut_offs, slow_signals, warn_of_cut_offs, warn_of_slow
+from cpfls_cli.flightlog.bandwidth import between_updates, cut_offs, slow_signals, warn_of_cut_offs, warn_of_slow
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.flightlog.smoothing import low_pass
@@ -106,3 +106,12 @@ def test_what_has_stamps_of_its_own_is_as_fast_as_these_say_whatever_is_lost():
     # Values that come slower than their stamps are as slow as they come.
     (slower,) = slow_signals(SignalTable(TIME, {"rotor_command": held(WAVES)}), {"rotor_command": 20.0})
     assert slower.rate_hz == pytest.approx(10, rel=0.01)
+
+
+def test_straight_lines_go_from_update_to_update_and_through_what_changes_in_every_row():
+    rows = np.arange(400)
+    repeated = np.column_stack([rows // 10 * 10.0] * 2)
+    between = between_updates(repeated)
+    assert np.abs(between[:390] - rows[:390, None]).max() < 1e-9
+    repeated[200:240] += np.sin(rows[200:240, None])
+    assert np.abs(between_updates(repeated)[205:235] - repeated[205:235]).max() < 1e-9

@@ -171,3 +171,36 @@ def test_neither_a_gyroscope_nor_what_is_asked_of_axes_is_taken_for_rotors(own):
     found = maps(proposed({"": columns}, ""))
     assert found["body_rate"].columns == ("omega[0]", "omega[1]", "omega[2]")
     assert not found.keys() & {"rotor_speed", "rotor_command"}
+
+
+@pytest.mark.parametrize("before", ["tau_", "acc_", "M_"])
+def test_what_else_is_asked_about_axes_is_no_rate(own, before):
+    columns = {
+        "time": own.time,
+        **named(own.rate, *(f"{before}{axis}" for axis in "pqr")),
+        **named(own.angles, "roll", "pitch", "yaw"),
+        **named(own.position, *"xyz"),
+    }
+    assert "body_rate" not in maps(proposed({"": columns}, "", units={"time": "s"}))
+
+
+def test_motors_that_rest_at_minus_one_are_rotors(own):
+    commands = 2 * (own.speed / own.speed.max()) ** 2 - 1
+    commands[:600] = -1.0
+    columns = {
+        "time": own.time,
+        **named(own.rate, "gyro_x", "gyro_y", "gyro_z"),
+        **named(own.angles, "roll", "pitch", "yaw"),
+        **named(commands, *(f"motor_{number}" for number in range(1, 5))),
+    }
+    assert "rotor_command" in maps(proposed({"": columns}, "", units={"time": "s"}))
+
+
+def test_numbers_that_no_parrot_counts_are_not_taken_for_its_own(own):
+    columns = {
+        "time": own.time,
+        **named(own.angles, *(f"rt_yout/{axis}" for axis in ("roll", "pitch", "yaw"))),
+        **named(own.rate, "gyro_x", "gyro_y", "gyro_z"),
+        **named(1000 + 1000 * (own.speed / 1000) ** 2, *(f"rt_yout/motors[{motor}]" for motor in range(4))),
+    }
+    assert maps(proposed({"": columns}, "", units={"time": "s"}))["rotor_command"].scale == 1 / 1000

@@ -534,6 +534,25 @@ def test_what_simulink_logs_with_time_is_on_one_clock(tmp_path):
     assert contents.system == "Parrot minidrone"
 
 
+def test_of_structures_only_those_with_time_are_laid_on_a_clock(tmp_path):
+    """One without it, one that has only the names of such, a vector that is a column, and a time of the file's own."""
+    time = np.arange(40) * 0.005
+    upright = np.arange(120.0).reshape(3, 1, 40)
+    data = {
+        "time": np.arange(90.0),
+        "own": {"time": time, "signals": {"gyro": time + 1.0}},
+        "bare": {"time": [], "signals": {"values": time + 2.0, "label": ""}},
+        "upright": structure(time, upright),
+    }
+    scipy.io.savemat(tmp_path / "log.mat", data)
+    columns = log_contents(tmp_path / "log.mat").topics[""]
+    assert columns["time"].tolist() == data["time"].tolist()
+    assert columns["upright/time"].tolist() == columns["own/time"].tolist() == time.tolist()
+    assert columns["own/signals/gyro"].tolist() == (time + 1.0).tolist()
+    assert columns["bare/signals/values"].tolist() == (time + 2.0).tolist()
+    assert columns["upright[1]"].tolist() == upright[1, 0].tolist()
+
+
 def test_zeros_that_fill_a_buffer_of_matlab_and_the_last_state_are_left_out(tmp_path):
     filled = np.concatenate([1.0 + np.arange(30.0), np.zeros(500)])
     scipy.io.savemat(tmp_path / "log.mat", {"timer": filled, "pos": np.outer([1.0, 0.0, 2.0], filled)})

@@ -268,3 +268,21 @@ def test_messages_that_a_ground_station_made_variables_of_matlab_are_those_of_th
     if form == "structures":
         assert exported.system == log.system == "ArduCopter 4.5.7"
         assert exported.parameters == {"FRAME_CLASS": 1.0, "FRAME_TYPE": 3.0}
+
+
+@pytest.mark.parametrize("form", ["structures", "matrices"])
+def test_an_integral_is_no_number_of_an_instance(tmp_path, form):
+    own = {"TimeUS": 1e6 + 1e4 * np.arange(40.0), "I": 3 * np.sin(0.3 * np.arange(40.0))}
+    named = {"ATT": own | {"Roll": np.arange(40.0)}, "PIDR": own}
+    matrices = {name: np.column_stack([*fields.values()]) for name, fields in named.items()}
+    labels = {f"{name}_label": np.array([*fields], dtype=object) for name, fields in named.items()}
+    scipy.io.savemat(tmp_path / "log.mat", named if form == "structures" else matrices | labels)
+    topics = log_contents(tmp_path / "log.mat").topics
+    assert topics.keys() == named.keys()
+    assert topics["PIDR"]["I"] == pytest.approx(own["I"])
+
+
+@pytest.mark.parametrize("stamps", ["abc", np.empty(0), np.array([1.0, np.nan, 3.0]), np.ones((3, 3))])
+def test_what_has_no_stamps_is_no_message(tmp_path, stamps):
+    scipy.io.savemat(tmp_path / "log.mat", {"ATT": {"TimeUS": stamps, "Roll": np.ones(3)}})
+    assert "ATT/Roll" in log_contents(tmp_path / "log.mat").topics[""]
