@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import atan2, degrees
 from typing import Final, Literal
 
 import numpy as np
