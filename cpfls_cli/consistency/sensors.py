@@ -10,7 +10,7 @@ from scipy.special import stdtr
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import blocks_of_time, half_width, mean_error
-from cpfls_cli.consistency.channels import TURNING_RAD_S, gyroscope_apart, least_noise
+from cpfls_cli.consistency.channels import BODY_AXES, TURNING_RAD_S, gyroscope_apart, least_noise
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber, Finding, in_ms, off_clock
 from cpfls_cli.consistency.gyroscope import DelayScan, GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.consistency.majority import Settled, set_apart, settled
@@ -39,6 +39,8 @@ _SCATTER_S, _SCATTER = 0.004, 0.2  # Estimates of one clock scatter by less than
 _FEWEST_SHIFTS = 4  # Two halves of one flight about roll and pitch.
 # Share of the torque that is left where no shift can do better, and share of that which a shift has to leave at most.
 _NEXT_TO_NOTHING, _HALF = 0.01, 0.5
+# Step of an attitude that no gyroscope of a flight is off by within a window, and share of windows that are without.
+_JUMP_RAD, _BUT_FOR_JUMPS = 0.17, 0.9
 _DONE = "corrected before the balance"
 
 
@@ -401,6 +403,8 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     unlike, scaled = gyroscope_apart(scanned.seen, scanned.read)
     filtered = _is_filtered(flights, windows, scanned)
     apart = (*unlike, *(() if filtered else scaled))
+    if unlike and (jumps := _jumps(flights, windows, scanned)):
+        return Gyroscope.unjudged("the attitude jumps", jumps)
     if unlike:
         return Gyroscope.unjudged("the axes of the gyroscope and the attitude do not match", apart)
     if _agrees_to_rounding(flights, windows):
@@ -425,6 +429,46 @@ def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
         untested |= {name: derived for name, test in _of_gyroscope().items() if test.integrated}
     faults = (CheckedFault(CATALOGUE[name], numbers) for name, numbers in fits.items() if name not in untested)
     return Gyroscope(tuple(faults), untested, fit, apart)
+
+
+def _jumps(flights: Sequence[Signals], windows: Windows, scanned: DelayScan) -> tuple[Finding, ...]:
+    """Find where the attitude turns at once and the gyroscope does not, if both are one motion but for that.
+
+    As of an estimator that resets its yaw. A step shows in a window by the step times the weight where it is.
+    """
+    cut = [(each, motion) for each in flights if (motion := kinematics(each, windows)) is not None]
+    flight = np.repeat(np.arange(len(cut)), [len(motion.rate) for _, motion in cut])
+    time = np.concatenate([motion.centres for _, motion in cut])
+    steps = (scanned.seen - scanned.read) * windows.period / windows.weight.max()
+    left, found = np.ones(len(steps), dtype=bool), list[Finding]()
+    while (size := np.where(left, np.abs(steps).max(axis=1), 0.0)).max() > _JUMP_RAD:
+        at = int(size.argmax())
+        left &= (flight != flight[at]) | (np.abs(time - time[at]) > len(windows.weight) * windows.period)
+        found.append(_jump(cut[flight[at]][0], float(time[at]), 0.5 * len(windows.weight) * windows.period))
+    if left.mean() < _BUT_FOR_JUMPS or gyroscope_apart(scanned.seen[left], scanned.read[left])[0]:
+        return ()
+    return tuple(found)
+
+
+def _jump(flight: Signals, about_s: float, half_s: float) -> Finding:
+    """Measure a jump of the attitude at about a time of a flight: what it turns by in a window beyond the gyroscope."""
+    from scipy.spatial.transform import Rotation
+
+    assert flight.attitude is not None, "it jumps"
+    inside = np.flatnonzero(np.abs(flight.time - about_s) <= half_s)
+    turned = Rotation.from_euler("ZYX", flight.attitude[inside, ::-1])
+    beyond = (turned[:-1].inv() * turned[1:]).as_rotvec() - flight.period * flight.body_rate[inside[:-1]]
+    size, at = beyond.sum(axis=0), flight.time[inside[np.linalg.norm(beyond, axis=1).argmax()]]
+    axis = int(np.abs(size).argmax())
+    what = (
+        f"the attitude jumps by {np.degrees(size[axis]):.0f} deg about body {BODY_AXES[axis]} at {at:.1f} s"
+        f"{f' of {flight.name}' if flight.name else ''}, which the gyroscope does not show"
+    )
+    remedy = (
+        "keep what is before it or after it by import.crop_s, in s from the first stamp of the log: an estimator that "
+        "resets its yaw jumps so"
+    )
+    return Finding(what, remedy, ("attitude", "gyroscope"), float(size[axis]), "rad")
 
 
 def _agrees_to_rounding(flights: Sequence[Signals], windows: Windows) -> bool:

@@ -418,6 +418,32 @@ def test_a_velocity_is_not_left_out_for_what_two_others_have_wrong(flights, posi
             assert np.sqrt(((now - known) ** 2).mean()) < most
 
 
+def jumping(signals, degrees, at):
+    """Let an estimator reset its yaw at a time, s."""
+    return replace(signals, attitude=signals.attitude + np.outer(signals.time > at, [0.0, 0.0, np.radians(degrees)]))
+
+
+@pytest.mark.parametrize("jumps", [[(8.03, 60.0)], [(8.03, -40.0), (14.0, 30.0)]], ids=["one", "two"])
+def test_an_attitude_that_jumps_is_said_to_and_no_column_is_suspected(flights, jumps):
+    first, other = flights
+    for at, degrees in jumps:
+        first = jumping(first, degrees, at)
+    said = audit([first, other], WINDOWS).contradictions
+    found = [re.search(r"jumps by (-?\d+) deg about body z \(yaw\) at ([\d.]+) s", each) for each in said]
+    assert len(said) == len(jumps)
+    for (at, degrees), (moment, angle) in zip(
+        jumps, sorted((float(each[2]), float(each[1])) for each in found), strict=True
+    ):
+        assert moment == pytest.approx(at, abs=0.15)
+        assert angle == pytest.approx(degrees, abs=3.0)
+
+
+def test_a_gyroscope_of_another_sign_is_no_jump(flights):
+    wrong = [replace(each, body_rate=each.body_rate * [1, 1, -1]) for each in flights]
+    [said] = audit(wrong, WINDOWS).contradictions
+    assert "opposite signs" in said
+
+
 def test_rotors_and_attitude_that_are_late_are_both_set_right(lively):
     given = with_rotors_late([with_attitude_late(signals) for signals in lively], 0.05, 0.05)
     found = audit(given, WINDOWS)
