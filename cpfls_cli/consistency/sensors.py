@@ -441,7 +441,10 @@ def _jumps(flights: Sequence[Signals], windows: Windows, scanned: DelayScan) -> 
     time = np.concatenate([motion.centres for _, motion in cut])
     steps = (scanned.seen - scanned.read) * windows.period / windows.weight.max()
     left, found = np.ones(len(steps), dtype=bool), list[Finding]()
-    while (size := np.where(left, np.abs(steps).max(axis=1), 0.0)).max() > _JUMP_RAD:
+    while left.mean() >= _BUT_FOR_JUMPS:
+        size = np.where(left, np.abs(steps).max(axis=1), 0.0)
+        if size.max() <= _JUMP_RAD:
+            break
         at = int(size.argmax())
         left &= (flight != flight[at]) | (np.abs(time - time[at]) > len(windows.weight) * windows.period)
         found.append(_jump(cut[flight[at]][0], float(time[at]), 0.5 * len(windows.weight) * windows.period))
