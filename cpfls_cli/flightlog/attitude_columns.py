@@ -152,16 +152,19 @@ def _changed(order: Sequence[int], sign: Sequence[float]) -> int:
     return sum(place != index or own < 0 for index, (place, own) in enumerate(zip(order, sign, strict=True)))
 
 
-def euler_readings(angles: Array, witnesses: Witnesses) -> Iterator[Attitude]:
-    """Go through roll, pitch and yaw, rad, with every sign, as named first, and with roll and pitch swapped."""
+def euler_readings(angles: Array, witnesses: Witnesses, named: bool = True) -> Iterator[Attitude]:
+    """Go through roll, pitch and yaw, rad, with every sign, as named first, and with roll and pitch swapped.
+
+    A matrix, whose columns have no names, may hold yaw, pitch and roll as well.
+    """
     from scipy.spatial.transform import Rotation
 
     # A pitch that is positive with the nose up, a heading like that of a compass, or both, are conventions.
     usual = ((1.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, -1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, 1.0))
     signs = (*usual, *(own for own in product((1.0, -1.0), repeat=3) if own not in usual))
-    for order, sign in product(((0, 1, 2), (1, 0, 2)), signs):
+    for order, sign in product(((0, 1, 2), (1, 0, 2), *([] if named else [(2, 1, 0)])), signs):
         rotation = Rotation.from_euler("ZYX", (np.asarray(sign) * angles[:, order])[:, ::-1])
-        price = (0 if sign == usual[0] else 1 if sign in usual else 2) + 2 * (order != (0, 1, 2))
+        price = (0 if sign == usual[0] else 1 if sign in usual else 2) + (0, 2, 1)[order[0]]
         yield witnesses.read(rotation, order, sign, price)
 
 
@@ -321,7 +324,8 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
     if named.unit not in (None, unit):
         seen.disagree(named, unit)
     for _ in range(2):
-        ways = euler_readings(named.scale * known_unit(unit).factor * values, witnesses)
+        angles = named.scale * known_unit(unit).factor * values
+        ways = euler_readings(angles, witnesses, named.group.kind != "numbers")
         as_named = next(ways)
         verdict = read_axes([as_named], witnesses)
         if not verdict.best.beats_all(witnesses):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -19,7 +20,6 @@ from cpfls_cli.flightlog.vocabulary import (
     KIN,
     MEANINGS,
     NOT_MEASURED,
-    PARROT,
     PX4,
     RATE_WORDS,
     WISHED,
@@ -70,11 +70,21 @@ class ColumnGroup:
     def words(self) -> tuple[str, ...]:
         """Words of the pattern in lower case, without numbers and without the unit at its end."""
         before, _, after = self.pattern.rpartition(self.ending) if self.ending else (self.pattern, "", "")
-        parts = re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+", f"{before} {after}".replace("*", " "))
-        words = " ".join(part.lower() for part in parts if not part.isdecimal())
-        for pattern, one in vocabulary.ONE_WORD.items():
-            words = re.sub(pattern, one, words)
-        return tuple(words.split())
+        return _words(f"{before} {after}")
+
+    @cached_property
+    def last_words(self) -> tuple[str, ...]:
+        """Words of the last part of a path that has any: a structure ``output`` may hold whatever was measured."""
+        parts = self.pattern.removesuffix(self.ending).split("/")
+        return next(filter(None, map(_words, reversed(parts))), ())
+
+
+def _words(text: str) -> tuple[str, ...]:
+    parts = re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+", text.replace("*", " "))
+    words = " ".join(part.lower() for part in parts if not part.isdecimal())
+    for pattern, one in vocabulary.ONE_WORD.items():
+        words = re.sub(pattern, one, words)
+    return tuple(words.split())
 
 
 @cache
@@ -162,11 +172,13 @@ _ABOUT_AXES = frozenset({"torque", "tau", "moment", "m", "i", "alpha", "acc", "a
 def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Named, ...]:
     """List what groups of columns may be by name, what a kind of log is known for first; without a system any."""
     known = [named for group in groups for named in _known_to_systems(group, system)]
-    kinds = {
-        own: {named.group.columns for named in known if named.known == own} for own in (PX4, *KIN, CRAZYFLIE, PARROT)
-    }
+    names = {column for group in groups for column in group.columns}
+    held = {(named.known, named.group.columns) for named in known}
+    # What is asked for counts too where a topic stands before it, as nobody else names it.
+    held |= {(own.system, own.columns) for own in vocabulary.KNOWN if "." in own.columns[0] and names >= {*own.columns}}
+    of_kind = Counter(kind for kind, _ in held)
     # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
-    found = [named for named in known if system or len(kinds[named.known]) > 1]
+    found = [named for named in known if system or of_kind[named.known] > 1]
     found += [named for group in groups for named in _by_words(group)]
     if lists_all(system):
         # Words would find parameters and allocations.
@@ -264,7 +276,7 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     if own & meaning.never:
         return False
     if signal in ROTORS:
-        asked = own & vocabulary.ASKED
+        asked = {*group.last_words} & vocabulary.ASKED
         # Three columns of the letter w, or in the unit of a rate, are the axes of a gyroscope.
         many = len(group.columns) > _AXES_OF_A_BODY
         fast = bool(own & vocabulary.FAST) or (many and (words == ("w",) or ends_in_speed))

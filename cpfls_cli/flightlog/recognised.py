@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 _TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?|millis|micros")
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_REFUSED = 3  # Columns of stamps that a message names.
+# Columns of stamps that a message names, and the share of falls below which one that is only called like them counts.
+_REFUSED, _SELDOM = 3, 0.1
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
 _SLOWEST_HZ = 0.5  # Below which a signal shows nothing of a flight.
@@ -150,7 +151,8 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
         changes = len(known) > max(2, 0.5 * len(values)) and np.ptp(known) > 0
         named = usual or "time" in lower or "stamp" in lower
         back = _steps_back(name, values)
-        if changes and usual and back:
+        seldom = usual or float(np.mean(np.diff(known) < 0)) < _SELDOM
+        if changes and named and back and seldom:
             refused += [f"{back}: keep the rows of one flight, and leave out rows whose stamps are wrong"]
         if changes and not back and (named or units.get(name) == "s"):
             ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2 if named else 3

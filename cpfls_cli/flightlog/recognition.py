@@ -88,7 +88,9 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         shares = rotor_shares(logged, shares=own is rotors.command)
     flown = find_flown(signs := _signs(log, candidates, shares, system)).within(ended, (0.0, float(signs.time[-1])))
     if not flown.flies:
-        held = f"holds {joined([name.replace('_', ' ') for name in candidates])} alone: "
+        unlike = {name: f"{found[0].group.pattern}, in numbers of no rotors," for name, found in candidates.items()}
+        names = [unlike[name] if name in ROTORS else name.replace("_", " ") for name in candidates]
+        held = f"holds {joined(names)} alone: "
         raise InputError(held * (signs.rotors is signs.height is signs.rate is None) + flown.reasons[0])
     carried = flown if kind is None else _hover_of(log, kind, flown)
     winged, flown = carried.span_s != flown.span_s, carried

@@ -327,6 +327,13 @@ _TEXTS: Final = (
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )
+# A line of four numbers or more.
+_NUMBERS: Final = re.compile(rb"([-+]?\d[\d.]*(e[-+]?\d+)?[ \t,;]+){3,}[-+\d.e]+\r?\n")
+_NAMELESS: Final = (
+    "a table of numbers without names",
+    "put a line above it that names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4, and let its name end"
+    " in .csv",
+)
 _SPREADSHEET, _NPY = (b"xl/", b"[Content_Types].xml"), b".npy"
 # A MAVLink frame begins with one of these; before it a telemetry log has its stamp in eight bytes, of 2001 to 2100.
 _TELEMETRY: Final = (".tlog", ".rlog", ".raw", ".mavlink")
@@ -346,6 +353,8 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
     if frame and frame in _MAVLINK:
         return "telemetry of MAVLink", _CONVERT_TLOG
     text = first.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    if suffix != ".csv" and _NUMBERS.match(text):
+        return _NAMELESS
     return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)
 
 

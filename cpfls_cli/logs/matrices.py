@@ -228,6 +228,8 @@ def _on_one_clock(
     """Lay what Simulink logs as structures with time on one clock; NaN where one has no sample."""
     half = 0.5 * float(np.median(np.diff(clock)))
     for name, (time, listed) in timed.items():
+        # Who saves them calls them rt_NAME or NAME_rt.
+        bus = f"rt_{name.removesuffix('_rt')}" if name.endswith("_rt") else name
         rows = np.minimum(np.searchsorted(clock, time - half), len(clock) - 1)
         near, named = np.abs(clock[rows] - time) < half, set[str]()
         for own in listed:
@@ -242,10 +244,8 @@ def _on_one_clock(
             label, block = str(own.get("label", "")).strip("<>[]"), str(own.get("blockName", "")).rpartition("/")[2]
             part = block if not label or label in named else label
             named.add(part)
-            if name in _BUSES and laid.ndim == 2:
-                yield from (
-                    (f"{name}/{part}", own, "") for part, own in zip(_BUSES[name].split(), laid.T, strict=False)
-                )
+            if bus in _BUSES and laid.ndim == 2:
+                yield from ((f"{bus}/{part}", own, "") for part, own in zip(_BUSES[bus].split(), laid.T, strict=False))
             else:
                 yield f"{name}/{part}" if len(listed) > 1 else name, laid, ""
 

@@ -26,6 +26,8 @@ def first(names, signal, system=""):
         ("angVelX angVelY angVelZ", "body_rate", "angVelX angVelY angVelZ"),
         ("px py pz", "position", "px py pz"),
         ("posX posY posZ", "position", "posX posY posZ"),
+        ("ax ay az gx gy gz", "body_rate", "gx gy gz"),
+        ("imuVAng[0] imuVAng[1] imuVAng[2]", "body_rate", "imuVAng[0] imuVAng[1] imuVAng[2]"),
         ("gyroADC[0] gyroADC[1] gyroADC[2]", "body_rate", "gyroADC[0] gyroADC[1] gyroADC[2]"),
         ("IMU.GyrX IMU.GyrY IMU.GyrZ", "body_rate", "IMU.GyrX IMU.GyrY IMU.GyrZ"),
         ("RATE.R RATE.P RATE.Y", "body_rate", "RATE.R RATE.P RATE.Y"),
@@ -53,6 +55,11 @@ def first(names, signal, system=""):
         ("om1 om2 om3 om4 omcmd1 omcmd2 omcmd3 omcmd4", "rotor_command", "omcmd1 omcmd2 omcmd3 omcmd4"),
         ("pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "rotor_command", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm"),
         ("u1 u2 u3 u4", "rotor_command", "u1 u2 u3 u4"),
+        (
+            "log/rotor/cmd1 log/rotor/cmd2 log/rotor/cmd3",
+            "rotor_command",
+            "log/rotor/cmd1 log/rotor/cmd2 log/rotor/cmd3",
+        ),
         # Named as keys of a config are, each with its unit.
         ("p_rad_s q_rad_s r_rad_s", "body_rate", "p_rad_s q_rad_s r_rad_s"),
         ("roll_rad pitch_rad yaw_rad p_rad_s q_rad_s r_rad_s", "attitude", "roll_rad pitch_rad yaw_rad"),
@@ -80,10 +87,20 @@ def test_columns_are_found_by_their_names(names, signal, columns):
         ("ATT.DesRoll ATT.DesPitch ATT.DesYaw", "attitude"),
         ("gyro_bias_x gyro_bias_y gyro_bias_z", "body_rate"),
         ("w0 w1 w2", "rotor_speed"),
+        # Of a structure only the last word says what drives rotors.
+        ("log/output/lean[0] log/output/lean[1] log/output/lean[2]", "rotor_command"),
+        ("acc_gx acc_gy acc_gz", "body_rate"),
     ],
 )
 def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
     assert first(names, signal) is None
+
+
+def test_what_a_kind_of_log_asks_for_counts_as_one_of_its_names():
+    """One measured name alone has many authors; two of a topic's own have one."""
+    rates, asked = (f"controller.{own}roll controller.{own}pitch controller.{own}yaw" for own in ("r_", "cmd_"))
+    assert first(rates, "body_rate") is None
+    assert first(f"{rates} {asked}", "body_rate").known == "Crazyflie"
 
 
 def test_a_kind_of_log_knows_its_columns_before_their_words_are_read():

@@ -104,6 +104,16 @@ def test_angles_of_either_unit_and_of_reversed_axes_are_put_right(own, sign, uni
     assert recognition.signal("attitude").columns.unit == unit
 
 
+def test_a_matrix_of_angles_may_hold_yaw_first(own):
+    """What is called yaw stays so."""
+    held = [f"log/lean/orient[{column}]" for column in range(3)]
+    log = flat_log(own, attitude=named(own.angles[:, ::-1], *held))
+    recognition = assert_the_flight_comes_back(log, own)
+    assert recognition.signal("attitude").columns.columns == tuple(held[::-1])
+    log = flat_log(own, attitude=named(own.angles[:, ::-1], "roll", "pitch", "yaw"))
+    assert seen(log).signal("attitude").columns.columns[2] == "yaw"
+
+
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
 @pytest.mark.parametrize("inverse", [False, True])
 def test_quaternions_of_either_order_and_direction_are_distinguished(own, order, inverse):
@@ -266,6 +276,8 @@ def test_lengths_in_millimetres_are_said_by_what_the_lean_does(own):
         (lambda speed: speed / 10, "1", 0.01, 0.0),
         (lambda speed: 1000 + speed, "1", 1e-3, -1.0),
         (lambda speed: 65.536 * speed, "1", 1 / 65536, 0.0),
+        (lambda speed: np.round(0.25 * speed), "1", 1 / 255, 0.0),
+        (lambda speed: 1 + speed / 1000, "1", 1.0, -1.0),
     ],
 )
 def test_the_range_of_a_command_shows_its_unit(own, values, unit, scale, offset):
@@ -387,6 +399,15 @@ def test_what_shows_no_flight_is_said_with_what_it_holds(own):
         seen(bare)
 
 
+def test_what_is_called_like_rotors_is_named_where_its_numbers_are_none(own):
+    log = flat_log(own, speed=named(own.speed - own.speed.mean(), "u1", "u2", "u3", "u4"))
+    bare = {name: values for name, values in log.topics[""].items() if name in ("t", "u1", "u2", "u3", "u4")}
+    with pytest.raises(
+        InputError, match=r"^holds u\*, in numbers of no rotors, alone: no rotors, no height and no rates"
+    ):
+        recognise({"": bare}, {}, {}, "")
+
+
 def test_a_height_that_no_config_takes_shows_what_flies():
     """Telemetry of a copter without rates and outputs waits, climbs to 20 m and lands."""
     time = 0.1 * np.arange(600)
@@ -406,6 +427,12 @@ def test_every_column_of_stamps_that_is_refused_is_said_with_what_else_helps(own
     stamps = {"t": np.arange(2000) % 1500 * 0.015, "time": np.arange(2000) // 60 * 1.0}
     with pytest.raises(InputError, match=r"^t falls once.*; time rises by 0.*write the config by hand"):
         seen(flat_log(own, t=stamps))
+
+
+def test_what_is_called_like_stamps_and_seldom_falls_is_said_where_there_is_no_clock(own):
+    flights = {"times of flight": np.arange(2000) % 700 * 0.015, "step time": np.tile([0.02, 0.01], 1000)}
+    with pytest.raises(InputError, match=r"^times of flight falls 2 times, first at row 701 of 2000[^;]*; rename"):
+        seen(flat_log(own, t=flights))
 
 
 def test_stamps_that_step_back_are_no_clock_where_another_one_never_does(own):

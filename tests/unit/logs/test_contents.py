@@ -513,6 +513,7 @@ def test_what_simulink_logs_with_time_is_on_one_clock(tmp_path):
     states = np.arange(480.0).reshape(40, 12)
     data = {
         "rt_estim": structure(time, states),
+        "estimatedStates_rt": structure(time, states),
         "rt_yout": {"time": time[35:, None], "signals": several},
         "rt_u": structure(time[::10], np.arange(4.0)[:, None]),
         "gain": 2.0,
@@ -523,7 +524,7 @@ def test_what_simulink_logs_with_time_is_on_one_clock(tmp_path):
     assert columns["time"].tolist() == time.tolist()
     assert contents.units == {"time": "s"}
     assert columns["rt_estim/gyro_x"].tolist() == states[:, 9].tolist()
-    assert columns["rt_estim/yaw"].tolist() == states[:, 3].tolist()
+    assert columns["rt_estim/yaw"].tolist() == columns["rt_estimatedStates/yaw"].tolist() == states[:, 3].tolist()
     nothing = [np.nan] * 35
     np.testing.assert_equal(columns["rt_yout/motors[1]"], [*nothing, *RATE[:, 1]])
     np.testing.assert_equal(columns["rt_yout/p"], [*nothing, *RATE[:, 0]])
@@ -745,6 +746,8 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ),
         ("a.yaml", b"time: 1.5\r\nroll: 0.1\r\n---\r\ntime: 1.6\r\n", "YAML, as `ros2 topic echo`", "ros2 bag record"),
         ("a.data", b"0.5 12 IMU_GYRO 0.1 0.2 0.3\n", "a log of Paparazzi", "write its numbers as CSV"),
+        ("a.txt", b"0.5 12 -0.1 1e-3 0.3\n0.6 12 0 0 0\n", "a table of numbers without names", "names each column"),
+        ("a.log", b"1,2,3,4\r\n", "a table of numbers without names", "let its name end in .csv"),
         ("a.bin", b"", "an empty file", "the copy failed"),
         ("a.log", b"", "an empty file", "the copy failed"),
         ("a.ulg", b"", "an empty file", "the copy failed"),
