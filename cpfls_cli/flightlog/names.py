@@ -276,12 +276,12 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     if own & meaning.never:
         return False
     if signal in ROTORS:
-        asked = {*group.last_words} & vocabulary.ASKED
+        asked, last = (bool(each & vocabulary.ASKED) for each in (own, {*group.last_words}))
         # Three columns of the letter w, or in the unit of a rate, are the axes of a gyroscope.
         many = len(group.columns) > _AXES_OF_A_BODY
         fast = bool(own & vocabulary.FAST) or (many and (words == ("w",) or ends_in_speed))
-        motors = words == ("m",) or bool({"motor", "motors"} & own)
-        return (fast and not asked) if signal == "rotor_speed" else bool(asked) or (motors and not fast)
+        motors = group.last_words == ("m",) or bool({"motor", "motors"} & own)
+        return fast and not asked if signal == "rotor_speed" else last or (asked if fast else motors)
     if signal == "position" and group.kind != "numbers":
         return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None
     if group.kind == "angles" and signal in ("attitude", "body_rate"):

@@ -151,8 +151,7 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
         changes = len(known) > max(2, 0.5 * len(values)) and np.ptp(known) > 0
         named = usual or "time" in lower or "stamp" in lower
         back = _steps_back(name, values)
-        seldom = usual or float(np.mean(np.diff(known) < 0)) < _SELDOM
-        if changes and named and back and seldom:
+        if changes and back and (usual or (named and float(np.mean(np.diff(known) < 0)) < _SELDOM)):
             refused += [f"{back}: keep the rows of one flight, and leave out rows whose stamps are wrong"]
         if changes and not back and (named or units.get(name) == "s"):
             ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2 if named else 3

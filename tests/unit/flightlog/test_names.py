@@ -55,11 +55,8 @@ def first(names, signal, system=""):
         ("om1 om2 om3 om4 omcmd1 omcmd2 omcmd3 omcmd4", "rotor_command", "omcmd1 omcmd2 omcmd3 omcmd4"),
         ("pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "rotor_command", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm"),
         ("u1 u2 u3 u4", "rotor_command", "u1 u2 u3 u4"),
-        (
-            "log/rotor/cmd1 log/rotor/cmd2 log/rotor/cmd3",
-            "rotor_command",
-            "log/rotor/cmd1 log/rotor/cmd2 log/rotor/cmd3",
-        ),
+        ("own/r/cmd1 own/r/cmd2 own/r/cmd3", "rotor_command", "own/r/cmd1 own/r/cmd2 own/r/cmd3"),
+        ("rpm_cmd/n[0] rpm_cmd/n[1] rpm_cmd/n[2]", "rotor_command", "rpm_cmd/n[0] rpm_cmd/n[1] rpm_cmd/n[2]"),
         # Named as keys of a config are, each with its unit.
         ("p_rad_s q_rad_s r_rad_s", "body_rate", "p_rad_s q_rad_s r_rad_s"),
         ("roll_rad pitch_rad yaw_rad p_rad_s q_rad_s r_rad_s", "attitude", "roll_rad pitch_rad yaw_rad"),
@@ -89,6 +86,7 @@ def test_columns_are_found_by_their_names(names, signal, columns):
         ("w0 w1 w2", "rotor_speed"),
         # Of a structure only the last word says what drives rotors.
         ("log/output/lean[0] log/output/lean[1] log/output/lean[2]", "rotor_command"),
+        ("rpm_cmd/n[0] rpm_cmd/n[1] rpm_cmd/n[2]", "rotor_speed"),
         ("acc_gx acc_gy acc_gz", "body_rate"),
     ],
 )
