@@ -21,7 +21,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import most_held
 from cpfls_cli.logs.blackbox import of_export
-from cpfls_cli.logs.formats import MOST_LISTED, LogContents
+from cpfls_cli.logs.formats import MOST_LISTED, NAME_COLUMNS, LogContents
 from cpfls_cli.words import some
 
 # Characters of a line, which may hold thousands of columns; compressed, a longer one may fill the memory.
@@ -143,10 +143,7 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     numbered = len(set(numbers)) == len(numbers) < len(names) and all(map(str.isdecimal, numbers))
     if 2 * len(numbers) > len(names) and not numbered:
         many = f"{len(numbers)} number{'s' * (len(numbers) > 1)}"
-        raise InputError(
-            f"{path}: has no line of column names, line {line} holds {many}: put a line above it that names each"
-            " column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
-        )
+        raise InputError(f"{path}: has no line of column names, line {line} holds {many}: {NAME_COLUMNS}")
     begun, quotes = [], 0
     for text in lines:
         begun.append(text)

@@ -103,6 +103,7 @@ _OLDER_USD = re.compile(rb"[\x01-\xff][A-Za-z]\w*(\.\w+)*\([BbHhIifd]\),")
 _READERS: Final = "cpfls_cli.logs."
 _PYARROW: Final = (("pyarrow", "pyarrow.parquet"), "parquet")
 _ROSBAGS: Final = (("rosbags",), "rosbag")
+NAME_COLUMNS: Final = "put a line above it that names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4"
 TABLE_ENDS: Final = "a table with a line of column names has to end in .csv"
 LOG_FORMATS = (
     LogFormat(".csv", "CSV", "CSV", b"", f"{_READERS}csv_log"),
@@ -329,11 +330,6 @@ _TEXTS: Final = (
 )
 # A line of four numbers or more.
 _NUMBERS: Final = re.compile(rb"([-+]?\d[\d.]*(e[-+]?\d+)?[ \t,;]+){3,}[-+\d.e]+\r?\n")
-_NAMELESS: Final = (
-    "a table of numbers without names",
-    "put a line above it that names each column, such as time,roll,pitch,yaw,p,q,r,m1,m2,m3,m4, and let its name end"
-    " in .csv",
-)
 _SPREADSHEET, _NPY = (b"xl/", b"[Content_Types].xml"), b".npy"
 # A MAVLink frame begins with one of these; before it a telemetry log has its stamp in eight bytes, of 2001 to 2100.
 _TELEMETRY: Final = (".tlog", ".rlog", ".raw", ".mavlink")
@@ -354,7 +350,7 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
         return "telemetry of MAVLink", _CONVERT_TLOG
     text = first.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
     if suffix != ".csv" and _NUMBERS.match(text):
-        return _NAMELESS
+        return "a table of numbers without names", f"{NAME_COLUMNS}, and let its name end in .csv"
     return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)
 
 
