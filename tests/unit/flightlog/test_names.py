@@ -27,6 +27,7 @@ def first(names, signal, system=""):
         ("px py pz", "position", "px py pz"),
         ("posX posY posZ", "position", "posX posY posZ"),
         ("ax ay az gx gy gz", "body_rate", "gx gy gz"),
+        ("gx gy gz gyro_x gyro_y gyro_z", "body_rate", "gyro_x gyro_y gyro_z"),
         ("imuVAng[0] imuVAng[1] imuVAng[2]", "body_rate", "imuVAng[0] imuVAng[1] imuVAng[2]"),
         ("gyroADC[0] gyroADC[1] gyroADC[2]", "body_rate", "gyroADC[0] gyroADC[1] gyroADC[2]"),
         ("IMU.GyrX IMU.GyrY IMU.GyrZ", "body_rate", "IMU.GyrX IMU.GyrY IMU.GyrZ"),
