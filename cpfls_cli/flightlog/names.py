@@ -16,6 +16,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.flightlog import agreement, vocabulary
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, UNITS_OF_SIGNAL, SignalName
 from cpfls_cli.flightlog.vocabulary import (
+    AIMED,
+    ASKED,
     CRAZYFLIE,
     KIN,
     MEANINGS,
@@ -276,11 +278,11 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     if own & meaning.never:
         return False
     if signal in ROTORS:
-        asked, last = (bool(each & vocabulary.ASKED) for each in (own, {*group.last_words}))
+        asked, last = bool(own & (ASKED | AIMED)), bool({*group.last_words} & ASKED)
         # Three columns of the letter w, or in the unit of a rate, are the axes of a gyroscope.
         many = len(group.columns) > _AXES_OF_A_BODY
-        fast = bool(own & vocabulary.FAST) or (many and (words == ("w",) or ends_in_speed))
-        motors = group.last_words == ("m",) or bool({"motor", "motors"} & own)
+        fast = bool(own & vocabulary.FAST) or (many and (own - AIMED == {"w"} or ends_in_speed))
+        motors = {*group.last_words} - AIMED == {"m"} or bool({"motor", "motors"} & own)
         return fast and not asked if signal == "rotor_speed" else last or (asked if fast else motors)
     if signal == "position" and group.kind != "numbers":
         return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None

@@ -28,7 +28,7 @@ from cpfls_cli.flightlog.stated_vehicle import (
     whole,
 )
 from cpfls_cli.flightlog.topics import logged_hz
-from cpfls_cli.flightlog.vocabulary import ARDUPILOT, ASKED, BETAFLIGHT, CRAZYFLIE, PARROT, PX4, RANGES
+from cpfls_cli.flightlog.vocabulary import AIMED, ARDUPILOT, ASKED, BETAFLIGHT, CRAZYFLIE, PARROT, PX4, RANGES
 from cpfls_cli.units import SPEED_UNITS, UnitName
 from cpfls_cli.words import joined
 
@@ -45,7 +45,6 @@ _CRAZYFLIE_MIXER = ((1.0, -0.5, 0.5, 1.0), (1.0, -0.5, -0.5, -1.0), (1.0, 0.5, -
 _MEAN_S, _IDLE, _LEAST_SPREAD = 0.5, 0.05, 0.02
 # Powers that are between those of a thrust and of a speed, or near them, and what divides these; least correlation.
 _POWERS, _BETWEEN, _CORRELATED = (0.35, 1.4), float(np.sqrt(0.5)), 0.9
-_ORTHOGONAL = 1e-2  # Median by which products of the rows of a rotation matrix are off those of the unit matrix.
 _SAME = 0.02  # Part of the largest one's spread below which an output is not connected to a motor.
 # Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller.
 _SELDOM = 0.1
@@ -214,19 +213,9 @@ class _Connected(NamedTuple):
     doubtful: tuple[str, ...] = ()  # Outputs of `others` that may be motors all the same.
 
 
-def _is_rotation(values: Array) -> bool:
-    """Tell the nine numbers of a rotation matrix, whose rows have length 1 at right angles, by row or by column."""
-    if values.shape[1] != np.size(np.eye(3)):
-        return False
-    matrices = values.reshape(-1, 3, 3)
-    return bool(np.median(np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3))) < _ORTHOGONAL)
-
-
 def _connected(found: Found, parameters: Parameters) -> _Connected:
     """Find the motors among outputs: by their functions, by the frame's number, or because they move together."""
     named, time, values = found
-    if _is_rotation(values):
-        return _Connected([], False, {})
     spread = values.std(axis=0)
     moving = [index for index, own in enumerate(spread) if own > _SAME * float(spread.max()) > 0]
 
@@ -420,7 +409,7 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     own = next((own for own in RANGES if low >= own.low and own.high_from < high <= own.high), None)
     if own is None:
         return None
-    clear = own.clear == "always" or (own.clear == "of commands" and bool(words & ASKED))
+    clear = own.clear == "always" or (own.clear == "of commands" and bool(words & (ASKED | AIMED)))
     others = [Rival(*own.rival)] if own.rival else []
     if not (clear or named.unit == "us" or "pwm" in words):
         others += [Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm")]

@@ -56,6 +56,8 @@ def first(names, signal, system=""):
         ("om1 om2 om3 om4 omcmd1 omcmd2 omcmd3 omcmd4", "rotor_command", "omcmd1 omcmd2 omcmd3 omcmd4"),
         ("pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "rotor_command", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm"),
         ("u1 u2 u3 u4", "rotor_command", "u1 u2 u3 u4"),
+        ("w_des1 w_des2 w_des3 w_des4", "rotor_command", "w_des1 w_des2 w_des3 w_des4"),
+        ("m1_ref m2_ref m3_ref m4_ref", "rotor_command", "m1_ref m2_ref m3_ref m4_ref"),
         ("own/r/cmd1 own/r/cmd2 own/r/cmd3", "rotor_command", "own/r/cmd1 own/r/cmd2 own/r/cmd3"),
         ("rpm_cmd/n[0] rpm_cmd/n[1] rpm_cmd/n[2]", "rotor_command", "rpm_cmd/n[0] rpm_cmd/n[1] rpm_cmd/n[2]"),
         # Named as keys of a config are, each with its unit.
@@ -89,6 +91,7 @@ def test_columns_are_found_by_their_names(names, signal, columns):
         ("log/output/lean[0] log/output/lean[1] log/output/lean[2]", "rotor_command"),
         ("rpm_cmd/n[0] rpm_cmd/n[1] rpm_cmd/n[2]", "rotor_speed"),
         ("acc_gx acc_gy acc_gz", "body_rate"),
+        ("d1 d2 d3 d4", "rotor_command"),
     ],
 )
 def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
