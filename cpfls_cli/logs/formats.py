@@ -328,8 +328,8 @@ _TEXTS: Final = (
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )
-# A line of four numbers or more.
-_NUMBERS: Final = re.compile(rb"([-+]?\d[\d.]*(e[-+]?\d+)?[ \t,;]+){3,}[-+\d.e]+\r?\n")
+# A line of three numbers or more, or its beginning.
+_NUMBERS: Final = re.compile(rb"([-+]?\d[\d.]*(e[-+]?\d+)?[ \t,;]+){3,}[-+\d.e \t,;]*(\r?\n|\Z)")
 _SPREADSHEET, _NPY = (b"xl/", b"[Content_Types].xml"), b".npy"
 # A MAVLink frame begins with one of these; before it a telemetry log has its stamp in eight bytes, of 2001 to 2100.
 _TELEMETRY: Final = (".tlog", ".rlog", ".raw", ".mavlink")
