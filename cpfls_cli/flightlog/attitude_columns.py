@@ -153,10 +153,7 @@ def _changed(order: Sequence[int], sign: Sequence[float]) -> int:
 
 
 def euler_readings(angles: Array, witnesses: Witnesses, named: bool = True) -> Iterator[Attitude]:
-    """Go through roll, pitch and yaw, rad, with every sign, as named first, and with roll and pitch swapped.
-
-    A matrix, whose columns have no names, may hold yaw, pitch and roll as well.
-    """
+    """Go through angles, rad, with every sign: as named first, roll and pitch swapped, and of a matrix yaw first."""
     from scipy.spatial.transform import Rotation
 
     # A pitch that is positive with the nose up, a heading like that of a compass, or both, are conventions.

@@ -221,7 +221,8 @@ def _take_place(
     if relative is not None and stated is None and place is not None:
         # What it is in follows from the position, whatever else is logged in other units.
         size = known_unit(place.columns.unit).factor / relative.gain
-        unit, scale = min(((units[0], 1.0), (units[0], 0.01), (units[1], 1.0)), key=lambda own: _far(size, own))
+        ways: tuple[tuple[UnitName, float], ...] = ((units[0], 1.0), (units[0], 0.01), (units[1], 1.0))
+        unit, scale = min(ways, key=lambda own: abs(np.log(size / (known_unit(own[0]).factor * own[1]))))
         sure = place.sure
     elif tilt is not None and stated is None:
         unit = units[gain > 100]
@@ -256,11 +257,6 @@ def _take_place(
         reason += "; rotated into the axes of the attitude, as the tilt requires"
     seen.take(named, unit, reason, sure, scale, order, sign, rivals)
     seen.warn_of_mirrored(named, order, sign, "the rest of the log")
-
-
-def _far(size: float, way: tuple[UnitName, float]) -> float:
-    """Give how far the size of a unit is from that of a unit with its scale, as a logarithm."""
-    return float(abs(np.log(size / (known_unit(way[0]).factor * way[1]))))
 
 
 # The accelerometer.

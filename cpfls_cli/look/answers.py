@@ -31,6 +31,7 @@ _SWAP = (
 _TRIED = 2
 """Flights that are proposed at most."""
 _PUNCH = "climb twice at nearly full throttle, for 2 s each"
+_NO_NEWTONS = "a log holds commands, not newtons: mass and arm are needed"
 _WHOLE_SPECTRUM_HZ = 900.0
 """Rate of a gyroscope whose log shows what rotors of usual sizes vibrate with."""
 _SOME_SPECTRUM_HZ = 150.0
@@ -141,7 +142,7 @@ def answers_of(found: Found) -> tuple[Answer, ...]:
         "vibration": _spectra,
         "thrust curve": _curve,
         "gusts": _gusts,
-        "inertia, drag, what a model misses": _constants,
+        "inertia, drag, what a model misses": lambda _: ("no", _NO_NEWTONS, "", ""),
     }
     rows = {question: answer(found) for question, answer in asked.items()}
     settings = found.settings
@@ -287,11 +288,6 @@ def _gusts(found: Found) -> tuple[str, str, str, str]:
     if known:
         return "roughly", joined(known), "", ""
     return "no", "what a command does is not identified" if not found.identified else "too little flight", "", ""
-
-
-def _constants(_: Found) -> tuple[str, str, str, str]:
-    """Give the answer where constants are needed, which no log holds."""
-    return "no", "a log holds commands, not newtons: mass and arm are needed", "", ""
 
 
 def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:

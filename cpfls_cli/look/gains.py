@@ -221,7 +221,11 @@ class _Work:
         self.attitude = flown.mean(axis=0) > _MOSTLY if len(flown) else np.zeros(len(AXES), dtype=bool)
         self.autopilot = _of_rates(self.autopilot, [AXES[axis] for axis in np.flatnonzero(~self.attitude)])
         # Without steps and ranges the best values are those of the plants.
-        self.open = replace(self.autopilot, parameters=tuple(_opened(each) for each in self.autopilot.parameters))
+        free = (
+            replace(each, low=0.0, high=np.inf, step=_FINE * max(each.default, each.step))
+            for each in self.autopilot.parameters
+        )
+        self.open = replace(self.autopilot, parameters=tuple(free))
         self.values = {each.name: self.values[each.name] for each in self.autopilot.parameters}
         self.law = self.open.law(self.values)
         self.names = self.autopilot.firmware.names(self.flight.system)
@@ -488,10 +492,6 @@ def _of_rates(autopilot: Autopilot, axes: Sequence[str]) -> Autopilot:
     closed = {f"{axis}.angle": _NO_ANGLE for axis in axes}
     kept = tuple(each for each in autopilot.parameters if each.role not in dropped)
     return replace(autopilot, parameters=kept, fixed={**autopilot.fixed, **closed})
-
-
-def _opened(parameter: Parameter) -> Parameter:
-    return replace(parameter, low=0.0, high=np.inf, step=_FINE * max(parameter.default, parameter.step))
 
 
 def _with(values: Mapping[str, float], found: Tuned) -> dict[str, float]:
