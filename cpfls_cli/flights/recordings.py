@@ -272,7 +272,12 @@ def _longest_stretch(flight: ReadFlight, study: Study) -> tuple[Signals, tuple[s
     signals, notes = signals_of(flight, known, study)
     if signals.rotor_speed is not None:
         require_rotors(study)
-    hz = flight.updated_hz.get("rotor_speed" if "rotor_speed" in known else "rotor_command", 1 / signals.period)
+    actuation = "rotor_speed" if "rotor_speed" in known else "rotor_command"
+    hz = flight.updated_hz.get(actuation, 1 / signals.period)
+    if signals.rotor_speed is not None and hz < FAST_HZ and actuation in flight.updated_hz:
+        # No controller is so slow: what rows repeat was sampled, and is no command that was held.
+        speed = between_updates(signals.rotor_speed) if actuation in flight.repeated else signals.rotor_speed
+        signals = replace(signals, rotor_speed=speed, rotor_span_s=1 / hz)
     slow = ""
     if signals.rotor_speed is not None and hz < SLOW_HZ:
         slow = (
