@@ -40,6 +40,7 @@ class Signals:
     # twice where rows lie on straight lines between them.
     attitude_spans: tuple[float, ...] = ()
     body_rate_spans: tuple[float, ...] = ()
+    rotor_span_s: float = 0.0  # Between updates of rotors that are logged slower: rows lie on straight lines between.
     attitude: Array | None = None  # Shape (time, 3), rad: roll, pitch, yaw.
     velocity: Array | None = None  # Shape (time, 3), m/s, world frame: relative to the ground.
     position: Array | None = None  # Shape (time, 3), m, world frame.
@@ -300,6 +301,22 @@ def stretch_of(signals: Signals, part: slice) -> Signals:
     return replace(signals, **cut, setpoints={name: value[part] for name, value in signals.setpoints.items()})
 
 
+def as_slow_as_rotors(signals: Signals) -> Signals:
+    """Average motion as straight lines between rare updates average rotors, so that both show alike what is slow."""
+    if not signals.rotor_span_s:
+        return signals
+    from scipy.ndimage import convolve1d
+
+    wide = signals.rotor_span_s / signals.period
+    weight = np.maximum(0.0, 1.0 - np.abs(np.arange(-int(wide), int(wide) + 1)) / wide)
+    names = ("body_rate", "attitude", "velocity", "position", "acceleration", "specific_force")
+    known = {name: values for name in names if (values := getattr(signals, name)) is not None}
+    changed: dict[str, Any] = {
+        name: convolve1d(values, weight / weight.sum(), axis=0, mode="nearest") for name, values in known.items()
+    }
+    return replace(signals, **changed)
+
+
 def fused(values: Array, rate: Array | None, period: float) -> Array:
     """Take the noise out of a signal by its measured derivative, each weighed by its own noise.
 
@@ -352,6 +369,9 @@ class RecordedFlight:
         "over which rows average an attitude that is logged slower, one after another", "span", unit="s", default=()
     )
     body_rate_spans: tuple[float, ...] = about("the same of body rates", "rate span", unit="s", default=())
+    rotor_span_s: float = about(
+        "time between updates of rotors that are logged slower, 0 of others", unit="s", default=0.0
+    )
     time: Array = about("time on the clock of the flight", "sample", unit="s")
     body_rate: Array = about("body rates p, q, r, as logged", "sample", "axis", unit="rad/s", frame=BODY)
     attitude: Array | None = about(

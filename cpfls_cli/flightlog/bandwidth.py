@@ -18,6 +18,7 @@ _REGULAR_SHARE = 0.8
 _LARGEST_SHARE_AT_ONCE = 0.2  # Of updates that come from row to row: jitter, not a rate.
 # A knot between two rows bends the line at both of them.
 _ROWS_OF_KNOT = 2
+_ROUNDING = 1e-6  # Of the largest step between updates.
 _STRAIGHT = 1e-3  # Bend of what is interpolated, by the rounding of a file, as a share of the largest.
 # Measured: logs of five vehicles fall by 29 dB below their trend at most, those that were filtered forward and backward
 # by 38 to 85 dB.
@@ -102,7 +103,9 @@ def between_updates(values: Array) -> Array:
     What is repeated comes late by half the time between updates, and its steps fold into slow motion where a window
     moves on by about that time. An update that was put on another clock may take two rows, of which the second has it.
     """
-    updates = np.flatnonzero(np.append(True, (np.diff(values, axis=0) != 0).any(axis=1)))
+    steps = np.abs(np.diff(values, axis=0))
+    # On another clock that is off by rounding the second row changes by rounding.
+    updates = np.flatnonzero(np.append(True, (steps > _ROUNDING * steps.max(axis=0)).any(axis=1)))
     at_once = np.diff(updates) == 1
     updates = updates[~np.append(at_once, False) | np.append(False, at_once)]
     if len(updates) < _FEWEST_UPDATES:

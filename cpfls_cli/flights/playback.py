@@ -14,7 +14,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import check
 from cpfls_cli.consistency.findings import contradictions, doubts
 from cpfls_cli.consistency.rotors import beyond_belief
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import Signals, as_slow_as_rotors
 from cpfls_cli.errors import CpflsError, InputError
 from cpfls_cli.flightlog.repair import common_rate, same_rate
 from cpfls_cli.flightlog.results import Imported
@@ -126,7 +126,10 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
         *doubts_on_voltage(flight.signals, flight.units),
         *doubts(findings),
     ]
-    usual: Hold = "linear" if actuation == "rotor_speed" else "previous"
+    # What rotors that are logged rarely do is known averaged alone, and so is the motion that it is compared with.
+    slow = parts[0].rotor_span_s > 0
+    parts = tuple(as_slow_as_rotors(part) for part in parts)
+    usual: Hold = "linear" if actuation == "rotor_speed" or slow else "previous"
     words = {
         "rotor_speed": "measured rotor speeds",
         "rotor_command": "rotor commands",

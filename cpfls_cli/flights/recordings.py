@@ -272,7 +272,7 @@ def _longest_stretch(flight: ReadFlight, study: Study) -> tuple[Signals, tuple[s
     signals, notes = signals_of(flight, known, study)
     if signals.rotor_speed is not None:
         require_rotors(study)
-    hz = flight.updated_hz.get("rotor_speed" if "rotor_speed" in known else "rotor_command", 1 / signals.period)
+    hz = 1 / (signals.rotor_span_s or signals.period)
     slow = ""
     if signals.rotor_speed is not None and hz < SLOW_HZ:
         slow = (
@@ -298,7 +298,17 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
     """
     signals, notes = _of_motion(flight, known, study)
     actuated, of_rotors = _actuated(signals, flight, known, study)
-    return actuated, (*notes, *of_rotors)
+    return _between_updates(actuated, flight), (*notes, *of_rotors)
+
+
+def _between_updates(signals: Signals, flight: ReadFlight) -> Signals:
+    """Put rotors that were logged rarely on straight lines: no controller holds a command for so long."""
+    name = "rotor_command" if signals.commanded else "rotor_speed"
+    hz = flight.updated_hz.get(name, FAST_HZ)
+    if signals.rotor_speed is None or hz >= FAST_HZ:
+        return signals
+    speed = between_updates(signals.rotor_speed) if name in flight.repeated else signals.rotor_speed
+    return replace(signals, rotor_speed=speed, rotor_span_s=1 / hz)
 
 
 def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> tuple[Signals, tuple[str, ...]]:

@@ -146,15 +146,14 @@ def common_windows(flights: Sequence[Signals], settings: WindowSettings) -> Wind
                 "import.rate_hz to one rate for all flights"
             )
     shortest = min(flights, key=len)
-    if settings.window_s > len(shortest) * period:
-        raise InputError(
-            f"gap.window_s = {settings.window_s:g}: longer than {shortest.name}, {len(shortest) * period:.3g} s"
-        )
-    shared = windows(period, settings.window_s, settings.overlap)
+    window_s = max(settings.window_s, FEWEST_SAMPLES * max(flight.rotor_span_s for flight in flights))
+    if window_s > len(shortest) * period:
+        raise InputError(f"gap.window_s = {window_s:g}: longer than {shortest.name}, {len(shortest) * period:.3g} s")
+    shared = windows(period, window_s, settings.overlap)
     for flight in flights:
         if shared.count(len(flight)) < FEWEST_WINDOWS:
             raise InputError(
                 f"{flight.name}: {len(flight) * period:.3g} s are too short; "
-                f"{FEWEST_WINDOWS} windows of gap.window_s = {settings.window_s:g} s are needed"
+                f"{FEWEST_WINDOWS} windows of gap.window_s = {window_s:g} s are needed"
             )
     return shared

@@ -52,7 +52,8 @@ def channel_cut_offs(signals: Signals, euler: bool) -> Array:
     `euler`: whether the inertial torque takes the attitude.
     Result: shape (6,), Hz; infinite where nothing was filtered.
     """
-    found = known_up_to(signals)
+    span = signals.rotor_span_s
+    found = known_up_to(signals) | ({"rotor_speed": 0.5 / span} if span else {})
     force = next(
         (name for name in ("specific_force", "acceleration", "velocity") if getattr(signals, name) is not None), ""
     )

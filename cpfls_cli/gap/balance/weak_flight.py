@@ -17,7 +17,7 @@ from cpfls_cli.dynamics import InertiaModel, momentum_form
 from cpfls_cli.effects.catalogue.parameter_error import shown, with_thrust
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import Signals, as_slow_as_rotors
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
 from cpfls_cli.gap.settings import GapSettings
@@ -177,15 +177,16 @@ def weak_flight(
     with_force = force and signals.has_force
 
     def make() -> WeakFlight:
-        nothing = np.zeros((len(signals), 3))
-        sides = rotation_balance(signals, model), translation_balance(signals) if with_force else Columns(nothing)
+        own = as_slow_as_rotors(signals)
+        nothing = np.zeros((len(own), 3))
+        sides = rotation_balance(own, model), translation_balance(own) if with_force else Columns(nothing)
         momenta = [nothing if side.momentum is None else side.momentum for side in sides]
         inertial = Columns(np.concatenate([side.direct for side in sides], axis=1), np.concatenate(momenta, axis=1))
         known = np.array([signals.torque is not None and axis in axes for axis in "xyz"] + [with_force] * 3)
         everything = np.ones(len(nuisance().effect.coefficients))
         cut_off = channel_cut_offs(signals, model is not None)
-        flight = WeakFlight(signals, windows, inertial, known, everything, cut_off)
-        noise = noise_floor(flight.residual(signals), windows, cut_off) if floor is None else floor
+        flight = WeakFlight(own, windows, inertial, known, everything, cut_off)
+        noise = noise_floor(flight.residual(own), windows, cut_off) if floor is None else floor
         # Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to lose the noise
         # of the gyroscope, which is not what anybody asked.
         turning = flight.averaged(inertial)[:, :3].std(axis=0) > TURNING * noise[:3]
