@@ -287,7 +287,9 @@ def find_constants(
     found = search.chosen(np.ones(len(balances.bands), dtype=bool), held)
     if len(found.sums.ztx) < ENOUGH_BLOCKS:
         return None
-    for slowest in range(len(balances.bands_hz) - 1, 0, -1):
+    # Rotors that are logged rarely show slow motion, and nothing that could stand for it.
+    slow = past and any(flight.rotor_span_s for flight in flights)
+    for slowest in range(0 if slow else len(balances.bands_hz) - 1, 0, -1):
         faster = found.bands.copy()
         faster[slowest] = False
         fast = search.chosen(faster, held)
