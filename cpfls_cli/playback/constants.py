@@ -260,13 +260,16 @@ def find_constants(
     -------
     Constants or None
         None where nothing shows how the flights were moved apart from gusts, for too short a time or too slow a log,
-        and where the inertia is not to be sought.
+        where the inertia is not to be sought, and by the past where rotors are logged rarely.
 
     References
     ----------
     Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats);
     Holtz-Eakin, Newey and Rosen 1988 (quasi-differences, with the past as instrument).
     """
+    if past and any(flight.rotor_span_s for flight in flights):
+        # What is faster than their updates folds into what is slower, and the past predicts that, too.
+        return None
     balances = (PastBalances if past else Balances)(given.flown, given)
     periods = {flight.motion.period for flight in balances.flights}
     if len(periods) > 1 or len(fitting_bands(max(periods))) < len(BANDS) - 1:
@@ -287,9 +290,7 @@ def find_constants(
     found = search.chosen(np.ones(len(balances.bands), dtype=bool), held)
     if len(found.sums.ztx) < ENOUGH_BLOCKS:
         return None
-    # Rotors that are logged rarely show slow motion, and nothing that could stand for it.
-    slow = past and any(flight.rotor_span_s for flight in flights)
-    for slowest in range(0 if slow else len(balances.bands_hz) - 1, 0, -1):
+    for slowest in range(len(balances.bands_hz) - 1, 0, -1):
         faster = found.bands.copy()
         faster[slowest] = False
         fast = search.chosen(faster, held)

@@ -371,9 +371,7 @@ def _what_can_come(
         return settings, ()
     said = said_by("vehicle", logged_hz, "too-slow")[0]
     logging.getLogger("cpfls_cli").warning(said)
-    # Without a lag the moments of inertia would take its place.
-    left = tuple(block for block in blocks_of(run.study.vehicle) if block not in ("lag", "delay"))
-    return replace(settings, leave_out=left, history_s=0.0), (said,)
+    return replace(settings, leave_out=blocks_of(run.study.vehicle), history_s=0.0), (said,)
 
 
 def _require_rotors(flight: LoggedFlight) -> None:
