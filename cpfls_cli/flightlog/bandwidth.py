@@ -11,8 +11,8 @@ from cpfls_cli.flightlog.settings import COMMANDS, ImportSettings
 
 # A coarse voltage hardly changes, and nothing is derived from it.
 _NOT_JUDGED = frozenset({"voltage"})
-# A rigid body hardly answers what is faster than half of this.
-_FAST_HZ = 100.0
+FAST_HZ = 100.0
+"""A rigid body hardly answers what is faster than half of this, and no controller holds a command for longer."""
 _FEWEST_UPDATES = 20  # Below which a regular step may be chance.
 _REGULAR_SHARE = 0.8
 _LARGEST_SHARE_AT_ONCE = 0.2  # Of updates that come from row to row: jitter, not a rate.
@@ -64,7 +64,8 @@ def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = No
         if name in found and 0 < 2 * own <= rate:
             seen = found[name]
             if seen is None or seen.rate_hz > _REGULAR_SHARE * own:
-                found[name] = SlowSignal(name, own, "repeated" if name in COMMANDS else "interpolated")
+                held = name in COMMANDS and own >= FAST_HZ
+                found[name] = SlowSignal(name, own, "repeated" if held else "interpolated")
     return tuple(signal for signal in found.values() if signal is not None)
 
 
@@ -115,7 +116,7 @@ def between_updates(values: Array) -> Array:
 
 def warn_of_slow(slow: tuple[SlowSignal, ...], rate_hz: float) -> Iterator[str]:
     """Say of signals that are slower than the clock, and slower than 100 Hz, how slow they are and what that costs."""
-    for signal in (own for own in slow if own.rate_hz < _FAST_HZ):
+    for signal in (own for own in slow if own.rate_hz < FAST_HZ):
         between, cost = "lie on a straight line between two updates", "knows"
         if signal.between == "repeated":
             between, cost = "repeat the last value", f"is {500 / signal.rate_hz:.3g} ms late on average, and knows"

@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.bandwidth import FAST_HZ
 from cpfls_cli.flightlog.conversion import columns_in_words, present_choices
 from cpfls_cli.flightlog.repair import align_quaternion_signs, increasing_rows, unwrap_angles
 from cpfls_cli.flightlog.settings import COMMANDS, SETPOINTS, ImportSettings, SignalMap
@@ -130,7 +131,7 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
                 if _step(clocks[topic]) > settings.gap_s:
                     slow = _slowness(topic, clocks[topic], settings.gap_s)
                     raise InputError(f"{slow}: raise import.gap_s, or leave its signals out of import.signals")
-                hold = name in COMMANDS
+                hold = name in COMMANDS and _step(clocks[topic]) * FAST_HZ <= _ROUNDING
                 columns[column] = interpolate(clocks[topic], values, target, settings.gap_s, hold=hold)
     step, steps = _step(clocks[base]), {topic: _step(clocks[topic]) for topic in sorted(used)}
     warnings += [

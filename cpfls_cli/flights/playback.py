@@ -127,8 +127,10 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
         *doubts(findings),
     ]
     # What rotors that are logged rarely do is known averaged alone, and so is the motion that it is compared with.
-    slow = parts[0].rotor_span_s > 0
+    slow = parts[0].rotor_span_s
     parts = tuple(as_slow_as_rotors(part) for part in parts)
+    if slow:
+        warnings.append(f"motion is averaged as rotors are that are known every {slow:.2g} s; errors are those of it")
     usual: Hold = "linear" if actuation == "rotor_speed" or slow else "previous"
     words = {
         "rotor_speed": "measured rotor speeds",

@@ -21,6 +21,7 @@ from cpfls_cli.consistency.findings import Finding, contradictions
 from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
+from cpfls_cli.flightlog import bandwidth
 from cpfls_cli.flightlog.bandwidth import between_updates
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import Imported
@@ -276,7 +277,7 @@ def _longest_stretch(flight: ReadFlight, study: Study) -> tuple[Signals, tuple[s
     slow = ""
     if signals.rotor_speed is not None and hz < SLOW_HZ:
         slow = (
-            f"the {shown_slowly(hz)}: inertia, drag factor, lag and effects on the torque cannot be found; first"
+            f"the {shown_slowly(hz)}: what is faster or small cannot be found; for that"
             f" {log_faster('rotors and body rates', FAST_HZ, flight.system)}"
         )
     notes = (*warnings, *notes, *doubts_on_voltage(known, flight.units))
@@ -304,8 +305,8 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
 def _between_updates(signals: Signals, flight: ReadFlight) -> Signals:
     """Put rotors that were logged rarely on straight lines: no controller holds a command for so long."""
     name = "rotor_command" if signals.commanded else "rotor_speed"
-    hz = flight.updated_hz.get(name, FAST_HZ)
-    if signals.rotor_speed is None or hz >= FAST_HZ:
+    hz = flight.updated_hz.get(name, bandwidth.FAST_HZ)
+    if signals.rotor_speed is None or hz >= bandwidth.FAST_HZ:
         return signals
     speed = between_updates(signals.rotor_speed) if name in flight.repeated else signals.rotor_speed
     return replace(signals, rotor_speed=speed, rotor_span_s=1 / hz)

@@ -19,6 +19,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step, solve
 from cpfls_cli.estimation.first_stage import FOLDS
+from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.inertia import EXPLAINED, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, PastBalances, Sums, fitting_bands
 from cpfls_cli.playback.evaluation import JointNumbers
@@ -260,13 +261,16 @@ def find_constants(
     -------
     Constants or None
         None where nothing shows how the flights were moved apart from gusts, for too short a time or too slow a log,
-        and where the inertia is not to be sought.
+        where the inertia is not to be sought, and by the past where rotors are logged below `SLOW_HZ`.
 
     References
     ----------
     Söderström and Stoica 2002 (instrumental variables in closed loop); Pintelon and Schoukens 2012 (repeats);
     Holtz-Eakin, Newey and Rosen 1988 (quasi-differences, with the past as instrument).
     """
+    if past and any(flight.rotor_span_s * SLOW_HZ > 1 for flight in flights):
+        # What is faster than their updates folds into what is slower, and the past predicts that, too.
+        return None
     balances = (PastBalances if past else Balances)(given.flown, given)
     periods = {flight.motion.period for flight in balances.flights}
     if len(periods) > 1 or len(fitting_bands(max(periods))) < len(BANDS) - 1:

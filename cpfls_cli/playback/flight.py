@@ -94,7 +94,8 @@ class PlaybackFlight:
     (time, rotor), and what it is between samples; without attitude or velocity rotation alone is played back; `wrench`:
     stated torque and force of a flight without rotor speeds, which are then 0, shape (time, 6), N m and N, body frame;
     `specific_force`: of an accelerometer, m/s^2, body frame; `setpoints`: those of `Signals` that are known in all
-    stretches; `group`: configuration of the vehicle that flew it, empty for the one of the config.
+    stretches; `group`: configuration of the vehicle that flew it, empty for the one of the config; `rotor_span_s`: of
+    `Signals`.
     """
 
     name: str
@@ -109,6 +110,7 @@ class PlaybackFlight:
     specific_force: Array | None = None
     setpoints: Mapping[str, Array] = field(default_factory=dict)
     group: str = ""
+    rotor_span_s: float = 0.0
 
     def __len__(self) -> int:
         return len(self.speed)
@@ -240,6 +242,7 @@ def playback_flight(parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:
             for name in first.setpoints
             if all(name in part.setpoints for part in parts)
         },
+        rotor_span_s=first.rotor_span_s,
     )
 
 

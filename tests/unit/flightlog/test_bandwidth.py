@@ -115,3 +115,10 @@ def test_straight_lines_go_from_update_to_update_and_through_what_changes_in_eve
     assert np.abs(between[:390] - rows[:390, None]).max() < 1e-9
     repeated[200:240] += np.sin(rows[200:240, None])
     assert np.abs(between_updates(repeated)[205:235] - repeated[205:235]).max() < 1e-9
+
+
+def test_an_update_that_rounding_spreads_over_two_rows_is_at_the_first():
+    rows = np.arange(400)
+    repeated = np.column_stack([rows // 10 * 10.0] * 2)
+    repeated[rows % 10 == 0] -= 1e-12
+    assert np.abs(between_updates(repeated)[:390] - rows[:390, None]).max() < 1e-9

@@ -58,16 +58,20 @@ def test_own_topic_is_taken_as_it_is():
     assert warnings == ()
 
 
-def test_setpoints_keep_the_previous_value_and_states_are_linear():
-    level = np.arange(100.0)
-    topics = {"gyro": gyro(), "slow": {"timestamp": SLOW, "a": level, "b": level, "c": level}}
+def test_states_and_commands_that_are_logged_rarely_are_linear_and_fast_commands_stay():
+    level = np.arange(250.0)
+    # 50 times a second, and 125 times.
+    slow = {"timestamp": SLOW} | dict.fromkeys("abc", level[:100])
+    fast = {"timestamp": 0.001 + 0.008 * level} | dict.fromkeys("abc", level)
+    topics = {"gyro": gyro(), "slow": slow, "fast": fast}
     names = ("slow.a", "slow.b", "slow.c")
-    torque = put(topics, body_rate=RATE, body_torque=names)[0]["slow.a"]
+    rare = put(topics, body_rate=RATE, body_torque=names)[0]["slow.a"]
+    often = put(topics, body_rate=RATE, body_torque=("fast.a", "fast.b", "fast.c"))[0]["fast.a"]
     state = put(topics, attitude=names)[0]["slow.a"]
     inside = between_samples(GYRO)
-    np.testing.assert_array_equal(torque[inside], np.floor((GYRO[inside] - SLOW[0]) / 0.02 + 1e-9))
-    np.testing.assert_allclose(state[inside], (GYRO[inside] - SLOW[0]) / 0.02, atol=1e-9)
-    for values in (torque, state):
+    np.testing.assert_array_equal(often[inside], np.floor((GYRO[inside] - SLOW[0]) / 0.008 + 1e-9))
+    for values in (rare, state):
+        np.testing.assert_allclose(values[inside], (GYRO[inside] - SLOW[0]) / 0.02, atol=1e-9)
         assert np.isnan(values[~inside]).all()
 
 

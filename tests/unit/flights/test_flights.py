@@ -12,7 +12,7 @@ import pytest
 from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study, resolved_yaml
-from cpfls_cli.effects.signals import RecordedFlight
+from cpfls_cli.effects.signals import RecordedFlight, Signals, as_slow_as_rotors
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.flightlog.results import MOTION, Flight, Imported
@@ -20,6 +20,7 @@ from cpfls_cli.flights import playback, recordings
 from cpfls_cli.flights import training as sources
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.flights.recordings import ReadFlight, signals_of
+from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.simulation.inverse import flyability
 from cpfls_cli.simulation.model import Simulated
 from cpfls_cli.store import Origin, write
@@ -27,6 +28,7 @@ from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
 from cpfls_cli.vehicle.rotors import body_wrench
 from cpfls_cli.vehicle.settings import Unknown, VehicleSettings
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, common_windows
 
 TIME = np.arange(3.0)
 THREE = np.zeros((3, 3))
@@ -109,6 +111,35 @@ def test_a_flight_knows_over_what_its_slow_channels_are_averaged():
     assert (flight.attitude_spans, flight.body_rate_spans) == ((0.1, 0.1), (0.02,))
     kept = RecordedFlight.of(flight, "given").flight(flight.vehicle, 0.0)
     assert (kept.attitude_spans, kept.body_rate_spans) == ((0.1, 0.1), (0.02,))
+
+
+@pytest.mark.parametrize(("hz", "repeated", "span_s"), [(10.0, True, 0.1), (10.0, False, 0.1), (125.0, True, 0.0)])
+def test_rotors_that_are_logged_rarely_lie_on_straight_lines(hz, repeated, span_s):
+    time = 0.001 * np.arange(4000)
+    updates = time[:: round(1000 / hz)]
+    speed = 500 + 50 * np.sin(updates[:, None] + np.arange(4))
+    rows = np.searchsorted(updates, time, side="right") - 1
+    lines = np.column_stack([np.interp(time, updates, each) for each in speed.T])
+    known = {"time": time, "body_rate": np.zeros((4000, 3)), "rotor_speed": speed[rows] if repeated else lines}
+    slow = {"updated_hz": {"rotor_speed": hz}, "repeated": ("rotor_speed",) * repeated}
+    flight, _ = signals_of(ReadFlight("flight.csv", known, {}, (), **slow), known, Study())
+    assert flight.rotor_span_s == pytest.approx(span_s)
+    assert RecordedFlight.of(flight, "given").flight(flight.vehicle, 0.0).rotor_span_s == flight.rotor_span_s
+    # A fast controller holds its command.
+    expected = lines if span_s else speed[rows]
+    np.testing.assert_allclose(flight.rotor_speed[:3900], expected[:3900])
+
+
+def test_motion_is_averaged_as_lines_between_updates_average_rotors():
+    time, turn = 0.01 * np.arange(2000), 2 * np.pi * 2.0
+    wave = np.sin(turn * time)[:, None] * np.ones(3)
+    flight = Signals(time=time, body_rate=wave, velocity=wave, vehicle=VehicleSettings(), rotor_span_s=0.1)
+    averaged = as_slow_as_rotors(flight)
+    for own in (averaged.body_rate, averaged.velocity):
+        np.testing.assert_allclose(own[100:-100], np.sinc(2.0 * 0.1) ** 2 * wave[100:-100], atol=2e-3)
+    assert as_slow_as_rotors(replace(flight, rotor_span_s=0.0)).body_rate is flight.body_rate
+    # As of a log with so many rows.
+    assert common_windows([flight], GapSettings()).weight.size == FEWEST_SAMPLES * 10
 
 
 @pytest.fixture
