@@ -14,6 +14,7 @@ from benchmarks.blind_study.run import CASES_AT_ONCE, judge_all, run
 from benchmarks.blind_study.score import scored
 from benchmarks.blind_study.sets import GROUPS, LEVELS, Size, sets
 from benchmarks.blind_study.tables import tables
+from benchmarks.blind_study.thin import thinned
 
 _QUICK = {
     "single": 22, "none": 4, "outside": 18, "pair": 3, "triple": 1, "background": 1, "form": 3, "hover": 2,
@@ -31,6 +32,8 @@ def main():
     if options.command == "fly":
         for own in sets(size):
             fly([own], options.out)
+    if options.command == "thin":
+        print(thinned(options.out))
     if options.command == "judge":
         judge_all(options.out, options.processes)
     if options.command == "run":
@@ -62,7 +65,7 @@ def _quick(options):
 
 def _arguments():
     parser = argparse.ArgumentParser(prog="benchmarks.blind_study", description=__doc__)
-    parser.add_argument("command", choices=("fly", "judge", "score", "run", "quick"))
+    parser.add_argument("command", choices=("fly", "thin", "judge", "score", "run", "quick"))
     parser.add_argument("--out", type=Path, default=Path("data/blind"), help="folder of the study")
     parser.add_argument("--seed", type=int, default=31)
     parser.add_argument("--draws", type=int, default=2, help="draws of each effect")

@@ -72,3 +72,14 @@ def test_of_fast_logs_nothing_is_said(cpfls, slow, logs):
     first, _ = logs(1)
     result = cpfls("vehicle", slow[0], first, "--dry-run", "-o", first.with_name("fast.h5"))
     assert (result.exit_code, "times a second" in result.stderr) == (0, False)
+
+
+@pytest.mark.decides
+def test_gap_names_wrong_guesses_and_no_effect(cpfls, slow):
+    """Motors that rows repeat, taken as they are, had three effects that nobody hid."""
+    config, first, second, _ = slow
+    words = ("gap", config, first, "--held-out", second, "--accept-guesses", "-o", config.with_name("gap"))
+    found = cpfls.summary(*words)
+    assert (found["verdict"], [effect["name"] for effect in found["effects"]]) == ("NAMED", ["parameter_error"])
+    thrust = found["effects"][0]["coefficients"]["thrust_scale"]
+    assert thrust["value"] == pytest.approx(-0.076, abs=0.003)

@@ -132,9 +132,7 @@ def held_out(
     }
     known = full.known & ~np.any([np.zeros_like(full.known), *beyond.values()], axis=0)
     here, own = floors(full, linear), system(fitted.flights)
-    numbers = (
-        _own_numbers(own, linear[: own.base.shape[2]]) if full.gusty.any() else fit(own, channel_size(own.residual))
-    )
+    numbers = _own_numbers(own, linear[: own.base.shape[2]]) if full.gusty.any() else fit(own, floor)
     scatter = scatter_size(scatter_variance(fitted), fitted.residual_at(linear), floor)
     return HeldOut(
         raw.residual,
