@@ -286,6 +286,14 @@ def test_the_range_of_a_command_shows_its_unit(own, values, unit, scale, offset)
     assert (columns.unit, columns.scale, columns.offset) == (unit, pytest.approx(scale), pytest.approx(offset))
 
 
+@pytest.mark.parametrize("name", ["R_cmd", "output_rot", "rotor_R"])
+def test_a_rotation_that_is_asked_for_is_no_command_of_rotors(own, name):
+    nine = named(own.rotation.as_matrix().reshape(-1, 9), *(f"{name}[{row}]" for row in range(9)))
+    pulses = named(1000 + own.speed, *(f"motor_pwm[{rotor}]" for rotor in range(4)))
+    recognition = seen(flat_log(own, speed={**nine, **pulses}))
+    assert recognition.signal("rotor_command").columns.columns == tuple(pulses)
+
+
 def test_two_guesses_that_the_data_cannot_part_are_both_listed(own):
     speed = named(own.speed, "rotor1", "rotor2", "rotor3", "rotor4")
     guess = seen(flat_log(own, speed=speed)).signal("rotor_speed")
