@@ -411,7 +411,7 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
         rivals = () if named.unit or unit == "rpm" else (Rival("unit: rpm", "its size fits both"),)
         sure = "guess" if rivals else "named"
         return _in_unit(named, unit, named.scale, f"{called}: a commanded speed", sure, *rivals)
-    if named.unit == "1" and named.scale != 1.0 and named.known != PARROT:
+    if named.unit == "1" and named.scale != 1.0 and named.known not in (CRAZYFLIE, PARROT):
         return _in_unit(named, "1", named.scale, f"{called}: per cent by its name", "named")
     least, most = np.quantile(values.mean(axis=1), (0.1, 0.9))
     if not named.known and not words & {"motor", "motors", "rotor", "rotors"} and least < -_BELOW * most:
@@ -424,7 +424,7 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     others = [Rival(*own.rival)] if own.rival else []
     if not (clear or named.unit == "us" or "pwm" in words):
         others += [Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm")]
-    sure = "data" if clear else "guess"
+    sure = "data" if clear and not others else "guess"
     return _in_unit(named, "1", own.scale, f"{called}: {own.words}", sure, *others, offset=own.offset)
 
 
