@@ -25,7 +25,7 @@ from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName, known_unit
 if TYPE_CHECKING:
     from cpfls_cli.flightlog.rebuilt import Rebuilt
 
-_TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?|millis|micros")
+_TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|tout|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?|millis|micros")
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 # Columns of stamps that a message names, and the share of falls below which one that is only called like them counts.
 _REFUSED, _SELDOM = 3, 0.1
@@ -142,7 +142,8 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
     ranks: dict[str, int] = {}
     refused: list[str] = []
-    groups = Counter(name.rpartition("/")[0] for name in fields)
+    paths = [name.split("/") for name in fields]
+    groups = Counter("/".join(path[:depth]) for path in paths for depth in range(len(path)))
     for name, values in fields.items():
         # In a struct of MATLAB, or a group of HDF5, what comes last says what it is; alone it is a unit, as in deg/sec.
         (group, _, last), known = name.rpartition("/"), np.asarray(values, dtype=float)

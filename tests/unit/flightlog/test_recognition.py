@@ -480,6 +480,13 @@ def test_what_is_called_like_stamps_and_seldom_falls_is_said_where_there_is_no_c
         seen(flat_log(own, t=flights))
 
 
+@pytest.mark.parametrize("clock", ["tout", "log/t"])
+def test_stamps_of_matlab_are_a_clock(own, clock):
+    """In a structure whose other parts are structures, or as Simulink calls them."""
+    rates = named(own.rate, *(f"log/own/gyro[{axis}]" for axis in range(3)))
+    assert seen(flat_log(own, t={clock: own.time}, rate=rates)).time_column == clock
+
+
 def test_stamps_that_step_back_are_no_clock_where_another_one_never_does(own):
     late = own.time.copy()
     late[[500, 900]] -= 0.5
