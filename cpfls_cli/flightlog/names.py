@@ -38,6 +38,10 @@ _MEASURED: Final = tuple(own for own in vocabulary.KNOWN if own.signal in UNITS_
 Kind = Literal["xyz", "wxyz", "angles", "numbers", "one"]
 
 
+# What MATLAB, Simulink and ROS call the numbers of whatever they log.
+_HOLDERS = frozenset({"data", "signals", "value", "values"})
+
+
 @dataclass(frozen=True)
 class ColumnGroup:
     """Columns whose names differ in an axis or a number alone."""
@@ -77,8 +81,8 @@ class ColumnGroup:
     @cached_property
     def last_words(self) -> tuple[str, ...]:
         """Words of the last part of a path that has any: a structure ``output`` may hold whatever was measured."""
-        parts = self.pattern.removesuffix(self.ending).split("/")
-        return next(filter(None, map(_words, reversed(parts))), ())
+        parts = map(_words, reversed(self.pattern.removesuffix(self.ending).split("/")))
+        return next((words for words in parts if {*words} - _HOLDERS), ())
 
 
 def _words(text: str) -> tuple[str, ...]:
@@ -176,8 +180,12 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     known = [named for group in groups for named in _known_to_systems(group, system)]
     names = {column for group in groups for column in group.columns}
     held = {(named.known, named.group.columns) for named in known}
-    # What is asked for counts too where a topic stands before it, as nobody else names it.
-    held |= {(own.system, own.columns) for own in vocabulary.KNOWN if "." in own.columns[0] and names >= {*own.columns}}
+    # What is asked for counts too where a topic stands before more than an axis, as nobody else names it.
+    held |= {
+        (own.system, own.columns)
+        for own in vocabulary.KNOWN
+        if re.search(r"\.[a-z]*[A-Z_]", own.columns[0]) and names >= {*own.columns}
+    }
     of_kind = Counter(kind for kind, _ in held)
     # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
     found = [named for named in known if system or of_kind[named.known] > 1]
@@ -281,7 +289,8 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
         asked, last = bool(own & (ASKED | AIMED)), bool({*group.last_words} & ASKED)
         # Three columns of the letter w, or in the unit of a rate, are the axes of a gyroscope.
         many = len(group.columns) > _AXES_OF_A_BODY
-        fast = bool(own & vocabulary.FAST) or (many and (own - AIMED == {"w"} or ends_in_speed))
+        turning = (asked or len(own) == 1) and {*group.last_words} - AIMED - ASKED == {"w"}
+        fast = bool(own & vocabulary.FAST) or (many and (turning or ends_in_speed))
         motors = {*group.last_words} - AIMED == {"m"} or bool({"motor", "motors"} & own)
         return fast and not asked if signal == "rotor_speed" else last or (asked if fast else motors)
     if signal == "position" and group.kind != "numbers":

@@ -20,17 +20,18 @@ from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, named_s
 from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
-from cpfls_cli.units import KNOWN_UNITS, UnitName, known_unit
+from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName, known_unit
 
 if TYPE_CHECKING:
     from cpfls_cli.flightlog.rebuilt import Rebuilt
 
-_TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?|millis|micros")
+_TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|tout|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?|millis|micros")
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 # Columns of stamps that a message names, and the share of falls below which one that is only called like them counts.
 _REFUSED, _SELDOM = 3, 0.1
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
+_AS_GRAVITY = 0.15  # Share by which what carries a multirotor is usually off gravity.
 _SLOWEST_HZ = 0.5  # Below which a signal shows nothing of a flight.
 _FEWEST_SAMPLES = 20  # For medians and rates.
 # Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses.
@@ -141,7 +142,8 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
     ranks: dict[str, int] = {}
     refused: list[str] = []
-    groups = Counter(name.rpartition("/")[0] for name in fields)
+    paths = [name.split("/") for name in fields]
+    groups = Counter("/".join(path[:depth]) for path in paths for depth in range(len(path)))
     for name, values in fields.items():
         # In a struct of MATLAB, or a group of HDF5, what comes last says what it is; alone it is a unit, as in deg/sec.
         (group, _, last), known = name.rpartition("/"), np.asarray(values, dtype=float)
@@ -211,6 +213,8 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
             named = replace(named, group=replace(named.group, columns=enough or named.group.columns))
             time, values = log.values(named.group.columns)
         enough_rows = len(time) >= _FEWEST_SAMPLES and log.rate_hz(named.group.columns) >= _SLOWEST_HZ
+        if named.signal == "body_rate" and not named.known and len(values) and _is_gravity(values):
+            continue
         if enough_rows and float(np.ptp(values, axis=0).max()) > 0:
             kept.setdefault(named.signal, []).append(named)
     for found in kept.values():
@@ -219,6 +223,14 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
         fastest = max(rates.values(), default=0.0)
         found.sort(key=lambda named: named in rates and rates[named] * _SEVERAL < fastest)
     return kept
+
+
+def _is_gravity(values: Array) -> bool:
+    """Tell what keeps nearly the length of gravity, in m/s^2 or g, as no gyroscope does: g may be its name."""
+    lengths = np.linalg.norm(values, axis=1)
+    length = float(np.median(lengths))
+    alike = min(abs(length / size - 1) for size in (1.0, STANDARD_GRAVITY)) < _AS_GRAVITY
+    return alike and float(lengths.std()) < _AS_GRAVITY * length
 
 
 def make_grid(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) -> None:

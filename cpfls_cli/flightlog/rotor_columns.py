@@ -45,6 +45,7 @@ _CRAZYFLIE_MIXER = ((1.0, -0.5, 0.5, 1.0), (1.0, -0.5, -0.5, -1.0), (1.0, 0.5, -
 _MEAN_S, _IDLE, _LEAST_SPREAD = 0.5, 0.05, 0.02
 # Powers that are between those of a thrust and of a speed, or near them, and what divides these; least correlation.
 _POWERS, _BETWEEN, _CORRELATED = (0.35, 1.4), float(np.sqrt(0.5)), 0.9
+_ORTHOGONAL = 1e-2  # Median by which products of the rows of a rotation matrix are off those of the unit matrix.
 _SAME = 0.02  # Part of the largest one's spread below which an output is not connected to a motor.
 # Share of the changes of the others below which an output is moved by hand or by a timer, and not by a controller.
 _SELDOM = 0.1
@@ -213,9 +214,19 @@ class _Connected(NamedTuple):
     doubtful: tuple[str, ...] = ()  # Outputs of `others` that may be motors all the same.
 
 
+def _is_rotation(values: Array) -> bool:
+    """Tell the nine numbers of a rotation matrix, whose rows have length 1 at right angles, by row or by column."""
+    if values.shape[1] != np.size(np.eye(3)):
+        return False
+    matrices = values.reshape(-1, 3, 3)
+    return bool(np.median(np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3))) < _ORTHOGONAL)
+
+
 def _connected(found: Found, parameters: Parameters) -> _Connected:
     """Find the motors among outputs: by their functions, by the frame's number, or because they move together."""
     named, time, values = found
+    if _is_rotation(values):
+        return _Connected([], False, {})
     spread = values.std(axis=0)
     moving = [index for index, own in enumerate(spread) if own > _SAME * float(spread.max()) > 0]
 
@@ -400,7 +411,7 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
         rivals = () if named.unit or unit == "rpm" else (Rival("unit: rpm", "its size fits both"),)
         sure = "guess" if rivals else "named"
         return _in_unit(named, unit, named.scale, f"{called}: a commanded speed", sure, *rivals)
-    if named.unit == "1" and named.scale != 1.0 and named.known != PARROT:
+    if named.unit == "1" and named.scale != 1.0 and named.known not in (CRAZYFLIE, PARROT):
         return _in_unit(named, "1", named.scale, f"{called}: per cent by its name", "named")
     least, most = np.quantile(values.mean(axis=1), (0.1, 0.9))
     if not named.known and not words & {"motor", "motors", "rotor", "rotors"} and least < -_BELOW * most:
@@ -413,7 +424,7 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     others = [Rival(*own.rival)] if own.rival else []
     if not (clear or named.unit == "us" or "pwm" in words):
         others += [Rival(f"unit: {unit}", f"if it is a speed, up to {high:.4g}") for unit in ("rad/s", "rpm")]
-    sure = "data" if clear else "guess"
+    sure = "data" if clear and not others else "guess"
     return _in_unit(named, "1", own.scale, f"{called}: {own.words}", sure, *others, offset=own.offset)
 
 

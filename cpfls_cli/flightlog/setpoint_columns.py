@@ -102,18 +102,26 @@ def _in_stated_unit(log: LogTable, signal: SignalName, mapped: SignalMap) -> Sig
 
 
 def _by_words(seen: Seen) -> Iterator[_Candidate]:
-    for named in wished_signals(column_groups(seen.log.names)):
+    groups = column_groups(seen.log.names)
+    measured = seen.guesses.get("attitude")
+    axes = () if measured is None else measured.columns.columns
+    # A matrix of angles that is asked for begins as the measured one does.
+    held = next((own.columns for own in groups if own.kind == "numbers" and {*own.columns} == {*axes}), ())
+    ahead = [held.index(column) for column in axes if held]
+    for named in wished_signals(groups):
         columns, unit = named.group.columns, named.unit
         if named.group.kind == "wxyz" and seen.quaternion_order == "xyzw":
             columns = (*columns[1:], columns[0])
+        if named.signal == "setpoint_attitude" and named.group.kind == "numbers" and len(columns) == len(ahead):
+            columns = tuple(columns[place] for place in ahead)
         units = _UNITS.get(named.signal, ())
         if unit is None and not units:
             seen.left_out.append(f"{named.group.pattern}: looks like a commanded thrust, but in no stated unit")
             continue
         mapped = SignalMap(columns=columns, unit=unit or units[0], scale=named.scale, required=False)
-        if len(columns) == 4 and (measured := seen.guesses.get("quaternion")) is not None:
+        if len(columns) == 4 and (turned := seen.guesses.get("quaternion")) is not None:
             # As the attitude: its inverse, or in other axes.
-            mapped = replace(mapped, sign=measured.columns.sign)
+            mapped = replace(mapped, sign=turned.columns.sign)
         mapped = _in_stated_unit(seen.log, named.signal, mapped)
         units = () if unit is not None or mapped.columns[0] in seen.log.units else units
         doubts = (_REFERENCE,) if {"ref", "reference"} & {*named.group.words} else ()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster
+from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster
 from cpfls_cli.look.balance import Balance
 from cpfls_cli.look.effectiveness import AxisPlant
 from cpfls_cli.look.flight import AXES, LogFlight
@@ -142,7 +142,7 @@ def answers_of(found: Found) -> tuple[Answer, ...]:
         "vibration": _spectra,
         "thrust curve": _curve,
         "gusts": _gusts,
-        "inertia, drag, what a model misses": lambda _: ("no", _NO_NEWTONS, "", ""),
+        "inertia, drag, what a model misses": _constants,
     }
     rows = {question: answer(found) for question, answer in asked.items()}
     settings = found.settings
@@ -290,6 +290,13 @@ def _gusts(found: Found) -> tuple[str, str, str, str]:
     return "no", "what a command does is not identified" if not found.identified else "too little flight", "", ""
 
 
+def _constants(found: Found) -> tuple[str, str, str, str]:
+    if found.loop_hz >= SLOW_HZ:
+        return "no", _NO_NEWTONS, "", ""
+    slow = ["commands"] if _gyroscope_hz(found.flight) >= SLOW_HZ else ["body rates", "commands"]
+    return "no", f"{_NO_NEWTONS}, and {joined(slow)} at {FAST_HZ:g} Hz or more", ", ".join(slow), ""
+
+
 def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:
     """Choose the setting and the flights that answer most of what is open, and the command that goes on to a model."""
     open_ = [each for each in answers if each.answer != "yes"]
@@ -305,7 +312,7 @@ def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:
     how = "faster" if found.settings or _gyroscope_hz(found.flight) >= _LEAST_HZ else f"at {_LEAST_HZ:g} Hz or more"
     logged = [
         NextStep(
-            what=f"log {joined(signal for each in slow for signal in each.log.split(', '))} {how}",
+            what=f"log {joined(dict.fromkeys(signal for each in slow for signal in each.log.split(', ')))} {how}",
             settings=found.settings,
             why=", ".join(each.question for each in slow),
         )

@@ -19,7 +19,7 @@ from tests.builders import looked_logs
 from tests.builders.blackbox_logs import signed
 from tests.builders.dataflash_logs import dataflash
 from tests.builders.look_flights import CROSS, hovering
-from tests.builders.unknown_logs import flat_log, flight, ulog_of_flight, write_csv
+from tests.builders.unknown_logs import flat_log, flight, named, ulog_of_flight, write_csv
 
 OWN = flight(seconds=15.0)
 MOST_LINES = 15
@@ -127,6 +127,15 @@ def test_one_topic_of_px4_alone_is_called_so(refuse, tmp_path, monkeypatch, comm
     (said,) = refuse(command[0], "log_vehicle_air_data_0.csv", *command[1:], code=code)
     assert said.startswith("log_vehicle_air_data_0.csv: by its name vehicle_air_data alone, one topic of a log of PX4")
     assert "if it is a whole log: no column is recognised" in said
+
+
+@pytest.mark.parametrize(("rate_hz", "log"), [(20.0, "body rates, commands"), (50.0, "")])
+def test_commands_that_are_logged_rarely_show_no_inertia_with_mass_and_arm_either(cpfls, tmp_path, rate_hz, log):
+    own = flight(rate_hz=rate_hz)
+    command = named(own.speed / 1000, "u1", "u2", "u3", "u4")
+    summary = cpfls.summary("look", write_csv(tmp_path / "log.csv", flat_log(own, speed=command)), "-o", tmp_path / "o")
+    assert summary["answers"][-1]["log"] == log
+    assert any("inertia" in own["why"] for own in summary["next_steps"][:-1]) == bool(log)
 
 
 def test_several_logs_are_a_table_and_a_page_each(cpfls, logs, tmp_path, monkeypatch):

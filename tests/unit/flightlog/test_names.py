@@ -60,6 +60,12 @@ def first(names, signal, system=""):
         ("m1_ref m2_ref m3_ref m4_ref", "rotor_command", "m1_ref m2_ref m3_ref m4_ref"),
         ("own/r/cmd1 own/r/cmd2 own/r/cmd3", "rotor_command", "own/r/cmd1 own/r/cmd2 own/r/cmd3"),
         ("rpm_cmd/n[0] rpm_cmd/n[1] rpm_cmd/n[2]", "rotor_command", "rpm_cmd/n[0] rpm_cmd/n[1] rpm_cmd/n[2]"),
+        # What holds numbers says nothing of them, and w of a command turns fast.
+        ("own/u/Data[0] own/u/Data[1] own/u/Data[2]", "rotor_command", "own/u/Data[0] own/u/Data[1] own/u/Data[2]"),
+        ("u/values[0] u/values[1] u/values[2]", "rotor_command", "u/values[0] u/values[1] u/values[2]"),
+        ("cmd/w[0] cmd/w[1] cmd/w[2] cmd/w[3]", "rotor_command", "cmd/w[0] cmd/w[1] cmd/w[2] cmd/w[3]"),
+        ("own/cmd/w1 own/cmd/w2 own/cmd/w3 own/cmd/w4", "rotor_command", "own/cmd/w1 own/cmd/w2 own/cmd/w3 own/cmd/w4"),
+        ("orient_w orient_x orient_y orient_z", "quaternion", "orient_w orient_x orient_y orient_z"),
         # Named as keys of a config are, each with its unit.
         ("p_rad_s q_rad_s r_rad_s", "body_rate", "p_rad_s q_rad_s r_rad_s"),
         ("roll_rad pitch_rad yaw_rad p_rad_s q_rad_s r_rad_s", "attitude", "roll_rad pitch_rad yaw_rad"),
@@ -103,6 +109,9 @@ def test_what_a_kind_of_log_asks_for_counts_as_one_of_its_names():
     rates, asked = (f"controller.{own}roll controller.{own}pitch controller.{own}yaw" for own in ("r_", "cmd_"))
     assert first(rates, "body_rate") is None
     assert first(f"{rates} {asked}", "body_rate").known == "Crazyflie"
+    # Any controller has axes.
+    axes, motors = "controller.roll controller.pitch controller.yaw", "motor.m1 motor.m2 motor.m3 motor.m4"
+    assert not first(f"{axes} {motors}", "rotor_command").known
 
 
 def test_a_kind_of_log_knows_its_columns_before_their_words_are_read():

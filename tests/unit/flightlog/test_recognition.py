@@ -114,6 +114,29 @@ def test_a_matrix_of_angles_may_hold_yaw_first(own):
     assert seen(log).signal("attitude").columns.columns[2] == "yaw"
 
 
+def test_what_is_asked_for_begins_with_the_axis_that_the_measured_angles_begin_with(own):
+    late = np.roll(own.angles, 5, axis=0)
+    asked, flown = ([f"{name}[{column}]" for column in range(3)] for name in ("euler_des", "euler"))
+    log = flat_log(own, attitude={**named(own.angles[:, ::-1], *flown), **named(late[:, ::-1], *asked)})
+    assert seen(log).signal("setpoint_attitude").columns.columns == tuple(asked[::-1])
+
+
+@pytest.mark.parametrize("length", [1.0, -9.80665])
+def test_gravity_that_is_called_g_is_no_gyroscope(own, length):
+    """No attitude would show it."""
+    gravity = named(length * own.rotation.as_matrix()[:, 2], "gx", "gy", "gz")
+    recognition = seen(flat_log(own, attitude=None, rate=gravity))
+    assert "body_rate" not in {guess.signal for guess in recognition.signals}
+    recognition = seen(flat_log(own, attitude=None, rate=named(own.rate, "gx", "gy", "gz")))
+    assert recognition.signal("body_rate").columns.unit == "rad/s"
+
+
+def test_the_vector_of_a_quaternion_is_no_three_angles(own):
+    orient = named(quaternion(own.rotation), *(f"orient_{axis}" for axis in "wxyz"))
+    recognition = assert_the_flight_comes_back(flat_log(own, attitude=orient), own)
+    assert recognition.signal("quaternion").columns.columns == tuple(orient)
+
+
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
 @pytest.mark.parametrize("inverse", [False, True])
 def test_quaternions_of_either_order_and_direction_are_distinguished(own, order, inverse):
@@ -286,6 +309,28 @@ def test_the_range_of_a_command_shows_its_unit(own, values, unit, scale, offset)
     assert (columns.unit, columns.scale, columns.offset) == (unit, pytest.approx(scale), pytest.approx(offset))
 
 
+def test_thrusts_may_be_as_large_as_pulses_in_milliseconds(own):
+    command = named(1 + own.speed / 1000, "u1", "u2", "u3", "u4")
+    guess = seen(flat_log(own, speed=command)).signal("rotor_command")
+    assert (guess.sure, guess.rivals[0].text) == ("guess", "scale: 1, offset: 0")
+
+
+def test_shares_of_a_crazyflie_are_of_no_16_bits(own):
+    """Drawn as 0 to 1, as a simulation of it logs them."""
+    shares = named((own.speed / 1000) ** 2, "motor.m1", "motor.m2", "motor.m3", "motor.m4")
+    degrees = named(np.degrees(own.angles) * [1, -1, 1], "stabilizer.roll", "stabilizer.pitch", "stabilizer.yaw")
+    guess = seen(flat_log(own, speed=shares, attitude=degrees)).signal("rotor_command")
+    assert guess.columns.scale == 1.0
+
+
+@pytest.mark.parametrize("name", ["R_cmd", "output_rot", "rotor_R"])
+def test_a_rotation_that_is_asked_for_is_no_command_of_rotors(own, name):
+    nine = named(own.rotation.as_matrix().reshape(-1, 9), *(f"{name}[{row}]" for row in range(9)))
+    pulses = named(1000 + own.speed, *(f"motor_pwm[{rotor}]" for rotor in range(4)))
+    recognition = seen(flat_log(own, speed={**nine, **pulses}))
+    assert recognition.signal("rotor_command").columns.columns == tuple(pulses)
+
+
 def test_two_guesses_that_the_data_cannot_part_are_both_listed(own):
     speed = named(own.speed, "rotor1", "rotor2", "rotor3", "rotor4")
     guess = seen(flat_log(own, speed=speed)).signal("rotor_speed")
@@ -433,6 +478,13 @@ def test_what_is_called_like_stamps_and_seldom_falls_is_said_where_there_is_no_c
     flights = {"times of flight": np.arange(2000) % 700 * 0.015, "step time": np.tile([0.02, 0.01], 1000)}
     with pytest.raises(InputError, match=r"^times of flight falls 2 times, first at row 701 of 2000[^;]*; rename"):
         seen(flat_log(own, t=flights))
+
+
+@pytest.mark.parametrize("clock", ["tout", "log/t"])
+def test_stamps_of_matlab_are_a_clock(own, clock):
+    """In a structure whose other parts are structures, or as Simulink calls them."""
+    rates = named(own.rate, *(f"log/own/gyro[{axis}]" for axis in range(3)))
+    assert seen(flat_log(own, t={clock: own.time}, rate=rates)).time_column == clock
 
 
 def test_stamps_that_step_back_are_no_clock_where_another_one_never_does(own):
