@@ -308,7 +308,8 @@ def _between_updates(signals: Signals, flight: ReadFlight) -> Signals:
     hz = flight.updated_hz.get(name, bandwidth.FAST_HZ)
     if signals.rotor_speed is None or hz >= bandwidth.FAST_HZ:
         return signals
-    speed = between_updates(signals.rotor_speed) if name in flight.repeated else signals.rotor_speed
+    held, apart = name in flight.repeated, 1 / (hz * signals.period)
+    speed = between_updates(signals.rotor_speed, apart) if held else signals.rotor_speed
     return replace(signals, rotor_speed=speed, rotor_span_s=1 / hz)
 
 
@@ -323,7 +324,11 @@ def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
         rate = np.zeros((len(time), 3))
         notes = ("neither body rates nor attitude; taken as level and at rest, so only the balance is judged",)
     optional: dict[str, Any] = {name: known.get(name) for name in _LOGGED}
-    optional |= {name: between_updates(known[name]) for name in _INTEGRALS if name in known and name in flight.repeated}
+    optional |= {
+        name: between_updates(known[name], 1 / (flight.updated_hz[name] * float(np.median(steps))))
+        for name in _INTEGRALS
+        if name in known and name in flight.repeated
+    }
     asked = {short: known[name] for name, short in SETPOINTS.items() if name in known}
     made = Signals(
         time=time,
