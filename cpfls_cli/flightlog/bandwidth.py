@@ -11,8 +11,9 @@ from cpfls_cli.flightlog.settings import COMMANDS, ImportSettings
 
 # A coarse voltage hardly changes, and nothing is derived from it.
 _NOT_JUDGED = frozenset({"voltage"})
-FAST_HZ = 100.0
-"""A rigid body hardly answers what is faster than half of this, and no controller holds a command for longer."""
+# A rigid body hardly answers what is faster than half of this, and no controller holds a command for longer.
+_FAST_HZ = 100.0
+_ON_RATE = 0.95  # Clocks of loggers are off, and stamps are rounded.
 _FEWEST_UPDATES = 20  # Below which a regular step may be chance.
 _REGULAR_SHARE = 0.8
 _LARGEST_SHARE_AT_ONCE = 0.2  # Of updates that come from row to row: jitter, not a rate.
@@ -50,6 +51,11 @@ class SlowSignal(NamedTuple):
     between: Literal["repeated", "interpolated"]  # What the rows between two updates hold.
 
 
+def is_fast(rate_hz: float) -> bool:
+    """Tell whether updates come so often that a command is held until the next, and shows what moves a body."""
+    return rate_hz >= _ON_RATE * _FAST_HZ
+
+
 def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = None) -> tuple[SlowSignal, ...]:
     """Find signals of a table as logged whose updates come at less than half the rate of the rows.
 
@@ -65,7 +71,7 @@ def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = No
         if name in found and 0 < 2 * own <= rate:
             seen = found[name]
             if seen is None or seen.rate_hz > _REGULAR_SHARE * own:
-                held = name in COMMANDS and own >= FAST_HZ
+                held = name in COMMANDS and is_fast(own)
                 found[name] = SlowSignal(name, own, "repeated" if held else "interpolated")
     return tuple(signal for signal in found.values() if signal is not None)
 
@@ -144,7 +150,7 @@ def _mean_ahead(values: Array, rows: float) -> Array:
 
 def warn_of_slow(slow: tuple[SlowSignal, ...], rate_hz: float) -> Iterator[str]:
     """Say of signals that are slower than the clock, and slower than 100 Hz, how slow they are and what that costs."""
-    for signal in (own for own in slow if own.rate_hz < FAST_HZ):
+    for signal in (own for own in slow if not is_fast(own.rate_hz)):
         between, cost = "lie on a straight line between two updates", "knows"
         if signal.between == "repeated":
             between, cost = "repeat the last value", f"is {500 / signal.rate_hz:.3g} ms late on average, and knows"

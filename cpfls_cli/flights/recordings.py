@@ -21,8 +21,7 @@ from cpfls_cli.consistency.findings import Finding, contradictions
 from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
-from cpfls_cli.flightlog import bandwidth
-from cpfls_cli.flightlog.bandwidth import between_updates
+from cpfls_cli.flightlog.bandwidth import between_updates, is_fast
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import Imported
 from cpfls_cli.flightlog.settings import SETPOINTS
@@ -305,8 +304,8 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
 def _between_updates(signals: Signals, flight: ReadFlight) -> Signals:
     """Put rotors that were logged rarely on straight lines: no controller holds a command for so long."""
     name = "rotor_command" if signals.commanded else "rotor_speed"
-    hz = flight.updated_hz.get(name, bandwidth.FAST_HZ)
-    if signals.rotor_speed is None or hz >= bandwidth.FAST_HZ:
+    hz = flight.updated_hz.get(name, np.inf)
+    if signals.rotor_speed is None or is_fast(hz):
         return signals
     held, apart = name in flight.repeated, 1 / (hz * signals.period)
     speed = between_updates(signals.rotor_speed, apart) if held else signals.rotor_speed
