@@ -303,13 +303,22 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
 
 def _between_updates(signals: Signals, flight: ReadFlight) -> Signals:
     """Put rotors that were logged rarely on straight lines: no controller holds a command for so long."""
-    name = "rotor_command" if signals.commanded else "rotor_speed"
-    hz = flight.updated_hz.get(name, np.inf)
-    if signals.rotor_speed is None or is_fast(hz):
+    if signals.rotor_speed is None:
         return signals
-    held, apart = name in flight.repeated, 1 / (hz * signals.period)
-    speed = between_updates(signals.rotor_speed, apart) if held else signals.rotor_speed
-    return replace(signals, rotor_speed=speed, rotor_span_s=1 / hz)
+    rarely = {name: hz for name, hz in flight.updated_hz.items() if not is_fast(hz)}
+
+    def lines(name: str, values: Array) -> Array:
+        held = name in rarely and name in flight.repeated
+        return between_updates(values, 1 / (rarely[name] * signals.period)) if held else values
+
+    name, command = "rotor_command" if signals.commanded else "rotor_speed", signals.rotor_command
+    return replace(
+        signals,
+        rotor_speed=lines(name, signals.rotor_speed),
+        # Commands that came late would make the lag of measured speeds shorter.
+        rotor_command=None if command is None else lines("rotor_command", command),
+        rotor_span_s=1 / rarely[name] if name in rarely else 0.0,
+    )
 
 
 def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> tuple[Signals, tuple[str, ...]]:

@@ -130,6 +130,17 @@ def test_rotors_that_are_logged_rarely_lie_on_straight_lines(hz, repeated, span_
     np.testing.assert_allclose(flight.rotor_speed[:3900], expected[:3900])
 
 
+def test_commands_of_measured_speeds_lie_on_lines_as_these_do():
+    time = 0.01 * np.arange(4000)
+    held = 500 + 50 * np.sin(time // 0.1 * 0.1)[:, None] * np.ones(4)
+    known = {"time": time, "body_rate": np.zeros((4000, 3)), "rotor_speed": held, "rotor_command": held}
+    slow = ("rotor_speed", "rotor_command")
+    read = ReadFlight("flight.csv", known, {}, (), updated_hz=dict.fromkeys(slow, 10.0), repeated=slow)
+    flight, _ = signals_of(read, known, Study())
+    np.testing.assert_array_equal(flight.rotor_command, flight.rotor_speed)
+    assert np.abs(flight.rotor_speed[:3900, 0] - 500 - 50 * np.sin(time[:3900])).max() < 1.0
+
+
 def test_motion_is_averaged_as_lines_between_updates_average_rotors():
     time, turn = 0.01 * np.arange(2000), 2 * np.pi * 2.0
     wave = np.sin(turn * time)[:, None] * np.ones(3)
