@@ -311,6 +311,9 @@ def as_slow_as_rotors(signals: Signals) -> Signals:
     weight = np.maximum(0.0, 1.0 - np.abs(np.arange(-int(wide), int(wide) + 1)) / wide)
     names = ("body_rate", "attitude", "velocity", "position", "acceleration", "specific_force")
     known = {name: values for name in names if (values := getattr(signals, name)) is not None}
+    if "attitude" in known:
+        # Where sensors were aligned, angles jump by full turns.
+        known["attitude"] = np.unwrap(known["attitude"], axis=0)
     changed: dict[str, Any] = {
         name: convolve1d(values, weight / weight.sum(), axis=0, mode="nearest") for name, values in known.items()
     }

@@ -5,20 +5,22 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.settings import COMMANDS, ImportSettings
 
 # A coarse voltage hardly changes, and nothing is derived from it.
 _NOT_JUDGED = frozenset({"voltage"})
-FAST_HZ = 100.0
-"""A rigid body hardly answers what is faster than half of this, and no controller holds a command for longer."""
+# A rigid body hardly answers what is faster than half of this, and no controller holds a command for longer.
+_FAST_HZ = 100.0
+_ON_RATE = 0.95  # Clocks of loggers are off, and stamps are rounded.
 _FEWEST_UPDATES = 20  # Below which a regular step may be chance.
 _REGULAR_SHARE = 0.8
 _LARGEST_SHARE_AT_ONCE = 0.2  # Of updates that come from row to row: jitter, not a rate.
 # A knot between two rows bends the line at both of them.
 _ROWS_OF_KNOT = 2
 _ROUNDING = 1e-6  # Of the largest step between updates.
+_STAYED = 1.5  # Times the usual time between updates.
 _STRAIGHT = 1e-3  # Bend of what is interpolated, by the rounding of a file, as a share of the largest.
 # Measured: logs of five vehicles fall by 29 dB below their trend at most, those that were filtered forward and backward
 # by 38 to 85 dB.
@@ -49,6 +51,11 @@ class SlowSignal(NamedTuple):
     between: Literal["repeated", "interpolated"]  # What the rows between two updates hold.
 
 
+def is_fast(rate_hz: float) -> bool:
+    """Tell whether updates come so often that a command is held until the next, and shows what moves a body."""
+    return rate_hz >= _ON_RATE * _FAST_HZ
+
+
 def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = None) -> tuple[SlowSignal, ...]:
     """Find signals of a table as logged whose updates come at less than half the rate of the rows.
 
@@ -64,7 +71,7 @@ def slow_signals(table: SignalTable, stamped_hz: Mapping[str, float] | None = No
         if name in found and 0 < 2 * own <= rate:
             seen = found[name]
             if seen is None or seen.rate_hz > _REGULAR_SHARE * own:
-                held = name in COMMANDS and own >= FAST_HZ
+                held = name in COMMANDS and is_fast(own)
                 found[name] = SlowSignal(name, own, "repeated" if held else "interpolated")
     return tuple(signal for signal in found.values() if signal is not None)
 
@@ -77,14 +84,14 @@ def _slow(name: str, time: Array, values: Array) -> SlowSignal | None:
     steps, step = np.diff(values, axis=0), float(np.median(np.diff(time)))
     updates = np.flatnonzero((steps != 0).any(axis=1))
     if _regular(updates, fewest=2):
-        return SlowSignal(name, float(1 / (step * np.diff(updates).mean())), "repeated")
+        return SlowSignal(name, 1 / (step * _apart(updates)), "repeated")
     bends = np.abs(np.diff(steps / np.diff(time)[:, None], axis=0))
     straight = np.all(bends <= _STRAIGHT * np.quantile(bends, 0.95, axis=0), axis=1)
     knots = np.flatnonzero(~straight & np.concatenate([[True], straight[:-1]]))
     if _regular(knots, fewest=_ROWS_OF_KNOT + 1):
         usual = float(np.median(np.diff(knots)))
         if straight.mean() >= _REGULAR_SHARE * (usual - _ROWS_OF_KNOT) / usual:
-            return SlowSignal(name, float(1 / (step * np.diff(knots).mean())), "interpolated")
+            return SlowSignal(name, 1 / (step * _apart(knots)), "interpolated")
     return None
 
 
@@ -93,30 +100,57 @@ def _regular(updates: IntArray, fewest: int) -> bool:
     if len(updates) < _FEWEST_UPDATES:
         return False
     apart = np.diff(updates)
-    usual = float(np.median(apart))
-    near = np.abs(apart - usual) <= max(1.0, 0.25 * usual)
+    usual, near = float(np.median(apart)), _near(apart)
     return bool(usual >= fewest and near.mean() >= _REGULAR_SHARE and (apart < fewest).mean() <= _LARGEST_SHARE_AT_ONCE)
 
 
-def between_updates(values: Array) -> Array:
-    """Put straight lines between updates that rows repeat, shape (row, column), each at its first row.
+def _near(apart: IntArray) -> BoolArray:
+    usual = float(np.median(apart))
+    return np.asarray(np.abs(apart - usual) <= max(1.0, 0.25 * usual))
+
+
+def _apart(updates: IntArray) -> float:
+    """Give the rows from one update to the next, without pauses in which nothing changes, as of rotors that idle."""
+    apart = np.diff(updates)
+    return float(apart[_near(apart)].mean())
+
+
+def between_updates(values: Array, apart: float) -> Array:
+    """Put straight lines between updates that rows repeat, shape (row, column), `apart` rows from each to the next.
 
     What is repeated comes late by half the time between updates, and its steps fold into slow motion where a window
-    moves on by about that time. An update that was put on another clock may take two rows, of which the second has it.
+    moves on by about that time. An update that was put on another clock takes some rows, of which the last has it.
+    What stays for longer than usual, as of rotors that idle, does so until the update before the one that changes it.
+    What was low-passed has no updates left: the mean of what follows lies on the same lines, low-passed.
     """
     steps = np.abs(np.diff(values, axis=0))
     # On another clock that is off by rounding the second row changes by rounding.
-    updates = np.flatnonzero(np.append(True, (steps > _ROUNDING * steps.max(axis=0)).any(axis=1)))
-    at_once = np.diff(updates) == 1
-    updates = updates[~np.append(at_once, False) | np.append(False, at_once)]
-    if len(updates) < _FEWEST_UPDATES:
-        return values
-    return np.column_stack([np.interp(np.arange(len(values)), updates, own) for own in values[updates].T])
+    changed = (steps > _ROUNDING * steps.max(axis=0, initial=0.0)).any(axis=1)
+    updates = np.flatnonzero(np.append(True, changed))
+    first = np.append(True, np.diff(updates) > 1)
+    last = np.append(first[1:], True)
+    runs = np.bincount(np.cumsum(first) - 1)
+    longest = max(_ROWS_OF_KNOT, 0.5 * apart)
+    if np.median(runs) > longest:
+        return _mean_ahead(values, apart)
+    updates = updates[last | (np.repeat(runs, runs) > longest) & ~first]
+    usual = round(apart)
+    stayed = np.diff(updates) > _STAYED * usual
+    knots = np.union1d(updates, updates[1:][stayed] - usual)
+    return np.column_stack([np.interp(np.arange(len(values)), knots, own) for own in values[knots].T])
+
+
+def _mean_ahead(values: Array, rows: float) -> Array:
+    row = np.arange(len(values))
+    padded = np.concatenate([np.zeros((1, values.shape[1])), values, np.repeat(values[-1:], int(rows) + 1, axis=0)])
+    total = np.cumsum(padded, axis=0)
+    ahead = [np.interp(row + rows, np.arange(len(total)), own) for own in total.T]
+    return np.asarray((np.column_stack(ahead) - total[: len(values)]) / rows)
 
 
 def warn_of_slow(slow: tuple[SlowSignal, ...], rate_hz: float) -> Iterator[str]:
     """Say of signals that are slower than the clock, and slower than 100 Hz, how slow they are and what that costs."""
-    for signal in (own for own in slow if own.rate_hz < FAST_HZ):
+    for signal in (own for own in slow if not is_fast(own.rate_hz)):
         between, cost = "lie on a straight line between two updates", "knows"
         if signal.between == "repeated":
             between, cost = "repeat the last value", f"is {500 / signal.rate_hz:.3g} ms late on average, and knows"

@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.bandwidth import FAST_HZ
+from cpfls_cli.flightlog.bandwidth import is_fast
 from cpfls_cli.flightlog.conversion import columns_in_words, present_choices
 from cpfls_cli.flightlog.repair import align_quaternion_signs, increasing_rows, unwrap_angles
 from cpfls_cli.flightlog.settings import COMMANDS, SETPOINTS, ImportSettings, SignalMap
@@ -131,7 +131,7 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
                 if _step(clocks[topic]) > settings.gap_s:
                     slow = _slowness(topic, clocks[topic], settings.gap_s)
                     raise InputError(f"{slow}: raise import.gap_s, or leave its signals out of import.signals")
-                hold = name in COMMANDS and _step(clocks[topic]) * FAST_HZ <= _ROUNDING
+                hold = name in COMMANDS and is_fast(_values_hz(clocks[topic], values))
                 columns[column] = interpolate(clocks[topic], values, target, settings.gap_s, hold=hold)
     step, steps = _step(clocks[base]), {topic: _step(clocks[topic]) for topic in sorted(used)}
     warnings += [
@@ -180,9 +180,12 @@ def stamped_rates(topics: Topics, settings: ImportSettings) -> dict[str, float]:
         topic, field = topic_and_field(signal.columns[0])
         own = topics.get(topic, {})
         if topic and name not in SETPOINTS and field in own and STAMP in own:
-            time, _ = _present(own[STAMP], np.asarray(own[field], dtype=float))
-            rates[name] = logged_hz(time)
+            rates[name] = _values_hz(own[STAMP], own[field])
     return rates
+
+
+def _values_hz(time: Array, values: Array) -> float:
+    return logged_hz(_present(time, np.asarray(values, dtype=float))[0])
 
 
 def logged_hz(time: Array) -> float:

@@ -21,8 +21,7 @@ from cpfls_cli.consistency.findings import Finding, contradictions
 from cpfls_cli.consistency.rotors import meant_unit
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, ConfigError, CpflsError, InputError
-from cpfls_cli.flightlog import bandwidth
-from cpfls_cli.flightlog.bandwidth import between_updates
+from cpfls_cli.flightlog.bandwidth import between_updates, is_fast
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.results import Imported
 from cpfls_cli.flightlog.settings import SETPOINTS
@@ -304,12 +303,22 @@ def signals_of(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
 
 def _between_updates(signals: Signals, flight: ReadFlight) -> Signals:
     """Put rotors that were logged rarely on straight lines: no controller holds a command for so long."""
-    name = "rotor_command" if signals.commanded else "rotor_speed"
-    hz = flight.updated_hz.get(name, bandwidth.FAST_HZ)
-    if signals.rotor_speed is None or hz >= bandwidth.FAST_HZ:
+    if signals.rotor_speed is None:
         return signals
-    speed = between_updates(signals.rotor_speed) if name in flight.repeated else signals.rotor_speed
-    return replace(signals, rotor_speed=speed, rotor_span_s=1 / hz)
+    rarely = {name: hz for name, hz in flight.updated_hz.items() if not is_fast(hz)}
+
+    def lines(name: str, values: Array) -> Array:
+        held = name in rarely and name in flight.repeated
+        return between_updates(values, 1 / (rarely[name] * signals.period)) if held else values
+
+    name, command = "rotor_command" if signals.commanded else "rotor_speed", signals.rotor_command
+    return replace(
+        signals,
+        rotor_speed=lines(name, signals.rotor_speed),
+        # Commands that came late would make the lag of measured speeds shorter.
+        rotor_command=None if command is None else lines("rotor_command", command),
+        rotor_span_s=1 / rarely[name] if name in rarely else 0.0,
+    )
 
 
 def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> tuple[Signals, tuple[str, ...]]:
@@ -323,7 +332,11 @@ def _of_motion(flight: ReadFlight, known: Mapping[str, Array], study: Study) -> 
         rate = np.zeros((len(time), 3))
         notes = ("neither body rates nor attitude; taken as level and at rest, so only the balance is judged",)
     optional: dict[str, Any] = {name: known.get(name) for name in _LOGGED}
-    optional |= {name: between_updates(known[name]) for name in _INTEGRALS if name in known and name in flight.repeated}
+    optional |= {
+        name: between_updates(known[name], 1 / (flight.updated_hz[name] * float(np.median(steps))))
+        for name in _INTEGRALS
+        if name in known and name in flight.repeated
+    }
     asked = {short: known[name] for name, short in SETPOINTS.items() if name in known}
     made = Signals(
         time=time,

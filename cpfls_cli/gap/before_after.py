@@ -255,7 +255,7 @@ def before_after(
     `base`: a vehicle with effects of its own that the model comes on top of; of that as given, the base of `model` is
     part.
     """
-    windows = common_windows(held, settings)
+    windows = common_windows([*training, *held], settings)
     centres = [windows.centres(flight.time) for flight in held]
     index = np.repeat(np.arange(len(held)), [len(each) for each in centres])
     stated = held[0].vehicle

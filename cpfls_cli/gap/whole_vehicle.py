@@ -11,7 +11,7 @@ from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.hooks import VehicleParts
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import Signals, as_slow_as_rotors
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect, Refit, plain
@@ -198,7 +198,8 @@ def with_known_wrench(flights: Sequence[Signals], model: VehicleModel) -> list[S
     for flight in of_vehicle(flights, model):
         # What another model knew is no part of the rotors.
         signals = replace(flight, known_wrench=None)
-        given.append(replace(signals, known_wrench=model.wrench_along(model.acting(signals)) - signals.wrench))
+        seen = as_slow_as_rotors(signals)
+        given.append(replace(signals, known_wrench=model.wrench_along(model.acting(seen)) - seen.wrench))
     return given
 
 

@@ -146,14 +146,18 @@ def common_windows(flights: Sequence[Signals], settings: WindowSettings) -> Wind
                 "import.rate_hz to one rate for all flights"
             )
     shortest = min(flights, key=len)
-    window_s = max(settings.window_s, FEWEST_SAMPLES * max(flight.rotor_span_s for flight in flights))
+    span_s = max(flight.rotor_span_s for flight in flights)
+    window_s = max(settings.window_s, FEWEST_SAMPLES * span_s)
+    length = f"gap.window_s = {window_s:g}"
+    if window_s > settings.window_s:
+        length = f"{window_s:.3g} s, {FEWEST_SAMPLES} updates of rotors that are logged every {span_s:.2g} s"
     if window_s > len(shortest) * period:
-        raise InputError(f"gap.window_s = {window_s:g}: longer than {shortest.name}, {len(shortest) * period:.3g} s")
+        raise InputError(f"{length}: longer than {shortest.name}, {len(shortest) * period:.3g} s")
     shared = windows(period, window_s, settings.overlap)
     for flight in flights:
         if shared.count(len(flight)) < FEWEST_WINDOWS:
             raise InputError(
-                f"{flight.name}: {len(flight) * period:.3g} s are too short; "
-                f"{FEWEST_WINDOWS} windows of gap.window_s = {window_s:g} s are needed"
+                f"{flight.name}: {len(flight) * period:.3g} s are too short; {FEWEST_WINDOWS} windows of {length} are"
+                " needed"
             )
     return shared

@@ -25,7 +25,7 @@ def rarely(signals, first):
     row = np.arange(len(signals))
     held = signals.rotor_speed[np.maximum((row - first) // ROWS * ROWS + first, 0)]
     as_logged = replace(signals, rotor_speed=held)
-    return as_logged, replace(as_logged, rotor_speed=between_updates(held), rotor_span_s=ROWS * signals.period)
+    return as_logged, replace(as_logged, rotor_speed=between_updates(held, ROWS), rotor_span_s=ROWS * signals.period)
 
 
 def diagnosed(flights):

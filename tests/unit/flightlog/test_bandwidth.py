@@ -111,14 +111,55 @@ def test_what_has_stamps_of_its_own_is_as_fast_as_these_say_whatever_is_lost():
 def test_straight_lines_go_from_update_to_update_and_through_what_changes_in_every_row():
     rows = np.arange(400)
     repeated = np.column_stack([rows // 10 * 10.0] * 2)
-    between = between_updates(repeated)
+    between = between_updates(repeated, 10)
     assert np.abs(between[:390] - rows[:390, None]).max() < 1e-9
     repeated[200:240] += np.sin(rows[200:240, None])
-    assert np.abs(between_updates(repeated)[205:235] - repeated[205:235]).max() < 1e-9
+    assert np.abs(between_updates(repeated, 10)[205:235] - repeated[205:235]).max() < 1e-9
 
 
 def test_an_update_that_rounding_spreads_over_two_rows_is_at_the_first():
     rows = np.arange(400)
     repeated = np.column_stack([rows // 10 * 10.0] * 2)
     repeated[rows % 10 == 0] -= 1e-12
-    assert np.abs(between_updates(repeated)[:390] - rows[:390, None]).max() < 1e-9
+    assert np.abs(between_updates(repeated, 10)[:390] - rows[:390, None]).max() < 1e-9
+
+
+def test_what_stays_does_so_until_the_update_before_the_one_that_changes_it():
+    rows = np.arange(600)
+    true = np.where(rows < 300, 100.0, 400.0 + rows)
+    between = between_updates(true[rows // 10 * 10, None], 10)[:, 0]
+    assert (between[:290] == 100.0).all()
+    assert np.abs(between[300:590] - true[300:590]).max() < 1e-9
+
+
+def test_a_pause_without_changes_makes_no_update_slower():
+    values = held(WAVES).copy()
+    values[:400] = values[400]
+    (found,) = slow_signals(SignalTable(TIME, {"rotor_command": values}))
+    assert found.rate_hz == pytest.approx(10, rel=0.01)
+
+
+def test_updates_of_a_short_stretch_lie_on_straight_lines_too():
+    rows = np.arange(60)
+    between = between_updates((rows // 10 * 10.0)[:, None], 10)[:, 0]
+    assert np.abs(between[:50] - rows[:50]).max() < 1e-9
+    assert between_updates(np.ones((1, 4)), 10).shape == (1, 4)
+
+
+@pytest.mark.parametrize("rate_hz", [250, 62.5])
+def test_updates_that_another_clock_spreads_over_rows_lie_on_straight_lines(rate_hz):
+    clock = np.arange(0.0, 10.0, 1 / rate_hz)
+    repeated = np.interp(clock, TIME, TIME // 0.1 * 0.1)[:, None]
+    inside = (clock > 0.5) & (clock < 9.0)
+    late = clock - between_updates(repeated, 0.1 * rate_hz)[:, 0]
+    # By a row of either clock at most, where rows that repeat are late by 0.1 s.
+    assert np.abs(late[inside]).max() < 1 / rate_hz + (TIME[1] - TIME[0])
+
+
+def test_updates_that_were_low_passed_are_not_late():
+    rate_hz = 1 / float(TIME[1] - TIME[0])
+    known = slice(50, -50)
+    waves = np.sin(3 * TIME)[:, None]
+    low_passed = low_pass(held(waves), rate_hz, 20.0, 4)
+    late = np.abs(low_passed - waves)[known].max()
+    assert np.abs(between_updates(low_passed, 0.1 * rate_hz) - waves)[known].max() < 0.3 * late

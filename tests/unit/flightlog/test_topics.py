@@ -58,6 +58,16 @@ def test_own_topic_is_taken_as_it_is():
     assert warnings == ()
 
 
+@pytest.mark.parametrize("drift", [-5e-4, 0.0, 5e-4])
+def test_commands_of_a_hundred_times_a_second_stay_whatever_the_clock_and_its_rounding(drift):
+    level = np.arange(190.0)
+    stamps = np.round((1 + drift) * (0.001 + 0.01 * level) + 1e-3 * (level % 2), 6)
+    topics = {"gyro": gyro(), "fast": {"timestamp": stamps} | dict.fromkeys("abc", level)}
+    columns, _ = put(topics, body_rate=RATE, body_torque=("fast.a", "fast.b", "fast.c"))
+    found = columns["fast.a"]
+    assert set(found[np.isfinite(found)]) <= set(level)
+
+
 def test_states_and_commands_that_are_logged_rarely_are_linear_and_fast_commands_stay():
     level = np.arange(250.0)
     # 50 times a second, and 125 times.

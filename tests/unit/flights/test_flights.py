@@ -12,7 +12,7 @@ import pytest
 from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.config.study import Study, resolved_yaml
-from cpfls_cli.effects.signals import RecordedFlight, Signals, as_slow_as_rotors
+from cpfls_cli.effects.signals import RecordedFlight, Signals, as_slow_as_rotors, stretch_of
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.flightlog.results import MOTION, Flight, Imported
@@ -130,6 +130,17 @@ def test_rotors_that_are_logged_rarely_lie_on_straight_lines(hz, repeated, span_
     np.testing.assert_allclose(flight.rotor_speed[:3900], expected[:3900])
 
 
+def test_commands_of_measured_speeds_lie_on_lines_as_these_do():
+    time = 0.01 * np.arange(4000)
+    held = 500 + 50 * np.sin(time // 0.1 * 0.1)[:, None] * np.ones(4)
+    known = {"time": time, "body_rate": np.zeros((4000, 3)), "rotor_speed": held, "rotor_command": held}
+    slow = ("rotor_speed", "rotor_command")
+    read = ReadFlight("flight.csv", known, {}, (), updated_hz=dict.fromkeys(slow, 10.0), repeated=slow)
+    flight, _ = signals_of(read, known, Study())
+    np.testing.assert_array_equal(flight.rotor_command, flight.rotor_speed)
+    assert np.abs(flight.rotor_speed[:3900, 0] - 500 - 50 * np.sin(time[:3900])).max() < 1.0
+
+
 def test_motion_is_averaged_as_lines_between_updates_average_rotors():
     time, turn = 0.01 * np.arange(2000), 2 * np.pi * 2.0
     wave = np.sin(turn * time)[:, None] * np.ones(3)
@@ -138,8 +149,15 @@ def test_motion_is_averaged_as_lines_between_updates_average_rotors():
     for own in (averaged.body_rate, averaged.velocity):
         np.testing.assert_allclose(own[100:-100], np.sinc(2.0 * 0.1) ** 2 * wave[100:-100], atol=2e-3)
     assert as_slow_as_rotors(replace(flight, rotor_span_s=0.0)).body_rate is flight.body_rate
+    # Through full turns.
+    turned = np.column_stack([0 * time, 0 * time, time])
+    jumping = as_slow_as_rotors(replace(flight, attitude=(turned + np.pi) % (2 * np.pi) - np.pi)).attitude
+    np.testing.assert_allclose(jumping[100:-100], turned[100:-100], atol=1e-9)
     # As of a log with so many rows.
     assert common_windows([flight], GapSettings()).weight.size == FEWEST_SAMPLES * 10
+    # Shorter windows in the config would not help.
+    with pytest.raises(InputError, match=r"4 s are too short; 16 windows of 0.8 s, 8 updates of rotors .* every 0.1 s"):
+        common_windows([stretch_of(flight, slice(0, 400))], GapSettings())
 
 
 @pytest.fixture

@@ -181,6 +181,14 @@ def test_extension_refits_and_shrinks_the_unseen_gap():
     assert error["after"] < 0.3 * error["before"]
 
 
+def test_flights_whose_rotors_are_logged_rarely_are_judged_on_others_over_their_windows():
+    training, held = [recording_of_sines(1, damping), recording_of_sines(2, damping)], [recording_of_sines(3, damping)]
+    rarely = [replace(each, rotor_span_s=0.1) for each in training]
+    found = extend(rarely, held, [named("linear_damping")], compared(rarely).audit, SETTINGS, None)
+    shown = before_after(rarely, held, found.unseen, found.model, SETTINGS)
+    assert len(shown.residual.time) == len(found.unseen.before)
+
+
 def rerun(draw, extra=None):
     """Fly path 1 once more: the same motion and torque, with noise of its own."""
     recording = recording_of_sines(1, extra)

@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.effects.catalogue.parameter_error import inertia_correction
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS, effect
-from cpfls_cli.effects.signals import Signals
+from cpfls_cli.effects.signals import Signals, as_slow_as_rotors
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Off
 from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, nuisance
@@ -203,3 +203,14 @@ def test_what_one_model_knew_is_no_part_of_what_the_next_one_does():
     again = with_known_wrench(with_known_wrench([replace(signals(), name="flight")], model), stronger)
     np.testing.assert_allclose(again[0].wrench, once[0].wrench, rtol=1e-12)
     np.testing.assert_allclose(once[0].thrust, 1.2 * signals().thrust, rtol=1e-12)
+
+
+def test_what_a_model_knows_is_averaged_as_rotors_are_that_are_logged_rarely():
+    drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
+    rarely = replace(signals(), name="flight", rotor_span_s=10 * signals().period)
+    (given,) = with_known_wrench([rarely], VehicleModel(vehicle=QUAD, effects=(drag,)))
+    (averaged,) = with_known_wrench(
+        [replace(as_slow_as_rotors(rarely), rotor_span_s=0.0)], VehicleModel(vehicle=QUAD, effects=(drag,))
+    )
+    np.testing.assert_allclose(given.known_wrench, averaged.known_wrench, rtol=1e-12)
+    np.testing.assert_array_equal(given.velocity, rarely.velocity)
