@@ -276,7 +276,7 @@ def _longest_stretch(flight: ReadFlight, study: Study) -> tuple[Signals, tuple[s
     slow = ""
     if signals.rotor_speed is not None and hz < SLOW_HZ:
         slow = (
-            f"the {shown_slowly(hz)}: what is faster or small cannot be found; for that"
+            f"the {shown_slowly(hz)}: what is faster or small cannot be found; to find it,"
             f" {log_faster('rotors and body rates', FAST_HZ, flight.system)}"
         )
     notes = (*warnings, *notes, *doubts_on_voltage(known, flight.units))
