@@ -180,7 +180,7 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     known = [named for group in groups for named in _known_to_systems(group, system)]
     names = {column for group in groups for column in group.columns}
     held = {(named.known, named.group.columns) for named in known}
-    # What is asked for counts too where a topic stands before more than an axis, as nobody else names it.
+    # What is asked for counts too where its name has more than a topic and an axis, as nobody else names it.
     held |= {
         (own.system, own.columns)
         for own in vocabulary.KNOWN

@@ -37,7 +37,11 @@ instruments, and of a rival against the chosen set."""
 class GapSettings(Settings):
     """Settings of `cpfls compare`, `diagnose`, `extend` and `gap`."""
 
-    window_s: Annotated[float, Gt(0), Doc("length of the smooth windows over which torques are compared, s")] = 0.4
+    window_s: Annotated[
+        float,
+        Gt(0),
+        Doc("length of the smooth windows over which torques are compared, s; at least eight updates of the rotors"),
+    ] = 0.4
     overlap: Annotated[float, Ge(0), Lt(1), Doc("share that neighbouring windows have in common")] = 0.5
     block_s: Annotated[float, Gt(0), Doc("length of the blocks that cross-validation leaves out, s")] = BLOCK_S
     shifts: Annotated[int, Ge(39), Doc("circular time shifts that say what chance alone explains")] = 199
