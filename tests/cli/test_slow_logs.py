@@ -39,10 +39,16 @@ def test_init_says_what_to_set(slow):
     assert f"log them at 100 Hz or more ({CURE}" in slow[-1].stderr
 
 
-def test_vehicle_says_it_first_and_fits_only_what_can_be_said(cpfls, slow):
+@pytest.fixture(scope="module")
+def found(cpfls, slow):
+    """The vehicle of these logs, and what was said."""
     config, first, second, _ = slow
     output = config.with_name("vehicle.h5")
-    result = cpfls.done("vehicle", config, first, "--held-out", second, "-o", output)
+    return output, cpfls.done("vehicle", config, first, "--held-out", second, "-o", output)
+
+
+def test_vehicle_says_it_first_and_fits_only_what_can_be_said(found):
+    output, result = found
     assert result.stderr.startswith("vehicle: The rotors are logged 10 times a second")
     # What to set is said once, in the answer.
     assert (result.stdout.count("SDLOG_PROFILE"), result.stderr.count("SDLOG_PROFILE")) == (1, 0)
@@ -55,9 +61,9 @@ def test_vehicle_says_it_first_and_fits_only_what_can_be_said(cpfls, slow):
     assert abs(summary["parameters"]["rotors.thrust_factor_n_s2"]["value"] / 6e-6 - 1) < 0.02
 
 
-def test_tune_asks_for_faster_logs_before_a_flight(cpfls, slow):
+def test_tune_asks_for_faster_logs_before_a_flight(cpfls, slow, found):
     config = slow[0]
-    result = cpfls("tune", config, config.with_name("vehicle.h5"), "--autopilot", "px4", "-o", config.with_name("g.h5"))
+    result = cpfls("tune", config, found[0], "--autopilot", "px4", "-o", config.with_name("g.h5"))
     assert result.exit_code == 2
     assert result.stderr.index(CURE) < result.stderr.index("cpfls trajectory")
 
