@@ -18,6 +18,8 @@ from cpfls_cli.units import known_unit
 Topics = Mapping[str, Mapping[str, Array]]
 STAMP = "timestamp"  # The field of a topic that holds its time stamps.
 REBUILT = "rebuilt"  # The topic of commands of rotors that are rebuilt (`flightlog.rebuilt`).
+# The topic that a reader adds, of turns of the estimated yaw that it has undone: when, and `turn`, rad.
+YAW_RESETS = "yaw_resets"
 _ANGLES_THAT_JUMP = (0, 2)
 # Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it.
 _STEPS_HELD = 3

@@ -29,7 +29,8 @@ _LONGEST_LINE = 1 << 20
 _LONGEST_ROW = 64  # Lines of the first row.
 _LONGEST_LIST = 50  # Numbers of a list that becomes columns: of a vehicle nothing is longer, a scan is.
 _REMARKS: Final = ("#", "%", "//")  # With which a remark before the column names begins.
-_EXPORT: Final = '"Product","Blackbox flight data recorder'  # With which what Betaflight's log viewer exports begins.
+# With which what Betaflight's log viewer exports begins; a spreadsheet drops the quotes and fills lines with commas.
+_EXPORT: Final = re.compile(r'"?Product"?,"?Blackbox flight data recorder')
 # A number as it is written in much of Europe, where semicolons separate columns.
 _DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
 
@@ -44,6 +45,9 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
                 break
             first = {name: own.strip() or later for (name, own), later in zip(first.items(), row, strict=True)}
     numeric = [name for name in names if name in first and _kind(first[name])]
+    if names.count("") > 1:
+        # As of a spreadsheet that filled its lines.
+        numeric = [name for name in numeric if name]
     if stated:
         columns = read_csv(path, set(numeric))
         held = [name for name in numeric if np.isfinite(columns[name]).any()]
@@ -126,8 +130,8 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     while header.startswith(_REMARKS):
         remark, header, line = header.lstrip("#%/ "), next(lines, ""), line + 1
     stated = {}
-    if header.startswith(_EXPORT):
-        while len(pair := _fields(header)) == 2:
+    if _EXPORT.match(header):
+        while len(pair := _fields(header)) > 1 and not any(pair[2:]):
             stated[pair[0]] = pair[1]
             header, line = next(lines, ""), line + 1
     if len(header) == _LONGEST_LINE:

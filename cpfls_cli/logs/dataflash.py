@@ -10,9 +10,11 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.topics import STAMP
-from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, SDLOG2, TABLE_ENDS, LogContents
-from cpfls_cli.logs.records import bytes_of, date, numbers, plain, seconds, table
+from cpfls_cli.flightlog.topics import STAMP, YAW_RESETS
+from cpfls_cli.logs.formats import DATAFLASH_MAGIC, DATAFLASH_TEXT_MAGIC, SDLOG2_MAGIC, TABLE_ENDS, LogContents
+from cpfls_cli.logs.records import bytes_of, date, numbers, plain, seconds, stamps_while, table, undone_turns
+from cpfls_cli.logs.sdlog2 import is_sdlog2, of_messages
+from cpfls_cli.rotations import wrapped
 
 _HEAD = b"\xa3\x95"
 _OF_FORMATS = 0x80
@@ -44,6 +46,10 @@ _GPS_BEGAN, _WEEK_S = 315_964_800 - 18, 604_800
 _INSTANCE, _INSTANCES = "#", ("I", "Instance", "C", "IMU")  # And fields that hold it where no unit says so.
 _MOST_INSTANCES = 16
 _NO_FACTOR = "-?0"
+# Events of Copter: the estimated yaw is reset; what ends a stand on the ground, and a flight.
+_YAW_RESET, _TAKES_OFF, _LANDS = 62, (28,), (11, 18)
+# The attitude is logged 10 times a second; below this, rad, its stamps and the gyroscope's make such turns as well.
+_RESET_WITHIN_S, _LEAST_TURN = 0.25, 0.05
 _SCALED = "cCeEL"
 # Our names of units that ArduPilot calls otherwise.
 _UNITS = {"m/s/s": "m/s^2", "degheading": "deg", "RPM": "rpm", "PWM": "us"}
@@ -71,8 +77,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     del wanted
     content = bytes_of(path)
     text = re.search(rb"^" + DATAFLASH_TEXT_MAGIC, content[:_HEAD_BYTES], re.MULTILINE)
-    if DATAFLASH_MAGIC in content[:_HEAD_BYTES]:
-        kinds, lost = _find_messages(content, content.index(DATAFLASH_MAGIC))
+    if DATAFLASH_MAGIC in content[:_HEAD_BYTES] or content.startswith(SDLOG2_MAGIC):
+        kinds, lost = _find_messages(content, max(content[:_HEAD_BYTES].find(DATAFLASH_MAGIC), 0))
         tables = {kind.name: table(content, kind.begins, kind.record) for kind in kinds.values() if kind.begins}
     elif text is not None:
         kinds, tables, lost = _read_lines(content[text.start() :])
@@ -147,8 +153,8 @@ def _of_tables(
         if kind.name in tables and kind.name in stamps
         for topic, fields in _topics(kind, tables[kind.name], stamps[kind.name], stated.get(kind.name, {}))
     }
-    if not topics and ("TIME" in tables or path.suffix.lower() == ".px4log"):
-        raise InputError(f"{path}: {SDLOG2}")
+    if not topics and is_sdlog2(tables):
+        return of_messages(path, {kind.name: kind.begins for kind in kinds.values()}, tables)
     if topics.keys() <= {"GPS", *_EVENTS} and "ATT" in tables:
         raise InputError(f"{path}: {_NO_STAMPS}")
     if not topics:
@@ -157,6 +163,7 @@ def _of_tables(
     for fields in topics.values():
         # Whole microseconds again: a difference of two large numbers of seconds is none.
         fields[STAMP] = np.round(fields[STAMP] - origin, 6)
+    _undo_yaw_resets(topics)
     units = {
         f"{topic}.{each}": unit
         for topic, fields in topics.items()
@@ -173,6 +180,35 @@ def _of_tables(
     begins, flown_at = {"": float(origin)}, _flown_at(topics.get("GPS", {}))
     warnings = (broken,) if lost else ()
     return LogContents(topics, units, parameters, _system(tables), warnings, flown_at, begins, tuple(said))
+
+
+def _undo_yaw_resets(topics: dict[str, dict[str, Array]]) -> None:
+    """Turn attitudes, and those asked for, to the yaw that the estimator holds in flight.
+
+    ArduPilot says when it resets its yaw, and not by how much: by what the attitude turns there beyond the gyroscope.
+    """
+    event, attitude, gyro = (topics.get(name, {}) for name in ("EV", "ATT", "IMU"))
+    known = event.keys() >= {"Id"} and attitude.keys() >= {"Roll", "Pitch", "Yaw"} and gyro.keys() >= {"GyrY", "GyrZ"}
+    if not known or min(len(attitude[STAMP]), len(gyro[STAMP])) < 2:
+        return
+    time, read = attitude[STAMP], gyro[STAMP]
+    roll, pitch, yaw = (np.radians(attitude[name]) for name in ("Roll", "Pitch", "Yaw"))
+    leant, nose = (np.interp(read, time, own) for own in (roll, pitch))
+    rate = (gyro["GyrY"] * np.sin(leant) + gyro["GyrZ"] * np.cos(leant)) / np.cos(nose)
+    turned = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(read)))
+    beyond = np.asarray(wrapped(np.diff(yaw) - np.diff(np.interp(time, read, turned))))
+    rows = set()
+    for at in event[STAMP][event["Id"] == _YAW_RESET]:
+        near = np.flatnonzero((time[1:] >= at - _RESET_WITHIN_S) & (time[:-1] <= at + _RESET_WITHIN_S))
+        rows |= {int(near[np.abs(beyond[near]).argmax()])} if len(near) else set()
+    kept = np.array([row for row in sorted(rows) if abs(beyond[row]) > _LEAST_TURN], dtype=int)
+    if len(kept):
+        topics[YAW_RESETS] = {STAMP: time[kept + 1], "turn": beyond[kept]}
+        takes_off, lands = (np.isin(event["Id"], own) for own in (_TAKES_OFF, _LANDS))
+        aloft = stamps_while(time, event[STAMP][takes_off | lands], takes_off[takes_off | lands])
+        turns = np.degrees(undone_turns(time, time[kept + 1], beyond[kept], aloft))
+        for name in {"Yaw", "DesYaw"} & attitude.keys():
+            attitude[name] = (attitude[name] + turns) % 360.0
 
 
 def _all_stamps(kinds: Mapping[int, _Kind], tables: Mapping[str, np.ndarray]) -> dict[str, Array]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 _ENCRYPTED_MAGIC = b"ULogEnc"
 DATAFLASH_MAGIC = b"\xa3\x95\x80\x80"
+SDLOG2_MAGIC = b"\xa3\x95\x80"
 DATAFLASH_TEXT_MAGIC = b"FMT, 128, "
 BLACKBOX_MAGIC = b"H Product:Blackbox flight data recorder"
 USD_MAGIC = b"\xbc"
@@ -111,6 +112,7 @@ LOG_FORMATS = (
     LogFormat(".parquet", "Parquet", "Parquet", b"PAR1", f"{_READERS}parquet_log", *_PYARROW),
     LogFormat(".ulg", "ULog", "ULog", ULOG_MAGIC, f"{_READERS}ulog"),
     LogFormat(".bin", "ArduPilot DataFlash", "a DataFlash log", DATAFLASH_MAGIC, f"{_READERS}dataflash"),
+    LogFormat(".px4log", "PX4 sdlog2", "a log of PX4 before ULog (sdlog2)", SDLOG2_MAGIC, f"{_READERS}dataflash"),
     LogFormat(".log", "ArduPilot DataFlash", "a DataFlash log in text", DATAFLASH_TEXT_MAGIC, f"{_READERS}dataflash"),
     LogFormat(".bbl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, f"{_READERS}blackbox"),
     LogFormat(".bfl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, f"{_READERS}blackbox"),
@@ -290,9 +292,6 @@ _SLOW: Final = (
     "it comes twice a second or so, which is too slow; give the log that the flight controller writes itself (.bbl,"
     " .bin, .ulg)"
 )
-_CONVERT_SDLOG2: Final = (
-    "convert it to CSV with sdlog2_dump.py of that firmware, or update the firmware, which then writes .ulg"
-)
 # What a file begins with, at which place, what it is called, and the way to a log.
 _FOREIGN: Final = (
     (b"#ROSBAG V", 0, "a bag of ROS 1", "make a bag of ROS 2 of it with rosbags-convert (package rosbags)"),
@@ -307,7 +306,6 @@ _FOREIGN: Final = (
     (b"\x93NUMPY", 0, "an array of NumPy", "write it as CSV, HDF5 or .mat, with a name for each column"),
     (b"version https://git-lfs", 0, "a pointer of Git LFS", "fetch it with `git lfs pull`"),
     (b"BUILD", 16, "a .DAT of DJI", "convert it to CSV with DatCon or its like"),
-    (b"\xa3\x95\x80", 0, "a log of PX4 before ULog (sdlog2)", _CONVERT_SDLOG2),
     (b"%PDF", 0, "a PDF", "give the log that it shows"),
     (b"\x89PNG", 0, "a picture", "give the log that it shows"),
     (b"\xff\xd8\xff", 0, "a picture", "give the log that it shows"),
@@ -352,6 +350,3 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
     if suffix != ".csv" and _NUMBERS.match(text):
         return "a table of numbers without names", f"{NAME_COLUMNS}, and let its name end in .csv"
     return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)
-
-
-SDLOG2: Final = f"a log of PX4 before ULog (sdlog2), and no log that can be read: {_CONVERT_SDLOG2}"

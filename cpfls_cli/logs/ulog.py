@@ -14,11 +14,14 @@ import pyulog
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.topics import STAMP
+from cpfls_cli.flightlog.topics import STAMP, YAW_RESETS
 from cpfls_cli.logs.formats import ULOG_MAGIC, LogContents
-from cpfls_cli.logs.records import date, numbers, plain, seconds
+from cpfls_cli.logs.records import date, numbers, plain, seconds, stamps_while, undone_turns
+from cpfls_cli.rotations import wrapped
 
 _PER_SECOND = 10**6
+_QUATERNION = tuple(f"q[{each}]" for each in range(4))
+_ASKED_FOR = tuple(f"q_d[{each}]" for each in range(4))
 _RECEIVERS = ("vehicle_gps_position", "sensor_gps")
 _HEADER_BYTES, _LONGEST_MESSAGE = 16, 65535
 _FIELD = re.compile(r"([^;\s\[]+)(?:\[(\d+)\])? [^;]*")
@@ -40,6 +43,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     }
     if not topics:
         raise InputError(f"{path}: a ULog file without samples: was the logger stopped at once, or the file cut off?")
+    _undo_yaw_resets(topics)
     begins = {"": origin / _PER_SECOND}
     # Of a version that is no release too; old logs do not state it as a number.
     version = log.get_version_info() if isinstance(log.msg_info_dict.get("ver_sw_release"), int) else None
@@ -95,6 +99,37 @@ def _refuse_endless(path: Path, stream: BinaryIO) -> None:
             raise InputError(
                 f"{path}: a broken ULog file: its message '{name}' would take more than {_LONGEST_MESSAGE} bytes"
             )
+
+
+def _undo_yaw_resets(topics: dict[str, dict[str, Array]]) -> None:
+    """Turn attitudes, and those asked for, to the yaw that the estimator holds in flight: PX4 states each reset."""
+    attitude = topics.get("vehicle_attitude", {})
+    stated = ("quat_reset_counter", "delta_q_reset[0]", "delta_q_reset[3]", STAMP)
+    if not attitude.keys() >= {*stated, *_QUATERNION}:
+        return
+    counted, cosine, sine, stamps = (attitude[name] for name in stated)
+    # The counter has eight bits; of two resets between two rows only the second is stated.
+    rows = np.flatnonzero(np.diff(counted) % 256 == 1) + 1
+    rows = rows[np.isfinite(cosine[rows]) & np.isfinite(sine[rows])]
+    if not len(rows):
+        return
+    # A quaternion and its negative are one turn.
+    turns = np.asarray(wrapped(2 * np.arctan2(sine[rows], cosine[rows])))
+    resets = stamps[rows]
+    topics[YAW_RESETS] = {STAMP: resets, "turn": turns}
+    landed = topics.get("vehicle_land_detected", {})
+    states = (landed[STAMP], landed["landed"] == 0) if landed.keys() >= {STAMP, "landed"} else (np.empty(0), np.empty(0))
+    aloft = stamps_while(stamps, *states)
+    for topic, names in (("vehicle_attitude", _QUATERNION), ("vehicle_attitude_setpoint", _ASKED_FOR)):
+        fields = topics.get(topic, {})
+        if not fields.keys() >= {STAMP, *names}:
+            continue
+        half = 0.5 * undone_turns(fields[STAMP], resets, turns, aloft)
+        w, x, y, z = (fields[name] for name in names)
+        c, s = np.cos(half), np.sin(half)
+        fields |= dict(zip(names, (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w), strict=True))
+        if "yaw_body" in fields:
+            fields["yaw_body"] = np.asarray(wrapped(fields["yaw_body"] + 2 * half))
 
 
 def _flown_at(topics: Mapping[str, Mapping[str, Array]]) -> float:

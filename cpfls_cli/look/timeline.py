@@ -14,7 +14,7 @@ from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.flightlog.crash import BEYOND, HARD
 from cpfls_cli.flightlog.names import is_of
 from cpfls_cli.flightlog.recognised import Recognition
-from cpfls_cli.flightlog.topics import STAMP, Topics
+from cpfls_cli.flightlog.topics import STAMP, YAW_RESETS, Topics
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
 from cpfls_cli.look.flight import LogFlight, Samples
 from cpfls_cli.result import about, result
@@ -320,18 +320,13 @@ def _of_px4(topics: Topics) -> Iterator[Event]:
 
 
 def _yaw_resets(flight: LogFlight, topics: Topics) -> Iterator[Event]:
-    """Say by how much PX4 turns its estimate at once: the attitudes before and after are not of one motion."""
-    time, counted = _field(topics, "vehicle_attitude", "quat_reset_counter")
-    cosine, sine = (_field(topics, "vehicle_attitude", f"delta_q_reset[{each}]")[1] for each in (0, 3))
-    for row in np.flatnonzero(np.diff(counted)) + 1 if len(cosine) == len(sine) == len(counted) else ():
-        # A quaternion and its negative are one turn.
-        half, at = np.arctan2(np.copysign(sine[row], sine[row] * cosine[row]), abs(cosine[row])), float(time[row])
-        turn = float(np.degrees(2 * half))
+    """Say by how much an autopilot turns its estimate at once, which its reader has undone."""
+    for at, turn in zip(*_field(topics, YAW_RESETS, "turn"), strict=True):
         flies = flight.flown[min(int(np.searchsorted(flight.time, at)), len(flight.time) - 1)]
-        if flies and abs(turn) > _JUMP_DEG:
-            text = f"estimated yaw is reset by {turn:.0f} deg".replace("-", "−")
-            text += ", which no gyroscope shows: keep one side of it (import.crop_s)"
-            yield Event(time_s=at, kind="reset", text=text, severity="warning")
+        if flies and abs(np.degrees(turn)) > _JUMP_DEG:
+            text = f"estimated yaw is reset by {np.degrees(turn):.0f} deg".replace("-", "−")
+            text += ", which no gyroscope shows: undone, what is before it is turned by as much"
+            yield Event(time_s=float(at), kind="reset", text=text, severity="warning")
 
 
 def _modes(changes: Iterator[tuple[float, float]], names: str) -> Iterator[Event]:
