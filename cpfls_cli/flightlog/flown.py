@@ -40,6 +40,8 @@ _WORKS, _CLIMBS_M, _UNFELT = 1.0, 3.0, 0.12
 # Rate, also as a share of that in flight, from which on what idles falls or flips, and does not stand; force in weights
 # below which it falls, on the mean over s.
 _TURNS_RAD_S, _OF_TURNING, _FALLS, _TURN_S = 0.2, 0.3, 0.3, 0.2
+# Slow force in weights that nothing but rotors gives, and share of the hover level by others below which it counts.
+_LIFTS, _OF_CLIMB = 1.15, 0.8
 _LONGEST_CUT_S = 3.0  # Longer than that no throttle is cut in flight: a fall of 44 m.
 _MOST_CLOCK_HZ = 50.0  # Rate that is enough to find a flight.
 _STAND = "the rotors stand still or idle"  # Of some logs no command is both.
@@ -204,6 +206,13 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         # By the mean force, in which vibration is none.
         of_hover = level / np.sqrt(np.maximum(np.linalg.norm(averaged(signs.felt, signs.period, _TURN_S), axis=1), 1.0))
     hover = float(np.median(of_hover[level > _OF_LARGEST * largest]))
+    if signs.felt is not None:
+        # In a fast climb rotors give less thrust: it hovers at no more than the level at which it is lifted.
+        hits = np.linalg.norm(signs.felt, axis=1) > HARD
+        lifted = np.linalg.norm(averaged(signs.felt, signs.period, SLOW_S), axis=1) > _LIFTS
+        lifted &= (level > ALIVE) & ~binary_dilation(hits, np.ones(2 * max(1, round(SLOW_S / signs.period)) + 1))
+        least = float(np.quantile(of_hover[lifted], 0.25)) if lifted.sum() * signs.period > _SHORT_S else hover
+        hover = least if least < _OF_CLIMB * hover else hover
     carrying = np.asarray(level > _OF_HOVER * hover, dtype=bool)
     if signs.rate is not None and carrying.any():
         # Idling rotors shake what stands on the ground, and do not turn it.

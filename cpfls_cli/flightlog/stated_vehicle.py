@@ -341,6 +341,9 @@ def log_faster(what: str, least_hz: float, *systems: str, parameters: Parameters
         for begin, cures in TABLE["log_faster"].items()
         if system.startswith(begin)
     )
+    if "SDLOG_RATE" in parameters and "SDLOG_PROFILE" not in parameters:
+        # Before ULog; -1 leaves the rate to the script that starts the logger.
+        known = dict.fromkeys(["PX4: SDLOG_RATE = 200, then restart"])
     said = [f"{asked} ({joined(known)})"] if known else []
     ours = (system for system in systems if system.startswith(_COPTER))
     said += dict.fromkeys(_of_copter(system, parameters) for system in ours)

@@ -411,8 +411,10 @@ def _at_limit(flight: LogFlight, after_s: float) -> Iterator[Event]:
     limits = len(plateaus) >= _FEWEST_PLATEAUS or any(np.ptp(each, axis=0).max() > _ROUNDED for each in long)
     if most < _FULL and not (limits and flight.rotors_source == "logged"):
         return
+    width = max(1, round(_LIMIT_S / float(np.median(np.diff(time)))))
     for rotor, column in enumerate(((values >= most - _STEP) & flown).T):
-        held = list(_held(time, column, _LIMIT_S))
+        # What oscillates as it asks for more than there is is at its limit most of the time.
+        held = list(_held(time, uniform_filter1d(column.astype(float), width) > 0.5, _LIMIT_S))
         if held:
             total, longest = sum(b - a for a, b in held), max(b - a for a, b in held)
             times = "once" if len(held) == 1 else f"{len(held)} times"

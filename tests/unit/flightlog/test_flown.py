@@ -251,6 +251,19 @@ def test_who_mostly_climbs_hovers_below_the_usual_level():
     assert flown.span_s == (pytest.approx(2.5, abs=0.1), pytest.approx(37.5, abs=0.1))
 
 
+def test_who_climbs_fast_for_most_of_a_flight_hovers_below_what_the_climb_takes():
+    """At full throttle it feels little more than its weight, against the air; then it flips, and hovers."""
+    times = [0, 2, 3, 4, 6, 20, 20.5, 22.5, 23, 38, 38.5]
+    level = np.interp(TIME, times, [0, 0, 0.3, 0.36, 0.6, 1.0, 0.1, 0.1, 0.3, 0.28, 0])
+    force = np.interp(TIME, [0, 3, 3.5, 20, 20.5, 22.5, 23], [1, 1, 1.35, 1.25, 0.2, 0.2, 1.0])
+    wobbles = between(4, 37, 0.1) * np.sin(2 * TIME)
+    rate = np.column_stack([turning(3, 38.2, 0.3) + between(20.5, 22.5, 8.0), 0 * TIME, 0 * TIME])
+    level, force = level * (1 + wobbles), force * (1 + 2 * wobbles)
+    rotors, felt = np.repeat(level[:, None], 4, axis=1), np.column_stack([0 * TIME, 0 * TIME, force])
+    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=felt))
+    assert flown.span_s == (pytest.approx(3.5, abs=0.3), pytest.approx(37.7, abs=0.3))
+
+
 @pytest.mark.parametrize("held", [False, True])
 def test_a_sensor_off_the_centre_of_what_vibrates_shows_no_test_stand(held):
     """A vibration of 8 Hz turns with the force that its lever makes; on a stand the weight turns slowly too."""

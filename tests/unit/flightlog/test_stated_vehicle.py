@@ -104,6 +104,8 @@ def test_a_crazyflie_that_logs_fast_enough_gets_no_setting_that_slows_it():
 
 
 def test_of_unknown_writers_nothing_is_named_and_of_known_ones_each_once():
+    before_ulog = log_faster("rotors", 50.0, "PX4", parameters={"SDLOG_RATE": -1.0})
+    assert before_ulog == "log rotors at 50 Hz or more (PX4: SDLOG_RATE = 200, then restart)"
     assert log_faster("rotors", 50.0, "ROS 2") == log_faster("rotors", 50.0) == "log rotors at 50 Hz or more"
     words = log_faster("rotors", 50.0, "PX4 1.14.3", "PX4 1.15.0", "ArduCopter 4.5.7")
     assert [words.count(name) for name in ("SDLOG_PROFILE", "LOG_BITMASK")] == [1, 1]

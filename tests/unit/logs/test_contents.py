@@ -34,7 +34,7 @@ from cpfls_cli.logs.formats import (
     suffixes_in_words,
 )
 from tests.builders import blackbox_logs, ulogs
-from tests.builders.dataflash_logs import dataflash, definition
+from tests.builders.dataflash_logs import dataflash
 from tests.builders.ros_bags import BEGIN_NS, imu, write_bag
 
 
@@ -57,6 +57,11 @@ def test_of_a_csv_only_what_is_wanted_is_read(tmp_path):
     assert listed(log_contents(path, ["roll"])) == {"": {"t": [], "roll": [1, 2], "mode": []}}
     with pytest.raises(InputError, match=r"log\.csv:2: column 'mode' = 'hover': not a number"):
         log_contents(path, ["mode"])
+
+
+def test_columns_without_names_that_a_spreadsheet_adds_are_none(tmp_path):
+    (tmp_path / "log.csv").write_text("t,roll,,\n0,1,,\n1,2,,\n")
+    assert listed(log_contents(tmp_path / "log.csv"))[""] == {"t": [0, 1], "roll": [1, 2]}
 
 
 def test_a_ulog_holds_topics_and_what_px4_knows_of_the_vehicle(tmp_path):
@@ -195,7 +200,8 @@ def test_the_page_on_import_describes_every_format():
 
 
 def test_words():
-    suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .log, .bbl, .bfl, Crazyflie uSD, .db3, .mcap, .h5, .hdf5 or .mat"
+    suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl, .bfl, Crazyflie uSD"
+    suffixes += ", .db3, .mcap, .h5, .hdf5 or .mat"
     assert suffixes_in_words() == suffixes
     formats = "CSV, Parquet, ULog, ArduPilot DataFlash, Betaflight blackbox, Crazyflie uSD, ROS 2 bag, HDF5, MATLAB"
     assert formats_in_words() == formats
@@ -720,7 +726,6 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.bin.gz", b"\x1f\x8b\x08" + bytes(9), "data compressed by gzip", "unpack it first"),
         ("a.tar", tape(), "a tar archive", "unpack it first"),
         ("a.xlsx", archive(xl_book="x"), "a spreadsheet", "save its table as CSV"),
-        ("a.px4log", definition(0x80, "FMT", "BBnZ", "Type,Length"), "a log of PX4 before ULog (sdlog2)", "to CSV"),
         ("a.npy", array(), "an array of NumPy", "a name for each column"),
         ("a.ulg", b"version https://git-lfs.github.com/spec/v1\n", "a pointer of Git LFS", "git lfs pull"),
         ("a.DAT", bytes(16) + b"BUILD 2019", "a .DAT of DJI", "to CSV"),
@@ -728,7 +733,6 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.kml", b"<kml>", "a KML track", "log of the autopilot"),
         ("a.csv", b"<!DOCTYPE html>\n<html>a,b", "a web page", "save the log itself"),
         ("a.csv", b'{"t": 1,\n', "JSON", "write its numbers as CSV"),
-        ("a.px4log", b"\xa3\x95\x80\x027ATT" + bytes(80), "a log of PX4 before ULog (sdlog2)", "to CSV"),
         ("a.log", b"[2024-06-13 11:56:33.1] [0x7f] Time [s], x [m]\n", "text with a stamp in brackets", "as CSV"),
         (
             "a.csv",
@@ -764,14 +768,6 @@ def test_a_file_that_is_no_log_is_named_with_the_way_to_one(tmp_path, name, cont
     said = str(caught.value)
     assert said.startswith(f"{path}: {what}")
     assert way in said
-
-
-def test_messages_of_sdlog2_are_distinguished_from_those_of_dataflash_whatever_the_name(tmp_path):
-    kinds = {"TIME": ("Q", "StartTime"), "ATT": ("fff", "Roll,Pitch,Yaw"), "PARM": ("Nf", "Name,Value")}
-    path = tmp_path / "log.bin"
-    path.write_bytes(dataflash(kinds | {"MSG": ("Z", "Message")}, [("TIME", (5,)), ("ATT", (0.1, 0.2, 0.3))]))
-    with pytest.raises(InputError, match="sdlog2"):
-        log_contents(path)
 
 
 def test_a_log_is_no_foreign_file(tmp_path):

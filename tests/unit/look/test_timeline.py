@@ -143,31 +143,14 @@ def test_what_climbs_has_not_landed():
         assert bool(of(events(contents), "landing")) == lands
 
 
-def test_a_yaw_that_px4_resets_in_flight_is_said_with_its_size():
-    contents = logs.WRITERS["px4"](HOP)
-    attitude = contents.topics["vehicle_attitude"]
-    stamps = attitude["timestamp"]
-    back = ["estimated yaw is reset by −30 deg"]
-    # The negative of a quaternion is the same turn.
-    for at, half_deg, said in ((2.0, 30, []), (12.0, 2, []), (12.0, -15, back), (12.0, 165, back)):
-        after, half = stamps > at, np.radians(half_deg)
-        turn = {"delta_q_reset[0]": np.where(after, np.cos(half), 1.0), "delta_q_reset[3]": np.sin(half) * after}
-        reset = {"quat_reset_counter": 1.0 * after, **turn}
-        more = replace(contents, topics=contents.topics | {"vehicle_attitude": attitude | reset})
-        found = [event for event in events(more) if event.kind == "reset"]
-        assert [event.text.partition(",")[0] for event in found] == said
-        assert [round(event.time_s) for event in found] == [12] * len(said)
-
-
-def test_each_reset_of_the_yaw_is_said_with_its_own_size():
-    contents = logs.WRITERS["px4"](HOP)
-    attitude = contents.topics["vehicle_attitude"]
-    counted = np.clip(np.floor(attitude["timestamp"] - 11.0), 0, 6)
-    half = np.radians(6.0 + counted)
-    turns = {"quat_reset_counter": counted, "delta_q_reset[0]": np.cos(half), "delta_q_reset[3]": np.sin(half)}
-    more = replace(contents, topics=contents.topics | {"vehicle_attitude": attitude | turns})
-    found = [event.text.partition(",")[0] for event in events(more) if event.kind == "reset"]
-    assert found == [f"estimated yaw is reset by {12 + 2 * each} deg" for each in range(1, 7)]
+def test_a_yaw_that_is_reset_in_flight_is_said_with_its_size():
+    for contents in (logs.px4(HOP), logs.WRITERS["ardupilot"](HOP)):
+        resets = {"timestamp": np.array([2.0, 11.0, 12.0, 13.0]), "turn": np.radians([60.0, 4.0, -30.0, 12.0])}
+        more = replace(contents, topics=contents.topics | {"yaw_resets": resets})
+        # On the ground and below 10 degrees nothing comes of them.
+        found = [(round(event.time_s), event.text.partition(",")[0]) for event in events(more) if event.kind == "reset"]
+        assert found == [(12, "estimated yaw is reset by −30 deg"), (13, "estimated yaw is reset by 12 deg")]
+        assert not [event for event in events(contents) if event.kind == "reset"]
 
 
 def test_a_failsafe_on_the_ground_is_no_danger():
@@ -206,6 +189,17 @@ def test_a_rotor_at_its_limit():
     # Where one alone stays at its largest for seconds, something limits it, as MOT_SPIN_MAX does.
     motors["control[1]"] = np.where((OWN.time > 8.0) & (OWN.time < 11.0), 0.9, motors["control[1]"])
     assert any(text.startswith("M2 at its upper limit 2 times, 3.") for _, text in of(events(contents), "limit"))
+
+
+def test_a_rotor_that_oscillates_at_its_limit_is_at_it_most_of_the_time():
+    time = np.arange(5000) / 500
+    speeds = 0.5 + 0.1 * np.sin(3 * time)[:, None] * [1, -1, 1, -1]
+    # Of ten samples seven are at the limit, for a second; then three.
+    share = np.where((time > 4) & (time < 5), 7, np.where((time > 7) & (time < 8), 3, 0))
+    speeds[:, 2] = np.where(np.arange(5000) % 10 < share, 1.0, speeds[:, 2])
+    (limit,) = _at_limit(still_flight(rotors=Samples(time, speeds, "rotors")), np.inf)
+    assert limit.text.startswith("M3 at its upper limit once, ")
+    assert (limit.time_s, limit.until_s) == (pytest.approx(4.0, abs=0.03), pytest.approx(5.0, abs=0.03))
 
 
 def test_clipping_gaps_and_the_battery():
