@@ -210,7 +210,9 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         # In a fast climb rotors give less thrust: it hovers at no more than the level at which it is lifted.
         hits = np.linalg.norm(signs.felt, axis=1) > HARD
         lifted = np.linalg.norm(averaged(signs.felt, signs.period, SLOW_S), axis=1) > _LIFTS
-        lifted &= (level > ALIVE) & ~binary_dilation(hits, np.ones(2 * max(1, round(SLOW_S / signs.period)) + 1))
+        lifted &= (level > ALIVE) & ~binary_dilation(
+            hits, np.ones(2 * max(1, round(SLOW_S / signs.period)) + 1, dtype=np.bool_)
+        )
         least = float(np.quantile(of_hover[lifted], 0.25)) if lifted.sum() * signs.period > _SHORT_S else hover
         hover = least if least < _OF_CLIMB * hover else hover
     carrying = np.asarray(level > _OF_HOVER * hover, dtype=bool)

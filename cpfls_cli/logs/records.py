@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.errors import InputError
 
 # Of 2005 and 2100: nothing flew a multirotor that logs before, or has yet after.
@@ -64,7 +64,7 @@ def undone_turns(stamps: Array, resets: Array, turns: Array, aloft: Array) -> Ar
     return np.asarray(left[np.searchsorted(resets, stamps, side="right")] - left[held.argmax()], dtype=float)
 
 
-def stamps_while(stamps: Array, changes: Array, on: Array) -> Array:
+def stamps_while(stamps: Array, changes: Array, on: BoolArray) -> Array:
     """Keep the stamps at which what changes at times is on; before its first change it is not."""
-    state = np.append(False, np.asarray(on, dtype=bool))
+    state = np.append(False, on)
     return np.asarray(stamps[state[np.searchsorted(changes, stamps, side="right")]], dtype=float)

@@ -61,7 +61,10 @@ def of_messages(path: Path, places: Mapping[str, Sequence[int]], tables: Mapping
     topics: dict[str, dict[str, Array]] = {}
     for topic, (message, spellings) in _TOPICS.items():
         own = tables.get(message, np.empty(0, dtype=[]))
-        held = {name: next((each for each in named if each in (own.dtype.names or ())), "") for name, named in spellings.items()}
+        held = {
+            name: next((each for each in named if each in (own.dtype.names or ())), "")
+            for name, named in spellings.items()
+        }
         if not all(held.values()) and topic != "vehicle_status":
             continue
         at = np.searchsorted(places[_CLOCK], places[message]) - 1

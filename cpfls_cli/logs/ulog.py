@@ -117,9 +117,8 @@ def _undo_yaw_resets(topics: dict[str, dict[str, Array]]) -> None:
     turns = np.asarray(wrapped(2 * np.arctan2(sine[rows], cosine[rows])))
     resets = stamps[rows]
     topics[YAW_RESETS] = {STAMP: resets, "turn": turns}
-    landed = topics.get("vehicle_land_detected", {})
-    states = (landed[STAMP], landed["landed"] == 0) if landed.keys() >= {STAMP, "landed"} else (np.empty(0), np.empty(0))
-    aloft = stamps_while(stamps, *states)
+    landed = {STAMP: np.empty(0), "landed": np.empty(0)} | topics.get("vehicle_land_detected", {})
+    aloft = stamps_while(stamps, landed[STAMP], landed["landed"] == 0)
     for topic, names in (("vehicle_attitude", _QUATERNION), ("vehicle_attitude_setpoint", _ASKED_FOR)):
         fields = topics.get(topic, {})
         if not fields.keys() >= {STAMP, *names}:
