@@ -170,8 +170,8 @@ def _against_thrust(checks: Sequence[PairCheck]) -> Finding | None:
         return Finding(
             f"judged by thrust and attitude, the axes of {who} are rotated by {np.degrees(angle):.0f} deg about the "
             "vertical",
-            "check the yaw of import.signals.attitude (or quaternion), the order of x and y, and import.world_frame; if they "
-            "are right, the yaw was estimated wrong, as by a compass near iron or currents",
+            "check the yaw of import.signals.attitude (or quaternion), the order of x and y, and import.world_frame; "
+            "if they are right, the yaw was estimated wrong, as by a compass near iron or currents",
             held,
             angle,
             "rad",
