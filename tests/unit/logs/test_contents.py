@@ -203,7 +203,8 @@ def test_words():
     suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl, .bfl, Crazyflie uSD"
     suffixes += ", .db3, .mcap, .h5, .hdf5 or .mat"
     assert suffixes_in_words() == suffixes
-    formats = "CSV, Parquet, ULog, ArduPilot DataFlash, Betaflight blackbox, Crazyflie uSD, ROS 2 bag, HDF5, MATLAB"
+    formats = "CSV, Parquet, ULog, ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag"
+    formats += ", HDF5, MATLAB"
     assert formats_in_words() == formats
 
 
