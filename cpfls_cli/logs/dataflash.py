@@ -154,7 +154,7 @@ def _of_tables(
         for topic, fields in _topics(kind, tables[kind.name], stamps[kind.name], stated.get(kind.name, {}))
     }
     if not topics and is_sdlog2(tables):
-        return of_messages(path, {kind.name: kind.begins for kind in kinds.values()}, tables)
+        return of_messages(path, {kind.name: kind.begins for kind in kinds.values()}, tables, _parameters(tables))
     if topics.keys() <= {"GPS", *_EVENTS} and "ATT" in tables:
         raise InputError(f"{path}: {_NO_STAMPS}")
     if not topics:
@@ -170,16 +170,12 @@ def _of_tables(
         for each, unit in stated.get(topic.partition("[")[0], {}).items()
         if each in fields and unit != _INSTANCE
     }
-    parameters: dict[str, float | str] = {}
-    for name, value in _rows(tables, "PARM", Name="S", Value="fiu"):
-        # As the log begins.
-        parameters.setdefault(_text(name), float(value))
     broken = f"{lost} bytes belong to no message: the file is damaged in places; what could be read is used"
     texts = (plain(_text(own)) for (own,) in _rows(tables, "MSG", Message="S"))
     said = [(round(float(at - origin), 6), "", own) for at, own in zip(stamps.get("MSG", ()), texts, strict=False)]
     begins, flown_at = {"": float(origin)}, _flown_at(topics.get("GPS", {}))
     warnings = (broken,) if lost else ()
-    return LogContents(topics, units, parameters, _system(tables), warnings, flown_at, begins, tuple(said))
+    return LogContents(topics, units, _parameters(tables), _system(tables), warnings, flown_at, begins, tuple(said))
 
 
 def _undo_yaw_resets(topics: dict[str, dict[str, Array]]) -> None:
@@ -347,6 +343,14 @@ def _flown_at(fields: Mapping[str, Array]) -> float:
             begins = _GPS_BEGAN + _WEEK_S * fields[week] + 1e-3 * fields[since] - fields[STAMP]
             return next((at for at in map(date, begins[fields[week] > 0]) if np.isfinite(at)), nan)
     return nan
+
+
+def _parameters(tables: Mapping[str, np.ndarray]) -> dict[str, float | str]:
+    parameters: dict[str, float | str] = {}
+    for name, value in _rows(tables, "PARM", Name="S", Value="fiu"):
+        # As the log begins.
+        parameters.setdefault(_text(name), float(value))
+    return parameters
 
 
 def _system(tables: Mapping[str, np.ndarray]) -> str:

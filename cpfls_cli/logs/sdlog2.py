@@ -51,34 +51,39 @@ _TOPICS: Final[dict[str, tuple[str, dict[str, tuple[str, ...]]]]] = {
 
 def is_sdlog2(tables: Mapping[str, np.ndarray]) -> bool:
     """Tell messages of PX4 from those of ArduPilot, which have stamps of their own."""
-    return _START in (tables[_CLOCK].dtype.names or ()) if _CLOCK in tables else False
+    return _CLOCK in tables and _holds(tables[_CLOCK], _START, "iu")
 
 
-def of_messages(path: Path, places: Mapping[str, Sequence[int]], tables: Mapping[str, np.ndarray]) -> LogContents:
+def of_messages(
+    path: Path,
+    places: Mapping[str, Sequence[int]],
+    tables: Mapping[str, np.ndarray],
+    parameters: dict[str, float | str],
+) -> LogContents:
     """Give messages, which begin at some places of the file, the time that was written before them."""
     origin = int(tables[_CLOCK][_START][0])
     clock = seconds(tables[_CLOCK][_START], origin, _PER_SECOND)
     topics: dict[str, dict[str, Array]] = {}
     for topic, (message, spellings) in _TOPICS.items():
         own = tables.get(message, np.empty(0, dtype=[]))
-        held = {
-            name: next((each for each in named if each in (own.dtype.names or ())), "")
-            for name, named in spellings.items()
-        }
+        held = {name: next((each for each in named if _holds(own, each)), "") for name, named in spellings.items()}
         if not all(held.values()) and topic != "vehicle_status":
             continue
-        at = np.searchsorted(places[_CLOCK], places[message]) - 1
+        at = np.searchsorted(places[_CLOCK], places.get(message, ())) - 1
         # What comes before the first time has none.
         fields = {name: numbers(own[field][at >= 0]) for name, field in held.items() if field}
-        topics[topic] = {STAMP: clock[at[at >= 0]], **fields}
+        if (at >= 0).any() and fields:
+            topics[topic] = {STAMP: clock[at[at >= 0]], **fields}
     if "vehicle_attitude" not in topics:
         raise InputError(f"{path}: a log of PX4 before ULog (sdlog2), without the attitude (ATT)")
     _turn_to_quaternions(topics["vehicle_attitude"])
-    parameters: dict[str, float | str] = {}
-    for row in tables.get("PARM", ()):
-        parameters.setdefault(row["Name"].decode("latin-1"), float(row["Value"]))
     stated: dict[str, Any] = {"system": "PX4", "flown_at": _flown_at(topics), "begins": {"": origin / _PER_SECOND}}
     return LogContents(topics, {}, parameters, **stated)
+
+
+def _holds(table: np.ndarray, field: str, kinds: str = "iuf") -> bool:
+    """Tell whether a message has a field that is a number, which a damaged log may describe as text."""
+    return field in (table.dtype.names or ()) and table.dtype[field].kind in kinds
 
 
 def _turn_to_quaternions(attitude: dict[str, Array]) -> None:

@@ -70,3 +70,17 @@ def test_without_an_attitude_it_is_said_what_the_file_is(tmp_path):
     (tmp_path / "log.px4log").write_bytes(sdlog2([("TIME", (5,)), ("GPS", (5, 3))]))
     with pytest.raises(InputError, match=r"before ULog \(sdlog2\), without the attitude"):
         log_contents(tmp_path / "log.px4log")
+
+
+@pytest.mark.parametrize(
+    "kinds", [{"PARM": ("Nn", "Name,Value")}, {"IMU": ("nnnnnn", KINDS["IMU"][1])}, {"TIME": ("Q", "StartTime")}]
+)
+def test_what_a_damaged_log_describes_otherwise_is_left_out(tmp_path, kinds):
+    rows = [(name, own) for name, own in flight(ANGLES) if name not in kinds or name == "TIME"]
+    texts = {"PARM": (b"PWM_MIN", b"1100"), "IMU": [b"1"] * 6, "TIME": (BEGIN - 5,)}
+    rows += [(name, texts[name]) for name in kinds]
+    (tmp_path / "log.px4log").write_bytes(sdlog2(rows, KINDS | kinds) + b"\xa3\x95\x07")
+    contents = log_contents(tmp_path / "log.px4log")
+    assert len(contents.topics["vehicle_attitude"][STAMP]) == 20
+    assert ("sensor_combined" in contents.topics) == ("IMU" not in kinds)
+    assert ("PWM_MIN" in contents.parameters) == ("PARM" not in kinds)
