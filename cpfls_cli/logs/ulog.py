@@ -104,10 +104,10 @@ def _refuse_endless(path: Path, stream: BinaryIO) -> None:
 def _undo_yaw_resets(topics: dict[str, dict[str, Array]]) -> None:
     """Turn attitudes, and those asked for, to the yaw that the estimator holds in flight: PX4 states each reset."""
     attitude = topics.get("vehicle_attitude", {})
-    stated = ("quat_reset_counter", "delta_q_reset[0]", "delta_q_reset[3]", STAMP)
-    if not attitude.keys() >= {*stated, *_QUATERNION}:
+    names = ("quat_reset_counter", "delta_q_reset[0]", "delta_q_reset[3]", STAMP)
+    if not attitude.keys() >= {*names, *_QUATERNION}:
         return
-    counted, cosine, sine, stamps = (attitude[name] for name in stated)
+    counted, cosine, sine, stamps = (attitude[name] for name in names)
     # The counter has eight bits; of two resets between two rows only the second is stated.
     rows = np.flatnonzero(np.diff(counted) % 256 == 1) + 1
     rows = rows[np.isfinite(cosine[rows]) & np.isfinite(sine[rows])]
@@ -117,8 +117,9 @@ def _undo_yaw_resets(topics: dict[str, dict[str, Array]]) -> None:
     turns = np.asarray(wrapped(2 * np.arctan2(sine[rows], cosine[rows])))
     resets = stamps[rows]
     topics[YAW_RESETS] = {STAMP: resets, "turn": turns}
-    landed = {STAMP: np.empty(0), "landed": np.empty(0)} | topics.get("vehicle_land_detected", {})
-    aloft = stamps_while(stamps, landed[STAMP], landed["landed"] == 0)
+    landed = topics.get("vehicle_land_detected", {})
+    stated = landed.keys() >= {STAMP, "landed"}
+    aloft = stamps_while(stamps, landed[STAMP], landed["landed"] == 0) if stated else np.empty(0)
     for topic, names in (("vehicle_attitude", _QUATERNION), ("vehicle_attitude_setpoint", _ASKED_FOR)):
         fields = topics.get(topic, {})
         if not fields.keys() >= {STAMP, *names}:
