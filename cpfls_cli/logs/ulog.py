@@ -104,10 +104,10 @@ def _refuse_endless(path: Path, stream: BinaryIO) -> None:
 def _undo_yaw_resets(topics: dict[str, dict[str, Array]]) -> None:
     """Turn attitudes, and those asked for, to the yaw that the estimator holds in flight: PX4 states each reset."""
     attitude = topics.get("vehicle_attitude", {})
-    names = ("quat_reset_counter", "delta_q_reset[0]", "delta_q_reset[3]", STAMP)
-    if not attitude.keys() >= {*names, *_QUATERNION}:
+    needed = ("quat_reset_counter", "delta_q_reset[0]", "delta_q_reset[3]", STAMP)
+    if not attitude.keys() >= {*needed, *_QUATERNION}:
         return
-    counted, cosine, sine, stamps = (attitude[name] for name in names)
+    counted, cosine, sine, stamps = (attitude[name] for name in needed)
     # The counter has eight bits; of two resets between two rows only the second is stated.
     rows = np.flatnonzero(np.diff(counted) % 256 == 1) + 1
     rows = rows[np.isfinite(cosine[rows]) & np.isfinite(sine[rows])]
