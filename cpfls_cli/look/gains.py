@@ -171,7 +171,7 @@ def tuned_gains(flight: LogFlight, plants: Sequence[AxisPlant], asked: AskedMarg
     return TunedGains(
         autopilot="" if autopilot is None else autopilot.name,
         title="" if autopilot is None else autopilot.title,
-        version="" if autopilot is None else autopilot.firmware.of(flight.system),
+        version="" if autopilot is None else flight.system or autopilot.firmware.title,
         reason=reason,
         asked_gain=asked.gain_db,
         asked_phase=asked.phase_deg,
