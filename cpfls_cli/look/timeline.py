@@ -325,7 +325,7 @@ def _yaw_resets(flight: LogFlight, topics: Topics) -> Iterator[Event]:
         flies = flight.flown[min(int(np.searchsorted(flight.time, at)), len(flight.time) - 1)]
         if flies and abs(np.degrees(turn)) > _JUMP_DEG:
             text = f"estimated yaw is reset by {np.degrees(turn):.0f} deg".replace("-", "−")
-            text += ", which no gyroscope shows: undone, what is before it is turned by as much"
+            text += ", which no gyroscope shows: it is undone"
             yield Event(time_s=float(at), kind="reset", text=text, severity="warning")
 
 
