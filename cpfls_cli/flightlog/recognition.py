@@ -130,7 +130,9 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     for voltage in reversed(candidates.get("voltage", ())):
         level = float(np.median(seen.grid(voltage)))
         scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
-        if _BATTERY_V[0] < level * scale < _BATTERY_V[1]:
+        # Whole numbers are per cent of its charge.
+        counted = bool(np.all(np.mod(log.values(voltage.group.columns)[1], 1) == 0))
+        if _BATTERY_V[0] < level * scale < _BATTERY_V[1] and not (counted and voltage.unit is None and scale == 1.0):
             seen.take(voltage, "V", f"{called(voltage)}; {level * scale:.3g} V in flight", "named", scale)
     speeds, moved = _take_rotors(seen, rotors)
     _take_wrench(seen)
