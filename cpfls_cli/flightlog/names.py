@@ -122,6 +122,11 @@ class Named:
     known: str = ""  # The kind of log whose documentation says so; empty where only words of the name do.
     sign: tuple[float, ...] | None = None  # Of each column in that frame; None for +1 everywhere.
 
+    @property
+    def by_axes(self) -> bool:
+        """Whether nothing but axes in their names makes the columns a place."""
+        return self.rank >= _BY_AXES
+
 
 # What to do where names do not tell what columns hold.
 BY_HAND: Final = "use common names (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
@@ -134,9 +139,7 @@ _CASES: Final[tuple[Callable[[str], str], ...]] = (
     lambda axis: axis[0] + axis.title().replace("_", "")[1:],
 )
 _FAMILIES: Final = tuple(
-    dict.fromkeys(
-        (cast("Kind", kind), tuple(map(case, axes))) for kind, axes in vocabulary.FAMILIES for case in _CASES
-    )
+    dict.fromkeys((cast("Kind", kind), tuple(map(case, axes))) for kind, axes in vocabulary.FAMILIES for case in _CASES)
 )
 _SHORTEST_NUMBERED, _LONGEST_NUMBERED = 3, 16
 
@@ -149,14 +152,21 @@ def column_groups(names: Mapping[str, object] | tuple[str, ...]) -> tuple[Column
     return (*found, *(ColumnGroup(name, "one", (name,)) for name in known))
 
 
+_BEHIND_AXES = ("dot", "ddot", "rate", "vel", "acc")
+
+
 def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
     """Look for the columns of the other axes wherever the first one stands in a name."""
     for name, (kind, axes) in product(names, _FAMILIES):
         for found in re.finditer(re.escape(axes[0]), name):
             before, after = name[: found.start()], name[found.end() :]
-            # An axis ends a word, but in xdot; a single letter of the angles, and a place, is a word of its own.
-            ends = not after or not after[0].islower() or (kind == "xyz" and after.startswith(("dot", "ddot")))
-            begins = not before or not before[-1].isalpha() or (kind == "numbers" and before[-1].islower() != axes[0][0].islower())
+            # An axis ends a word, but in xdot and its kind; a letter of angles, and a place, is a word of its own.
+            ends = not after or not after[0].islower() or (kind == "xyz" and after.startswith(_BEHIND_AXES))
+            begins = (
+                not before
+                or not before[-1].isalpha()
+                or (kind == "numbers" and before[-1].islower() != axes[0][0].islower())
+            )
             if (kind == "angles" and len(axes[0]) > 1) or (ends and (begins or kind in ("xyz", "wxyz"))):
                 columns = tuple(f"{before}{axis}{after}" for axis in axes)
                 if all(column in names for column in columns):
@@ -179,7 +189,7 @@ def _numbered(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             yield ColumnGroup(pattern, "numbers", tuple(columns[number] for number in numbers))
 
 
-_BY_WORDS, _OF_OTHER_INSTANCE = 100.0, 50.0
+_BY_WORDS, _OF_OTHER_INSTANCE, _BY_AXES = 100.0, 50.0, 1000.0
 _AXES_OF_A_BODY = 3
 
 
@@ -263,7 +273,8 @@ def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
         if signal == "body_rate" if wished and group.pqr else _means(meaning, group, words):
             fast = not wished and any(signal in vocabulary.IN_RADIANS.get(word, ()) for word in words)
             usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
-            yield Named(named, group, rank, *(stated or (usual, 1.0)))
+            place = signal != "position" or group.kind == "numbers" or _is_called_place(meaning, group)
+            yield Named(named, group, rank + (0.0 if place else _BY_AXES), *(stated or (usual, 1.0)))
 
 
 def height_columns(names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], float]]:
@@ -271,16 +282,18 @@ def height_columns(names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], fl
     for name in names:
         group = ColumnGroup(name, "one", (name,))
         stated = _stated_unit(group, "position") if group.ending else ("m", 1.0)
-        if {*group.words} & {"alt", "altitude", "height"} and {*group.words} <= vocabulary.HEIGHT and stated is not None:
+        if (
+            {*group.words} & {"alt", "altitude", "height"}
+            and {*group.words} <= vocabulary.HEIGHT
+            and stated is not None
+        ):
             yield (name,), known_unit(stated[0]).factor * stated[1]
 
 
 def only_of_airplanes(names: tuple[str, ...]) -> list[str]:
-    """List columns that only airplanes log: two surfaces, or an airspeed and an angle to it."""
-    surfaces, *others = ([name for name in names if {*_words(name)} & {*own}] for own in vocabulary.AIRPLANE_WORDS)
-    if len({word for name in surfaces for word in _words(name)} & {*vocabulary.AIRPLANE_WORDS[0]}) > 1:
-        return surfaces[:2]
-    return [own[0] for own in others] if all(others) else []
+    """List columns that only airplanes log: an airspeed and an angle to it; none where one is missing."""
+    found = [next((name for name in names if {*_words(name)} & {*own}), "") for own in vocabulary.AIRPLANE_WORDS]
+    return found if all(found) else []
 
 
 _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
@@ -319,7 +332,7 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     if signal in ROTORS:
         return _means_rotors(signal, group, own, ends_in_speed)
     if signal == "position" and group.kind != "numbers":
-        return _is_place(meaning, group)
+        return _has_axes_of_places(group)
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
         turns = ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
         if signal == "body_rate":
@@ -349,14 +362,18 @@ def _means_rotors(signal: SignalName, group: ColumnGroup, own: set[str], ends_in
     return bool(last & ASKED) or "pwm" in own or (asked if fast else motors)
 
 
-def _is_place(meaning: Meaning, group: ColumnGroup) -> bool:
-    """Tell the axes of a place: alone behind a path, or behind words of places only."""
+def _has_axes_of_places(group: ColumnGroup) -> bool:
     before, _, after = group.pattern.partition("*")
-    prefix = re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?$", before) or (
+    begins = re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?$", before) or (
         before[-1].islower() and group.columns[0][len(before)].isupper()
     )
+    return bool(begins) and not after[:1].isalpha()
+
+
+def _is_called_place(meaning: Meaning, group: ColumnGroup) -> bool:
+    """Tell axes that are alone behind a path, or stand with words of places only."""
     part = re.split(r"[/.]", group.pattern)[-1]
-    return bool(prefix) and not after[:1].isalpha() and {*_words(part.removesuffix(group.ending))} - WISHED <= meaning.words
+    return {*_words(part.removesuffix(group.ending))} - WISHED <= meaning.words
 
 
 # Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix.

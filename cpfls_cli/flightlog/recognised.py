@@ -33,6 +33,7 @@ _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _REFUSED, _SELDOM = 3, 0.1
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
+_PULSES = (800.0, 2300.0)  # Of receivers, us.
 _AS_GRAVITY = 0.15  # Share by which what carries a multirotor is usually off gravity.
 _SLOWEST_HZ = 0.5  # Below which a signal shows nothing of a flight.
 _FEWEST_SAMPLES = 20  # For medians and rates.
@@ -220,6 +221,9 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
             time, values = log.values(named.group.columns)
         enough_rows = len(time) >= _FEWEST_SAMPLES and log.rate_hz(named.group.columns) >= _SLOWEST_HZ
         if named.signal == "body_rate" and not named.known and len(values) and _is_gravity(values):
+            continue
+        # Sticks have the names of angles too.
+        if named.signal == "attitude" and len(values) and _PULSES[0] < values.min() and values.max() < _PULSES[1]:
             continue
         if enough_rows and float(np.ptp(values, axis=0).max()) > 0:
             kept.setdefault(named.signal, []).append(named)

@@ -350,11 +350,10 @@ def test_what_alone_rises_evenly_is_the_clock_and_said_to_be(name, factor, unit)
     assert any(f"{name} alone rises evenly" in words for words in proposal.warnings)
 
 
-@pytest.mark.parametrize("others", [{}, {"odometer": 0.3 * OWN.time}])
+@pytest.mark.parametrize("others", [{}, {"lap": 2.5 * OWN.time, "odometer": 0.3 * OWN.time}])
 def test_rows_that_are_counted_and_two_that_rise_are_no_clock(others):
-    own = {name: values for name, values in zip(("step", "lap"), (np.arange(len(OWN.time)), 2.5 * OWN.time))}
     with pytest.raises(InputError, match="no column of time stamps is recognised"):
-        proposed(t={"step": own["step"].astype(float), **({"lap": own["lap"], **others} if others else {})})
+        proposed(t={"step": np.arange(len(OWN.time), dtype=float), **others})
 
 
 def test_charge_is_no_voltage():
@@ -368,7 +367,12 @@ def test_charge_is_no_voltage():
 def test_rotors_by_place_are_taken_in_the_order_of_their_places():
     front_left_first = OWN.speed[:, [2, 0, 1, 3]] * RPM
     proposal = proposed(speed=named(front_left_first, "rpm_fl", "rpm_fr", "rpm_rl", "rpm_rr"))
-    assert [rotor.name for rotor in proposal.airframe.rotors] == ["front left", "front right", "rear left", "rear right"]
+    assert [rotor.name for rotor in proposal.airframe.rotors] == [
+        "front left",
+        "front right",
+        "rear left",
+        "rear right",
+    ]
 
 
 def test_north_east_down_need_no_motion_to_count_downward():
@@ -403,3 +407,18 @@ def test_a_table_of_an_airplane_is_said_to_be_one():
         proposed(speed=None, air=air)
     # With rotors it is a multirotor that measures the wind.
     assert proposed(air=air).airframe is not None
+
+
+@pytest.mark.parametrize(("velocity", "taken"), [(True, True), (False, False)])
+def test_axes_behind_an_unknown_word_are_a_place_where_the_velocity_is_their_derivative(velocity, taken):
+    speed = named(OWN.velocity, "ext_vx", "ext_vy", "ext_vz") if velocity else None
+    proposal = proposed(position=named(OWN.position, "ext_x", "ext_y", "ext_z"), velocity=speed)
+    assert ("position" in {guess.signal for guess in proposal.signals}) == taken
+    vibration = named(1 + OWN.angles, "vibe_x", "vibe_y", "vibe_z")
+    assert "position" not in {guess.signal for guess in proposed(position=vibration).signals}
+
+
+def test_sticks_with_the_names_of_angles_are_no_attitude():
+    sticks = named(1500 + 300 * OWN.angles, "Roll", "Pitch", "Yaw")
+    proposal = proposed(attitude=sticks, imu=named(OWN.angles, "IMU_Roll", "IMU_Pitch", "IMU_Yaw"))
+    assert signal(proposal, "attitude").columns.columns == ("IMU_Roll", "IMU_Pitch", "IMU_Yaw")
