@@ -128,13 +128,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     _take_frames(seen, reading)
     if verdict is not None:
         doubt_reading(seen, verdict)
-    for voltage in reversed(candidates.get("voltage", ())):
-        level = float(np.median(seen.grid(voltage)))
-        scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
-        # Whole numbers are per cent of its charge.
-        counted = bool(np.all(np.mod(log.values(voltage.group.columns)[1], 1) == 0))
-        if _BATTERY_V[0] < level * scale < _BATTERY_V[1] and not (counted and voltage.unit is None and scale == 1.0):
-            seen.take(voltage, "V", f"{called(voltage)}; {level * scale:.3g} V in flight", "named", scale)
+    _take_voltage(seen)
     speeds, moved = _take_rotors(seen, rotors)
     _take_wrench(seen)
     _doubt_columns(seen)
@@ -269,6 +263,17 @@ def _take_frames(seen: Seen, reading: Reading | None) -> None:
     if reading is not None and reading.lean is not None and reading.world != world:
         world, reason = reading.world, "z of the world is opposite to z of the level body"
     seen.choose("world_frame", world, reason, "guess" if body is None else body.sure)
+
+
+def _take_voltage(seen: Seen) -> None:
+    """Take the first column that may be the voltage of a battery, and not its charge in per cent."""
+    for voltage in seen.candidates.get("voltage", ()):
+        level = float(np.median(seen.grid(voltage)))
+        scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
+        whole = voltage.unit is None and bool(np.all(np.mod(seen.log.values(voltage.group.columns)[1], 1) == 0))
+        if _BATTERY_V[0] < level * scale < _BATTERY_V[1] and (scale < 1.0 or not whole):
+            seen.take(voltage, "V", f"{called(voltage)}; {level * scale:.3g} V in flight", "named", scale)
+            return
 
 
 def _take_wrench(seen: Seen) -> None:
