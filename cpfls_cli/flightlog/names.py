@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Final, Literal, cast
@@ -189,8 +189,10 @@ def _numbered(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             yield ColumnGroup(pattern, "numbers", tuple(columns[number] for number in numbers))
 
 
-_BY_WORDS, _OF_OTHER_INSTANCE, _BY_AXES = 100.0, 50.0, 1000.0
+_BY_WORDS, _SECOND, _OF_OTHER_INSTANCE, _BY_AXES = 100.0, 10.0, 50.0, 1000.0
 _AXES_OF_A_BODY = 3
+_OF_A_POSE = ("attitude", "quaternion", "velocity")
+_PLACE_WORDS = tuple(own.words for own in MEANINGS if own.signal == "position")
 
 
 def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Named, ...]:
@@ -211,6 +213,12 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     # Motors beside what is asked of them are measured, and nobody says in what.
     asked = {frozenset(own.group.words) - ASKED - AIMED for own in by_words if {*own.group.words} & (ASKED | AIMED)}
     found += [own for own in by_words if own.signal != "rotor_command" or {*own.group.words} not in asked]
+    # Of what has an attitude or a velocity the axes are a place.
+    poses = {word for own in found if own.signal in _OF_A_POSE for word in own.group.words}.union(*_PLACE_WORDS)
+    found = [
+        replace(own, rank=own.rank - _BY_AXES + _SECOND) if own.by_axes and {*own.group.words} <= poses else own
+        for own in found
+    ]
     if lists_all(system):
         # Words would find parameters and allocations.
         found = [named for named in found if named.known or named.signal not in (*ROTORS, "voltage")]
@@ -255,7 +263,7 @@ def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
     words = tuple(word for word in group.words if not (wished and word in WISHED))
     rank = _BY_WORDS + len(words)
     if not wished:
-        rank += 10 * sum(word in vocabulary.SECOND_HAND for word in words)
+        rank += _SECOND * sum(word in vocabulary.SECOND_HAND for word in words)
         rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
     before, _, after = group.pattern.partition("*")
     squared = bool(re.search(r"[a-z]2($|_)", f"{before}{after}")) or bool({"squared", "sq"} & {*words})

@@ -414,6 +414,9 @@ def test_axes_behind_an_unknown_word_are_a_place_where_the_velocity_is_their_der
     speed = named(OWN.velocity, "ext_vx", "ext_vy", "ext_vz") if velocity else None
     proposal = proposed(position=named(OWN.position, "ext_x", "ext_y", "ext_z"), velocity=speed)
     assert ("position" in {guess.signal for guess in proposal.signals}) == taken
+    attitude = named(OWN.angles, "ext_roll", "ext_pitch", "ext_yaw")
+    own = proposed(position=named(OWN.position, "ext_x", "ext_y", "ext_z"), velocity=None, attitude=attitude)
+    assert "position" in {guess.signal for guess in own.signals}
     vibration = named(1 + OWN.angles, "vibe_x", "vibe_y", "vibe_z")
     assert "position" not in {guess.signal for guess in proposed(position=vibration).signals}
 
