@@ -1,5 +1,7 @@
 """What the columns of motion are: gyroscope, position, velocity and accelerometer, each held against all others."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from cpfls_cli.arrays import Array
@@ -15,7 +17,8 @@ from cpfls_cli.flightlog.agreement import (
 from cpfls_cli.flightlog.airframe import explained_by_rotors
 from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, SENSED, Reading, nearest
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.recognised import Guess, Rival, Seen, Sure, called
+from cpfls_cli.flightlog.recognised import Guess, LogTable, Rival, Seen, Sure, called
+from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.flightlog.vocabulary import Row, sizes
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
@@ -150,6 +153,21 @@ def _doubt_rates(seen: Seen, named: Named, fit: AxisFit) -> None:
 
 
 # Position and velocity.
+
+
+def without_other_axes(log: LogTable, candidates: Mapping[SignalName, list[Named]]) -> dict[SignalName, list[Named]]:
+    """Leave out places that only their axes make one, but where the velocity is their derivative."""
+    velocity = next(iter(candidates.get("velocity", ())), None)
+    rate_hz = 1 / float(log.grid[1] - log.grid[0])
+
+    def moves(named: Named) -> bool:
+        if velocity is None:
+            return False
+        derived = first_derivative(log.on_grid(named.group.columns), rate_hz)
+        return fit_axes(slow(derived, rate_hz), slow(log.on_grid(velocity.group.columns), rate_hz)).as_named > GOOD
+
+    places = [own for own in candidates.get("position", ()) if not own.by_axes or moves(own)]
+    return {name: found for name, own in candidates.items() if (found := places if name == "position" else own)}
 
 
 def position_by_velocity(seen: Seen) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import product
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, cast
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from cpfls_cli.flightlog.vocabulary import (
     Meaning,
 )
 from cpfls_cli.rounding import largest
-from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName
+from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName, known_unit
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -51,10 +51,15 @@ class ColumnGroup:
     columns: tuple[str, ...]  # In the order of axes or numbers, of a quaternion w, x, y, z.
 
     @property
+    def axis(self) -> str:
+        """What the name of the first column has in place of the star, in lower case."""
+        before, _, after = self.pattern.partition("*")
+        return self.columns[0].removeprefix(before).removesuffix(after).lower()
+
+    @property
     def pqr(self) -> bool:
         """Whether the columns differ in p, q and r."""
-        before, _, after = self.pattern.partition("*")
-        return self.kind == "angles" and self.columns[0].removeprefix(before).removesuffix(after) == "p"
+        return self.kind == "angles" and self.axis == "p"
 
     @cached_property
     def ending(self) -> str:
@@ -117,16 +122,24 @@ class Named:
     known: str = ""  # The kind of log whose documentation says so; empty where only words of the name do.
     sign: tuple[float, ...] | None = None  # Of each column in that frame; None for +1 everywhere.
 
+    @property
+    def by_axes(self) -> bool:
+        """Whether nothing but axes in their names makes the columns a place."""
+        return self.rank >= _BY_AXES
+
 
 # What to do where names do not tell what columns hold.
 BY_HAND: Final = "use common names (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
-_FAMILIES: Final[tuple[tuple[Kind, tuple[str, ...]], ...]] = (
-    *(("wxyz", tuple(axes)) for axes in ("wxyz", "WXYZ")),
-    *(("xyz", tuple(axes)) for axes in ("xyz", "XYZ", "NED")),
-    *(
-        ("angles", tuple(axes.split()))
-        for axes in ("roll pitch yaw", "phi theta psi", "Roll Pitch Yaw", "R P Y", "p q r")
-    ),
+# In small letters, in capitals, and each part with a capital, as in frontLeft and FrontLeft.
+_CASES: Final[tuple[Callable[[str], str], ...]] = (
+    str,
+    str.upper,
+    str.title,
+    lambda axis: axis.title().replace("_", ""),
+    lambda axis: axis[0] + axis.title().replace("_", "")[1:],
+)
+_FAMILIES: Final = tuple(
+    dict.fromkeys((cast("Kind", kind), tuple(map(case, axes))) for kind, axes in vocabulary.FAMILIES for case in _CASES)
 )
 _SHORTEST_NUMBERED, _LONGEST_NUMBERED = 3, 16
 
@@ -139,15 +152,22 @@ def column_groups(names: Mapping[str, object] | tuple[str, ...]) -> tuple[Column
     return (*found, *(ColumnGroup(name, "one", (name,)) for name in known))
 
 
+_BEHIND_AXES = ("dot", "ddot", "rate", "vel", "acc")
+
+
 def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
     """Look for the columns of the other axes wherever the first one stands in a name."""
     for name, (kind, axes) in product(names, _FAMILIES):
         for found in re.finditer(re.escape(axes[0]), name):
             before, after = name[: found.start()], name[found.end() :]
-            # An axis ends a word; a single letter of the angles is a word of its own.
-            ends = not after or not after[0].islower()
-            alone = not before or not before[-1].isalpha()
-            if (len(axes[0]) > 1 or (alone and ends)) if kind == "angles" else ends:
+            # An axis ends a word, but in xdot and its kind; a letter of angles, and a place, is a word of its own.
+            ends = not after or not after[0].islower() or (kind == "xyz" and after.startswith(_BEHIND_AXES))
+            begins = (
+                not before
+                or not before[-1].isalpha()
+                or (kind == "numbers" and before[-1].islower() != axes[0][0].islower())
+            )
+            if (kind == "angles" and len(axes[0]) > 1) or (ends and (begins or kind in ("xyz", "wxyz"))):
                 columns = tuple(f"{before}{axis}{after}" for axis in axes)
                 if all(column in names for column in columns):
                     yield ColumnGroup(f"{before}*{after}", kind, columns)
@@ -169,10 +189,10 @@ def _numbered(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             yield ColumnGroup(pattern, "numbers", tuple(columns[number] for number in numbers))
 
 
-_BY_WORDS, _OF_OTHER_INSTANCE = 100.0, 50.0
+_BY_WORDS, _SECOND, _OF_OTHER_INSTANCE, _BY_AXES = 100.0, 10.0, 50.0, 1000.0
 _AXES_OF_A_BODY = 3
-# What else p, q and r may name, by a word before them.
-_ABOUT_AXES = frozenset({"torque", "tau", "moment", "m", "i", "alpha", "acc", "acceleration", "dot", "pid", "int"})
+_OF_A_POSE = ("attitude", "quaternion", "velocity")
+_PLACE_WORDS = tuple(own.words for own in MEANINGS if own.signal == "position")
 
 
 def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Named, ...]:
@@ -189,7 +209,16 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     of_kind = Counter(kind for kind, _ in held)
     # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
     found = [named for named in known if system or of_kind[named.known] > 1]
-    found += [named for group in groups for named in _by_words(group)]
+    by_words = [named for group in groups for named in _by_words(group)]
+    # Motors beside what is asked of them are measured, and nobody says in what.
+    asked = {frozenset(own.group.words) - ASKED - AIMED for own in by_words if {*own.group.words} & (ASKED | AIMED)}
+    found += [own for own in by_words if own.signal != "rotor_command" or {*own.group.words} not in asked]
+    # Of what has an attitude or a velocity the axes are a place.
+    poses = {word for own in found if own.signal in _OF_A_POSE for word in own.group.words}.union(*_PLACE_WORDS)
+    found = [
+        replace(own, rank=own.rank - _BY_AXES + _SECOND) if own.by_axes and {*own.group.words} <= poses else own
+        for own in found
+    ]
     if lists_all(system):
         # Words would find parameters and allocations.
         found = [named for named in found if named.known or named.signal not in (*ROTORS, "voltage")]
@@ -234,7 +263,7 @@ def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
     words = tuple(word for word in group.words if not (wished and word in WISHED))
     rank = _BY_WORDS + len(words)
     if not wished:
-        rank += 10 * sum(word in vocabulary.SECOND_HAND for word in words)
+        rank += _SECOND * sum(word in vocabulary.SECOND_HAND for word in words)
         rank += _OF_OTHER_INSTANCE * bool(re.search(r"\[\d+\]\.", group.pattern))
     before, _, after = group.pattern.partition("*")
     squared = bool(re.search(r"[a-z]2($|_)", f"{before}{after}")) or bool({"squared", "sq"} & {*words})
@@ -242,14 +271,37 @@ def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
         signal, stated, ending = meaning.signal, _stated_unit(group, meaning.signal), group.ending
         # A name that ends in a unit, and in none of the signal, is of something else.
         other = bool(ending) and stated is None and (len(ending.strip("_ ")) > 1 or ending == "_m")
+        # Per cent of a battery are its charge.
+        other |= signal == "voltage" and stated is not None and stated[0] != "V"
         allowed = vocabulary.ALLOWED.get(signal, frozenset()) | (WISHED if wished else frozenset())
+        allowed |= ASKED | AIMED if signal in ROTORS else frozenset()
         named = _SETPOINT_OF.get(signal) if wished else None if squared and signal in ROTORS else signal
         if named is None or other or not _suits(meaning, group) or (NOT_MEASURED - allowed) & {*words}:
             continue
         if signal == "body_rate" if wished and group.pqr else _means(meaning, group, words):
             fast = not wished and any(signal in vocabulary.IN_RADIANS.get(word, ()) for word in words)
             usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
-            yield Named(named, group, rank, *(stated or (usual, 1.0)))
+            place = signal != "position" or group.kind == "numbers" or _is_called_place(meaning, group)
+            yield Named(named, group, rank + (0.0 if place else _BY_AXES), *(stated or (usual, 1.0)))
+
+
+def height_columns(names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], float]]:
+    """List single columns that words call a height, each with the factor that makes it m."""
+    for name in names:
+        group = ColumnGroup(name, "one", (name,))
+        stated = _stated_unit(group, "position") if group.ending else ("m", 1.0)
+        if (
+            {*group.words} & {"alt", "altitude", "height"}
+            and {*group.words} <= vocabulary.HEIGHT
+            and stated is not None
+        ):
+            yield (name,), known_unit(stated[0]).factor * stated[1]
+
+
+def only_of_airplanes(names: tuple[str, ...]) -> list[str]:
+    """List columns that only airplanes log: an airspeed and an angle to it; none where one is missing."""
+    found = [next((name for name in names if {*_words(name)} & {*own}), "") for own in vocabulary.AIRPLANE_WORDS]
+    return found if all(found) else []
 
 
 _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
@@ -286,21 +338,50 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
     if own & meaning.never:
         return False
     if signal in ROTORS:
-        asked, last = bool(own & (ASKED | AIMED)), bool({*group.last_words} & ASKED)
-        # Three columns of the letter w, or in the unit of a rate, are the axes of a gyroscope.
-        many = len(group.columns) > _AXES_OF_A_BODY
-        turning = (asked or len(own) == 1) and {*group.last_words} - AIMED - ASKED == {"w"}
-        fast = bool(own & vocabulary.FAST) or (many and (turning or ends_in_speed))
-        motors = {*group.last_words} - AIMED == {"m"} or bool({"motor", "motors"} & own)
-        return fast and not asked if signal == "rotor_speed" else last or (asked if fast else motors)
+        return _means_rotors(signal, group, own, ends_in_speed)
     if signal == "position" and group.kind != "numbers":
-        return re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?\*($|[^A-Za-z])", group.pattern) is not None
+        return _has_axes_of_places(group)
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
         turns = ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
         if signal == "body_rate":
-            return turns or (group.pqr and not own & _ABOUT_AXES)
-        return not turns and not group.pqr and not own & {"torque", "tau", "moment"}
+            return turns or group.pqr
+        # What is asked about an axis is no angle, and letters are angles where a word says so.
+        letters = len(group.axis) == 1 and not own & meaning.words
+        return not (turns or group.pqr or letters or own & {*group.last_words} & ASKED)
+    if signal == "voltage" and "bat" in own:
+        return ending is not None and ending[0] == "V"
     return bool({*words[-meaning.last :]} & meaning.words)
+
+
+def _means_rotors(signal: SignalName, group: ColumnGroup, own: set[str], ends_in_speed: bool) -> bool:
+    """Tell whether words mean what drives rotors, or how fast they turn."""
+    last, many = {*group.last_words}, len(group.columns) > _AXES_OF_A_BODY
+    # A part of a path that is called output may hold whatever was measured.
+    asked = bool(last & ASKED or own & (AIMED | {"pwm"}))
+    if asked and not many and own & RATE_WORDS:
+        return False
+    # Three columns of the letter w, or in the unit of a rate, are the axes of a gyroscope.
+    turning = last - AIMED - ASKED == {"w"} and (asked or len(own) == 1)
+    counted = last - AIMED - ASKED == {"n"} and asked
+    fast = bool(own & vocabulary.FAST) or (many and (turning or counted or ends_in_speed))
+    motors = last - AIMED == {"m"} or bool(vocabulary.MOTORS & own)
+    if signal == "rotor_speed":
+        return fast and not asked
+    return bool(last & ASKED) or "pwm" in own or (asked if fast else motors)
+
+
+def _has_axes_of_places(group: ColumnGroup) -> bool:
+    before, _, after = group.pattern.partition("*")
+    begins = re.search(r"(^|[^A-Za-z])([Pp]|[Pp]os)?$", before) or (
+        before[-1].islower() and group.columns[0][len(before)].isupper()
+    )
+    return bool(begins) and not after[:1].isalpha()
+
+
+def _is_called_place(meaning: Meaning, group: ColumnGroup) -> bool:
+    """Tell axes that are alone behind a path, or stand with words of places only."""
+    part = re.split(r"[/.]", group.pattern)[-1]
+    return {*_words(part.removesuffix(group.ending))} - WISHED <= meaning.words
 
 
 # Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix.
@@ -316,19 +397,19 @@ _RATE_HZ = 100.0  # Rate to which a fast matrix is thinned: every pair of runs i
 OF_A_MATRIX: Final = "a matrix without names"
 
 
+def even_step(values: Array) -> float:
+    """Give the step by which numbers rise evenly from row to row; 0 where they do not."""
+    steps = np.diff(np.asarray(values, dtype=float)[np.isfinite(values)])
+    if len(steps) < 2 or steps.min() <= 0:
+        return 0.0
+    step = float(np.median(steps))
+    # A pause of the recording counts as one step.
+    return step if float(np.minimum(np.abs(steps - step), step).mean()) < _EVEN * step else 0.0
+
+
 def nameless_clock(columns: Mapping[str, Array]) -> str | None:
     """Find the column of a matrix without names that counts seconds in even steps."""
-    for name in _of_matrix(columns):
-        values = np.asarray(columns[name], dtype=float)
-        steps = np.diff(values[np.isfinite(values)])
-        if len(steps) < 2 or steps.min() <= 0:
-            continue
-        step = float(np.median(steps))
-        # A pause of the recording counts as one step.
-        uneven = float(np.minimum(np.abs(steps - step), step).mean())
-        if _STEPS_S[0] <= step <= _STEPS_S[1] and uneven < _EVEN * step:
-            return name
-    return None
+    return next((name for name in _of_matrix(columns) if _STEPS_S[0] <= even_step(columns[name]) <= _STEPS_S[1]), None)
 
 
 def _of_matrix(columns: Mapping[str, Array]) -> list[str]:

@@ -16,7 +16,7 @@ from cpfls_cli.flightlog.agreement import handed
 from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
-from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, named_signals, nameless_clock
+from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, even_step, named_signals, nameless_clock
 from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
@@ -25,12 +25,15 @@ from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName, known_unit
 if TYPE_CHECKING:
     from cpfls_cli.flightlog.rebuilt import Rebuilt
 
-_TIME_NAMES: Final = re.compile(r"ts?(_s|_utc)?|tout|time(_s|_ms|_us|us|stamp)?|stamp|tick|sec(onds)?|millis|micros")
+_TIME_NAMES: Final = re.compile(
+    r"(ts?|time(_?stamp)?)([_ ]?[\[(]?([mun]?s|[mun]?sec|utc)[\])]?)?|tout|stamp|ticks?|sec(onds)?|millis?|mills|micros"
+)
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 # Columns of stamps that a message names, and the share of falls below which one that is only called like them counts.
 _REFUSED, _SELDOM = 3, 0.1
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
+_PULSES = (800.0, 2300.0)  # Of receivers, us.
 _AS_GRAVITY = 0.15  # Share by which what carries a multirotor is usually off gravity.
 _SLOWEST_HZ = 0.5  # Below which a signal shows nothing of a flight.
 _FEWEST_SAMPLES = 20  # For medians and rates.
@@ -178,6 +181,10 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     clock = nameless_clock(fields)
     if clock is not None:
         return clock, "s", ""
+    even = {name: step for name, values in fields.items() if (step := even_step(values)) not in (0.0, 1.0)}
+    for name, step in even.items() if len(even) == 1 else ():
+        for unit in (unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]):
+            return name, unit, f"{name} alone rises evenly, by {step:.3g}: taken for the stamps, in {unit}"
     unknown = (
         "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp"
     )
@@ -214,6 +221,9 @@ def holding_values(log: LogTable, candidates: Sequence[Named]) -> dict[SignalNam
             time, values = log.values(named.group.columns)
         enough_rows = len(time) >= _FEWEST_SAMPLES and log.rate_hz(named.group.columns) >= _SLOWEST_HZ
         if named.signal == "body_rate" and not named.known and len(values) and _is_gravity(values):
+            continue
+        # Sticks have the names of angles too.
+        if named.signal == "attitude" and len(values) and _PULSES[0] < values.min() and values.max() < _PULSES[1]:
             continue
         if enough_rows and float(np.ptp(values, axis=0).max()) > 0:
             kept.setdefault(named.signal, []).append(named)

@@ -16,14 +16,30 @@ from cpfls_cli.flightlog.attitude_columns import BODY_OF, Reading, doubt_reading
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, find_flown, rotor_shares
-from cpfls_cli.flightlog.names import BY_HAND, Named, column_groups, is_of, named_signals, nameless_signals
+from cpfls_cli.flightlog.names import (
+    BY_HAND,
+    Named,
+    column_groups,
+    height_columns,
+    is_of,
+    named_signals,
+    nameless_signals,
+    only_of_airplanes,
+)
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
 from cpfls_cli.flightlog.recognised import Load, LogTable, Recognition, Rival, Seen, called
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.rotor_columns import Found, RotorColumns, find_mixed, find_rotors
 from cpfls_cli.flightlog.setpoint_columns import take_setpoints
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, SignalName
-from cpfls_cli.flightlog.stated_vehicle import Parameters, VehicleKind, forward_flight, refuse_other_vehicle
+from cpfls_cli.flightlog.stated_vehicle import (
+    AIRPLANE,
+    NO_MULTIROTOR,
+    Parameters,
+    VehicleKind,
+    forward_flight,
+    refuse_other_vehicle,
+)
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
 from cpfls_cli.flightlog.vocabulary import KNOWN
@@ -54,6 +70,7 @@ _SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}  # 
 # specific force of a lean of 30 degrees is 15 % above gravity.
 _STEADY: Final = 0.15
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
+_BATTERY_V = (2.5, 80.0)  # From one cell that is empty to more than a large vehicle has.
 _SHOWN = 4  # Groups of columns that are named where others are taken for the same.
 _UP: Final = {"FLU": "up", "FRD": "down"}
 
@@ -77,8 +94,11 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         raise InputError(f"no flight in it: the rotors ({dead[0].group.pattern}) never change")
     log, candidates, ended = _live_part(log, candidates)
     recognised.make_grid(log, candidates)
+    candidates = motion_columns.without_other_axes(log, candidates)
     rotors = find_rotors(_of_rotors(log, candidates), parameters, system)
     rotors = rotors if rotors.driving else find_mixed(log) or rotors
+    if rotors.driving is None and log.flat and (only := only_of_airplanes(log.names)):
+        raise InputError(f"a log of {AIRPLANE} ({joined(only)}), {NO_MULTIROTOR}")
     log, rotors, rebuilt = with_rebuilt(log, rotors, parameters, system)
     shares = None
     if rotors.driving:
@@ -108,10 +128,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     _take_frames(seen, reading)
     if verdict is not None:
         doubt_reading(seen, verdict)
-    if (voltage := seen.first("voltage")) is not None:
-        level = float(np.median(seen.grid(voltage)))
-        scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
-        seen.take(voltage, "V", f"{called(voltage)}; {level * scale:.3g} V in flight", "named", scale)
+    _take_voltage(seen)
     speeds, moved = _take_rotors(seen, rotors)
     _take_wrench(seen)
     _doubt_columns(seen)
@@ -173,14 +190,14 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
     values = {name: named.scale * log.on_grid(named.group.columns) for name, named in first.items()}
     height, rate, angles = values.get("position"), values.get("body_rate"), values.get("attitude")
     if height is not None:
-        up = -1.0 if first["position"].frame == "NED" else 1.0
+        up = -1.0 if first["position"].frame == "NED" or first["position"].group.axis == "n" else 1.0
         stated = first["position"].unit or motion_columns.length_unit(height, 1 / float(log.grid[1] - log.grid[0]))
         height = up * known_unit(stated).factor * height[:, 2]
     elif rotors is None and rate is None:
         # A height that no config takes still says what flies.
-        known = (row for row in KNOWN if row.signal == "height" and is_of(system, row.system))
-        row = next((row for row in known if {*row.columns} <= {*log.names}), None)
-        height = None if row is None else row.scale * log.on_grid(row.columns)[:, 0]
+        known = [(row.columns, row.scale) for row in KNOWN if row.signal == "height" and is_of(system, row.system)]
+        found = next((own for own in (*known, *height_columns(log.names)) if {*own[0]} <= {*log.names}), None)
+        height = None if found is None else found[1] * log.on_grid(found[0])[:, 0]
     if rate is not None:
         unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(rate), 0.99)) > _FASTEST_RAD_S
         rate = rate / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)
@@ -246,6 +263,17 @@ def _take_frames(seen: Seen, reading: Reading | None) -> None:
     if reading is not None and reading.lean is not None and reading.world != world:
         world, reason = reading.world, "z of the world is opposite to z of the level body"
     seen.choose("world_frame", world, reason, "guess" if body is None else body.sure)
+
+
+def _take_voltage(seen: Seen) -> None:
+    """Take the first column that may be the voltage of a battery, and not its charge in per cent."""
+    for voltage in seen.candidates.get("voltage", ()):
+        level = float(np.median(seen.grid(voltage)))
+        scale = 1e-3 if voltage.unit is None and level > 1000 else 1.0
+        whole = voltage.unit is None and bool(np.all(np.mod(seen.log.values(voltage.group.columns)[1], 1) == 0))
+        if _BATTERY_V[0] < level * scale < _BATTERY_V[1] and (scale < 1.0 or not whole):
+            seen.take(voltage, "V", f"{called(voltage)}; {level * scale:.3g} V in flight", "named", scale)
+            return
 
 
 def _take_wrench(seen: Seen) -> None:

@@ -406,7 +406,7 @@ def _command_unit(named: Named, values: Array, parameters: Parameters, chosen: _
     if named.known in (CRAZYFLIE, PARROT) and 1 < high <= 1 / named.scale:
         return _in_unit(named, "1", named.scale, f"{called}: of {1 / named.scale:.0f}, as on a {named.known}", "named")
     words = {*named.group.words}
-    if named.unit in SPEED_UNITS or words & {"om", "omega", "omcmd", "rpm", "rads", "speed", "rad"}:
+    if named.unit in SPEED_UNITS or words & {"om", "omega", "omcmd", "rpm", "rads", "speed", "rad", "w", "n"}:
         unit = named.unit or ("rpm" if high > _RPM_FROM else "rad/s")
         rivals = () if named.unit or unit == "rpm" else (Rival("unit: rpm", "its size fits both"),)
         sure = "guess" if rivals else "named"

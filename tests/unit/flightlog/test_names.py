@@ -2,7 +2,7 @@
 
 import pytest
 
-from cpfls_cli.flightlog.names import column_groups, named_signals
+from cpfls_cli.flightlog.names import column_groups, height_columns, named_signals, only_of_airplanes, wished_signals
 from cpfls_cli.flightlog.settings import UNITS_OF_SIGNAL
 from cpfls_cli.flightlog.vocabulary import ALLOWED, IN_RADIANS, KNOWN, MEANINGS, RANGES, sizes
 from cpfls_cli.units import KNOWN_UNITS
@@ -73,6 +73,45 @@ def first(names, signal, system=""):
         ("x_m y_m z_m vx_m_s vy_m_s vz_m_s", "velocity", "vx_m_s vy_m_s vz_m_s"),
         ("ax_m_s2 ay_m_s2 az_m_s2", "acceleration", "ax_m_s2 ay_m_s2 az_m_s2"),
         ("w1_rad_s w2_rad_s w3_rad_s w4_rad_s", "rotor_speed", "w1_rad_s w2_rad_s w3_rad_s w4_rad_s"),
+        # By place, in any case; of a path any part may say pwm, and output is no command by itself.
+        ("motor_fl motor_bl motor_fr motor_br", "rotor_command", "motor_fl motor_fr motor_bl motor_br"),
+        ("rpmFL rpmFR rpmRL rpmRR", "rotor_speed", "rpmFL rpmFR rpmRL rpmRR"),
+        (
+            "frontLeftMotor frontRightMotor rearLeftMotor rearRightMotor",
+            "rotor_command",
+            "frontLeftMotor frontRightMotor rearLeftMotor rearRightMotor",
+        ),
+        ("output/esc[0] output/esc[1] output/esc[2]", "rotor_command", "output/esc[0] output/esc[1] output/esc[2]"),
+        ("pwm/out[0] pwm/out[1] pwm/out[2]", "rotor_command", "pwm/out[0] pwm/out[1] pwm/out[2]"),
+        ("n_ref1 n_ref2 n_ref3 n_ref4", "rotor_command", "n_ref1 n_ref2 n_ref3 n_ref4"),
+        ("rpm_sp_1 rpm_sp_2 rpm_sp_3 rpm_sp_4", "rotor_command", "rpm_sp_1 rpm_sp_2 rpm_sp_3 rpm_sp_4"),
+        ("duty_1 duty_2 duty_3 duty_4", "rotor_command", "duty_1 duty_2 duty_3 duty_4"),
+        (
+            "output/rotor_speed[0] output/rotor_speed[1] output/rotor_speed[2]",
+            "rotor_speed",
+            "output/rotor_speed[0] output/rotor_speed[1] output/rotor_speed[2]",
+        ),
+        ("M1 M2 M3 M4 M_ref1 M_ref2 M_ref3 M_ref4", "rotor_command", "M_ref1 M_ref2 M_ref3 M_ref4"),
+        ("Phi Theta Psi", "attitude", "Phi Theta Psi"),
+        ("ROLL PITCH YAW", "attitude", "ROLL PITCH YAW"),
+        ("roll pitch heading", "attitude", "roll pitch heading"),
+        ("euler_r euler_p euler_y", "attitude", "euler_r euler_p euler_y"),
+        ("P Q R", "body_rate", "P Q R"),
+        ("gyro_r gyro_p gyro_y", "body_rate", "gyro_r gyro_p gyro_y"),
+        ("pos_n pos_e pos_d", "position", "pos_n pos_e pos_d"),
+        ("curX curY curZ", "position", "curX curY curZ"),
+        ("qi qx qy qz", "quaternion", "qi qx qy qz"),
+        ("xvel yvel zvel", "velocity", "xvel yvel zvel"),
+        ("xrate yrate zrate", "body_rate", "xrate yrate zrate"),
+        (
+            "motor_one motor_two motor_three motor_four",
+            "rotor_command",
+            "motor_one motor_two motor_three motor_four",
+        ),
+        ("x_dot y_dot z_dot", "velocity", "x_dot y_dot z_dot"),
+        ("xdot ydot zdot", "velocity", "xdot ydot zdot"),
+        ("bat_volt", "voltage", "bat_volt"),
+        ("batV", "voltage", "batV"),
         # The first instance of a topic bears no number.
         ("ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM", "rotor_speed", "ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM"),
     ],
@@ -98,10 +137,52 @@ def test_columns_are_found_by_their_names(names, signal, columns):
         ("rpm_cmd/n[0] rpm_cmd/n[1] rpm_cmd/n[2]", "rotor_speed"),
         ("acc_gx acc_gy acc_gz", "body_rate"),
         ("d1 d2 d3 d4", "rotor_command"),
+        ("ref1 ref2 ref3 ref4", "rotor_command"),
+        ("omega_cmd[0] omega_cmd[1] omega_cmd[2]", "rotor_command"),
+        ("M1 M2 M3 M4 M_ref1 M_ref2 M_ref3 M_ref4", "rotor_speed"),
+        ("fl fr rl rr", "rotor_command"),
+        ("x_dot y_dot z_dot", "position"),
+        ("x y z p q r", "attitude"),
+        ("pid_roll pid_pitch pid_yaw", "attitude"),
+        ("u_roll u_pitch u_yaw", "attitude"),
+        ("phi_dot theta_dot psi_dot", "attitude"),
+        ("phi_velocity theta_velocity psi_velocity", "attitude"),
+        ("gimbal_roll gimbal_pitch gimbal_yaw", "attitude"),
+        ("angular_acceleration_x angular_acceleration_y angular_acceleration_z", "body_rate"),
+        ("batt_pct", "voltage"),
+        ("battery_w", "voltage"),
+        ("motor_temp_1 motor_temp_2 motor_temp_3 motor_temp_4", "rotor_command"),
+        ("bat", "voltage"),
     ],
 )
 def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
     assert first(names, signal) is None
+
+
+@pytest.mark.parametrize(
+    ("names", "signal"),
+    [
+        ("p_cmd q_cmd r_cmd", "setpoint_body_rate"),
+        ("omega_cmd[0] omega_cmd[1] omega_cmd[2]", "setpoint_body_rate"),
+        ("cmd_x cmd_y cmd_z", "setpoint_position"),
+        ("x_ref y_ref z_ref", "setpoint_position"),
+    ],
+)
+def test_what_is_commanded_may_be_a_setpoint(names, signal):
+    own = wished_signals(column_groups(tuple(names.split())))
+    assert [named.signal for named in own] == [signal]
+
+
+def test_what_only_airplanes_log_is_known_by_its_words():
+    assert only_of_airplanes(("t", "roll", "airspeed", "aoa_deg")) == ["airspeed", "aoa_deg"]
+    assert not only_of_airplanes(("t", "airspeed", "roll", "yaw"))
+
+
+def test_a_height_is_one_column_in_its_unit():
+    assert list(height_columns(("t", "Alt", "gps_altitude", "altitude(ft)"))) == [
+        (("Alt",), 1.0),
+        (("altitude(ft)",), 0.3048),
+    ]
 
 
 def test_what_a_kind_of_log_asks_for_counts_as_one_of_its_names():

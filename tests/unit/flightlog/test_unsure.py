@@ -12,7 +12,7 @@ from cpfls_cli.flightlog.attitude_columns import _angle_unit, doubt_reading
 from cpfls_cli.flightlog.names import column_groups, named_signals
 from cpfls_cli.flightlog.proposal import known_log, propose
 from cpfls_cli.flightlog.recognised import LogTable, Seen
-from tests.builders.unknown_logs import FLIP, GRAVITY, HUBS, NED, flat_log, flight, named, quaternion
+from tests.builders.unknown_logs import FLIP, GRAVITY, HUBS, NED, flat_log, flight, named, quaternion, with_ground
 
 GYRO, ACC = ("gyro_x", "gyro_y", "gyro_z"), ("acc_x", "acc_y", "acc_z")
 PLACE, SPEED, Q = ("x", "y", "z"), ("vx", "vy", "vz"), ("qw", "qx", "qy", "qz")
@@ -341,3 +341,87 @@ def test_angles_that_jump_by_a_full_turn_are_in_rad():
     assert _angle_unit(angles, rolls)[0] == "rad"
     assert _angle_unit(angles, np.degrees(rolls))[0] == "deg"
     assert _angle_unit(angles, np.column_stack([3.0 * np.sin(time), np.sin(time), time]))[0] == "deg"
+
+
+@pytest.mark.parametrize(("name", "factor", "unit"), [("Tiempo", 1.0, "s"), ("currentT", 1e6, "us")])
+def test_what_alone_rises_evenly_is_the_clock_and_said_to_be(name, factor, unit):
+    proposal = proposed(t={name: factor * OWN.time, "step": np.arange(len(OWN.time), dtype=float)})
+    assert (proposal.time_column, proposal.time_unit) == (name, unit)
+    assert any(f"{name} alone rises evenly" in words for words in proposal.warnings)
+
+
+@pytest.mark.parametrize("others", [{}, {"lap": 2.5 * OWN.time, "odometer": 0.3 * OWN.time}])
+def test_rows_that_are_counted_and_two_that_rise_are_no_clock(others):
+    with pytest.raises(InputError, match="no column of time stamps is recognised"):
+        proposed(t={"step": np.arange(len(OWN.time), dtype=float), **others})
+
+
+def test_charge_is_no_voltage():
+    level = np.round(np.linspace(42, 40, len(OWN.time)))
+    assert "voltage" not in {guess.signal for guess in proposed(battery={"battery": level}).signals}
+    volts = np.linspace(16.2, 15.4, len(OWN.time))
+    proposal = proposed(battery={"battery": level, "battery_voltage": volts})
+    assert signal(proposal, "voltage").columns.columns == ("battery_voltage",)
+
+
+def test_rotors_by_place_are_taken_in_the_order_of_their_places():
+    front_left_first = OWN.speed[:, [2, 0, 1, 3]] * RPM
+    proposal = proposed(speed=named(front_left_first, "rpm_fl", "rpm_fr", "rpm_rl", "rpm_rr"))
+    assert [rotor.name for rotor in proposal.airframe.rotors] == [
+        "front left",
+        "front right",
+        "rear left",
+        "rear right",
+    ]
+
+
+def test_north_east_down_need_no_motion_to_count_downward():
+    """A climb from the ground in z down; an attitude and places alone."""
+    own = with_ground(OWN)
+    turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
+    proposal = proposed(
+        own,
+        attitude=named(turned.as_euler("ZYX")[:, ::-1], *ANGLES),
+        position=named(own.position @ NED.T, "pos_n", "pos_e", "pos_d"),
+        velocity=named(own.velocity @ NED.T, "vel_n", "vel_e", "vel_d"),
+        rate=None,
+        force=None,
+        speed=None,
+    )
+    assert signal(proposal, "position").columns.columns == ("pos_n", "pos_e", "pos_d")
+    assert choices(proposal)["world_frame"][0] == "NED"
+
+
+def test_a_height_alone_shows_what_flies():
+    own = with_ground(OWN)
+    log = {"position": None, "velocity": None, "rate": None, "force": None, "speed": None}
+    with pytest.raises(InputError, match="holds attitude alone"):
+        proposed(own, **log)
+    proposal = proposed(own, **log, height={"Altitude": own.position[:, 2]})
+    assert {guess.signal for guess in proposal.signals} == {"attitude"}
+
+
+def test_a_table_of_an_airplane_is_said_to_be_one():
+    air = {"airspeed": 15 + OWN.velocity[:, 0], "aoa": 0.1 * OWN.angles[:, 1]}
+    with pytest.raises(InputError, match=r"an airplane \(airspeed and aoa\)"):
+        proposed(speed=None, air=air)
+    # With rotors it is a multirotor that measures the wind.
+    assert proposed(air=air).airframe is not None
+
+
+@pytest.mark.parametrize(("velocity", "taken"), [(True, True), (False, False)])
+def test_axes_behind_an_unknown_word_are_a_place_where_the_velocity_is_their_derivative(velocity, taken):
+    speed = named(OWN.velocity, "ext_vx", "ext_vy", "ext_vz") if velocity else None
+    proposal = proposed(position=named(OWN.position, "ext_x", "ext_y", "ext_z"), velocity=speed)
+    assert ("position" in {guess.signal for guess in proposal.signals}) == taken
+    attitude = named(OWN.angles, "ext_roll", "ext_pitch", "ext_yaw")
+    own = proposed(position=named(OWN.position, "ext_x", "ext_y", "ext_z"), velocity=None, attitude=attitude)
+    assert "position" in {guess.signal for guess in own.signals}
+    vibration = named(1 + OWN.angles, "vibe_x", "vibe_y", "vibe_z")
+    assert "position" not in {guess.signal for guess in proposed(position=vibration).signals}
+
+
+def test_sticks_with_the_names_of_angles_are_no_attitude():
+    sticks = named(1500 + 300 * OWN.angles, "Roll", "Pitch", "Yaw")
+    proposal = proposed(attitude=sticks, imu=named(OWN.angles, "IMU_Roll", "IMU_Pitch", "IMU_Yaw"))
+    assert signal(proposal, "attitude").columns.columns == ("IMU_Roll", "IMU_Pitch", "IMU_Yaw")
