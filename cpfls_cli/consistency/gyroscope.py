@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+UP=np.array([0.,0.,1.])
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import polar
 
@@ -27,6 +28,7 @@ FEWEST_BLOCKS = 7  # Blocks below which a jackknife says too little about signif
 _WANTED_BLOCKS, _SHORTEST_BLOCK_S = 8, 1.5
 # Between delays that are tried, and Gauss-Newton steps from the best: the last one changes nothing.
 _SCAN_STEP_S, _ROUNDS = 0.005, 4
+LEVEL=True
 # A rate about an axis counts as excited from this multiple of the residual variance; below it, noise of the
 # gyroscope would pull its scale by more than a tenth.
 _EXCITED = 10.0
@@ -47,6 +49,8 @@ class Kinematics:
     rate: Array
     # Shape (window, sample, 3, 3): ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those axes.
     turning: Array
+    # Shape (window, 3), rad: the same of ``R' e_z x f / |f|``, the turn that an estimator levels its attitude by.
+    level: Array
     time: Array  # Shape (window, sample), s.
     gyro: "CubicSpline"  # Body rate over time; through smooth windows its interpolation error is nothing.
 
@@ -110,7 +114,10 @@ def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
         # Angles are what is averaged: in fast turns body axes are others after an update.
         gyro = _averaged(CubicSpline(signals.time, attitude_rate(signals.attitude, signals.body_rate)), of_attitude)
         gyro = CubicSpline(gyro.x, body_rate(signals.attitude[np.isin(signals.time, gyro.x)], gyro(gyro.x)))
-    return Kinematics(rate, weighted, np.asarray(time), gyro)
+    felt = np.broadcast_to(UP, signals.body_rate.shape) if signals.specific_force is None else signals.specific_force
+    level = np.cross(signals.rotation[:, 2], felt / np.linalg.norm(felt, axis=1, keepdims=True))
+    level = sliding_window_view(level[inside], length, axis=0)[::hop]
+    return Kinematics(rate, weighted, np.einsum("wsab,wbs->wa", weighted, level), np.asarray(time), gyro)
 
 
 def _averaged(values: "CubicSpline", spans: Sequence[float]) -> "CubicSpline":
@@ -212,7 +219,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
         return None
     excited = scanned.excited
     # Axes that turn, and the delay if any does.
-    columns = np.flatnonzero(np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), [excited.any()]]))
+    columns = np.flatnonzero(np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), [excited.any()], [LEVEL]]))
     matrix, delay, variance = np.eye(3), scanned.delay, scanned.variance
     for _ in range(_ROUNDS):
         design, right = _design(flights, matrix, delay), scanned.seen - _read(flights, delay)
@@ -233,7 +240,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
         value=_faults(solution, base) if turns else np.zeros_like(solution),
         error=jackknife_error(draws),
         pull=_pull(scanned.read, variance),
-        known=np.concatenate([np.ones(3, dtype=bool), excited, across, across, [excited.any()]]) & turns,
+        known=np.concatenate([np.ones(3, dtype=bool), excited, across, across, [excited.any()], [LEVEL]]) & turns,
         blocks=len(draws),
         variance=variance,
         flight_bias=bias,
@@ -246,12 +253,12 @@ def _design(flights: Sequence[Kinematics], matrix: Array, delay: float) -> Array
     for flight in flights:
         later = np.einsum("waij,ij->wa", flight.products(delay, 1), matrix)
         products = flight.products(delay).reshape(-1, 3, 9)
-        parts.append(np.concatenate([products, -flight.constants(), later[..., None]], axis=2))
+        parts.append(np.concatenate([products, -flight.constants(), later[..., None], flight.level[..., None]], axis=2))
     return np.concatenate(parts)
 
 
 def _padded(solutions: Array, columns: IntArray) -> Array:
-    whole = np.zeros((len(solutions), 13))
+    whole = np.zeros((len(solutions), 14))
     whole[:, columns] = solutions
     return whole
 
@@ -265,14 +272,14 @@ def _faults(solution: Array, base: float) -> Array:
     misalignment = -Rotation.from_matrix(turned).as_rotvec()
     cross = [stretched[1, 2], stretched[2, 0], stretched[0, 1]]
     bias, scale = inverse @ solution[9:12], np.diag(stretched) - 1
-    return np.concatenate([bias, scale, misalignment, cross, [base + solution[12]]])
+    return np.concatenate([bias, scale, misalignment, cross, [base + solution[12]], solution[13:]])
 
 
 def _pull(read: Array, variance: Array) -> Array:
     pull = variance[:, None] * np.abs(_precision(read))
     both = 0.5 * (pull + pull.T)
     across = np.array([both[1, 2], both[2, 0], both[0, 1]])
-    return np.concatenate([np.zeros(3), np.diag(pull), across, across, [0.0]])
+    return np.concatenate([np.zeros(3), np.diag(pull), across, across, [0.0, 0.0]])
 
 
 def _flight_bias(rest: Array, index: IntArray, block: IntArray) -> tuple[Array, Array]:

@@ -224,7 +224,9 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
         square += len(flight) * flight.known * floor**2
         count += len(flight) * flight.known
     noise = np.sqrt(square / np.maximum(count, 1))
-    inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    inertial = hypothesis.by_flight(
+        lambda flight, _: flight.windows.balance(flight.inertial.direct, flight.inertial.momentum) * flight.known
+    )
     return np.where(count > 0, np.maximum(noise, negligible(np.mean(inertial**2, axis=0))), 1.0)
 
 

@@ -26,6 +26,7 @@ from cpfls_cli.playback.innovations import PER_WINDOW
 from cpfls_cli.weak_form.windows import Windows
 
 TURNING = 4.0  # Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth.
+_OFFSET_M_S2 = 0.1
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
 
@@ -70,6 +71,8 @@ class WeakFlight:
     air: Array = field(default_factory=lambda: np.zeros(6))
     # Shape (6, window): correlation of both by how many windows apart they are, while they last; empty without gusts.
     lasting: Array = field(default_factory=lambda: np.zeros((6, 0)))
+    # Shape (6,): share of its mean that each channel is reduced by, as an accelerometer may have an offset in a flight.
+    reduced: Array = field(default_factory=lambda: np.zeros(6))
     # Shape (6, window, window): takes the first rows to what of each those before do not predict, the last one also all
     # that follow; None for rows as averaged.
     whitening: Array | None = None
@@ -146,7 +149,8 @@ class WeakFlight:
 
     def of_channels(self, rows: Array) -> Array:
         """Give rows, shape (window, 6, ...), of the channels that the flight has, whitened where that is asked for."""
-        rows = rows * self.known.reshape(-1, *[1] * (rows.ndim - 2))
+        shape = (-1, *[1] * (rows.ndim - 2))
+        rows = rows * self.known.reshape(shape) - self.reduced.reshape(shape) * rows.mean(axis=0)
         if self.whitening is not None:
             rows = np.stack([_whitened(each, rows[:, at]) for at, each in enumerate(self.whitening)], axis=1)
         return np.asarray(rows)
@@ -190,7 +194,11 @@ def weak_flight(
         # Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to lose the noise
         # of the gyroscope, which is not what anybody asked.
         turning = flight.averaged(inertial)[:, :3].std(axis=0) > TURNING * noise[:3]
-        return replace(flight, turns=shown(turning))
+        if signals.specific_force is None or floor is not None:
+            return replace(flight, turns=shown(turning))
+        offset = np.where(np.arange(6) < 3, 0.0, _OFFSET_M_S2 * signals.vehicle.mass_kg)
+        reduced = 1 - 1 / np.sqrt(1 + len(flight) * (offset / np.maximum(noise, 1e-30)) ** 2)
+        return replace(flight, turns=shown(turning), reduced=reduced)
 
     # Each stage rebuilds its model, and a flight is planned once.
     shared = model is None and floor is None
