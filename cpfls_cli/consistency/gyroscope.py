@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-UP=np.array([0.,0.,1.])
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import polar
 
@@ -28,7 +27,6 @@ FEWEST_BLOCKS = 7  # Blocks below which a jackknife says too little about signif
 _WANTED_BLOCKS, _SHORTEST_BLOCK_S = 8, 1.5
 # Between delays that are tried, and Gauss-Newton steps from the best: the last one changes nothing.
 _SCAN_STEP_S, _ROUNDS = 0.005, 4
-LEVEL=True
 # A rate about an axis counts as excited from this multiple of the residual variance; below it, noise of the
 # gyroscope would pull its scale by more than a tenth.
 _EXCITED = 10.0
@@ -49,8 +47,7 @@ class Kinematics:
     rate: Array
     # Shape (window, sample, 3, 3): ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those axes.
     turning: Array
-    # Shape (window, 3), rad: the same of ``R' e_z x f / |f|``, the turn that an estimator levels its attitude by.
-    level: Array
+    level: Array  # Shape (window, 3): the same of what an estimator levels its attitude by, for a unit of its gain.
     time: Array  # Shape (window, sample), s.
     gyro: "CubicSpline"  # Body rate over time; through smooth windows its interpolation error is nothing.
 
@@ -114,10 +111,23 @@ def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
         # Angles are what is averaged: in fast turns body axes are others after an update.
         gyro = _averaged(CubicSpline(signals.time, attitude_rate(signals.attitude, signals.body_rate)), of_attitude)
         gyro = CubicSpline(gyro.x, body_rate(signals.attitude[np.isin(signals.time, gyro.x)], gyro(gyro.x)))
-    felt = np.broadcast_to(UP, signals.body_rate.shape) if signals.specific_force is None else signals.specific_force
-    level = np.cross(signals.rotation[:, 2], felt / np.linalg.norm(felt, axis=1, keepdims=True))
-    level = sliding_window_view(level[inside], length, axis=0)[::hop]
+    level = sliding_window_view(_levelling(signals)[inside], length, axis=0)[::hop]
     return Kinematics(rate, weighted, np.einsum("wsab,wbs->wa", weighted, level), np.asarray(time), gyro)
+
+
+def _levelling(signals: Signals) -> Array:
+    """Compute the turn, shape (time, 3), by which an estimator levels its attitude, for a unit of its gain.
+
+    It takes what the accelerometer feels for the vertical: in flight about the axis of the thrust. So the attitude
+    follows ``omega + k (f / |f|) x R' e_z``; it leads by ``k / frequency^2``, which looks like a late gyroscope.
+    Reference: Mahony et al. 2008 (explicit complementary filter).
+    """
+    if signals.specific_force is None:
+        x, y, _ = signals.rotation[:, 2].T
+        return np.stack([-y, x, np.zeros_like(x)], axis=1)
+    felt = np.linalg.norm(signals.specific_force, axis=1, keepdims=True)
+    along = signals.specific_force / np.maximum(felt, np.finfo(float).tiny)
+    return np.asarray(np.cross(along, signals.rotation[:, 2]))
 
 
 def _averaged(values: "CubicSpline", spans: Sequence[float]) -> "CubicSpline":
@@ -184,12 +194,13 @@ def _precision(read: Array) -> Array:
 class GyroFit:
     """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated."""
 
-    # Shape (13,): bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s). The
-    # misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
+    # Shape (14,): bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s), gain
+    # by which the attitude is levelled (1/s). The misalignment is the rotation of the gyroscope against the attitude, a
+    # rotation vector in body axes.
     value: Array
-    error: Array  # Shape (13,): standard errors by the jackknife over blocks.
-    pull: Array  # Shape (13,): how far noise of the gyroscope can have pulled the value at most.
-    known: BoolArray  # Shape (13,): what the motion identifies.
+    error: Array  # Shape (14,): standard errors by the jackknife over blocks.
+    pull: Array  # Shape (14,): how far noise of the gyroscope can have pulled the value at most.
+    known: BoolArray  # Shape (14,): what the motion identifies.
     blocks: int
     variance: Array  # Shape (3,), rad^2/s^2: left about each axis.
     flight_bias: Array  # Shape (flight, 3), rad/s: bias of each flight less that of all.
@@ -218,8 +229,9 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     if block.max() + 1 < FEWEST_BLOCKS:
         return None
     excited = scanned.excited
-    # Axes that turn, and the delay if any does.
-    columns = np.flatnonzero(np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), [excited.any()], [LEVEL]]))
+    others = [excited.any(), excited[:2].any()]
+    # Axes that turn, the delay if any does, and levelling if the vehicle leans.
+    columns = np.flatnonzero(np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), others]))
     matrix, delay, variance = np.eye(3), scanned.delay, scanned.variance
     for _ in range(_ROUNDS):
         design, right = _design(flights, matrix, delay), scanned.seen - _read(flights, delay)
@@ -240,7 +252,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
         value=_faults(solution, base) if turns else np.zeros_like(solution),
         error=jackknife_error(draws),
         pull=_pull(scanned.read, variance),
-        known=np.concatenate([np.ones(3, dtype=bool), excited, across, across, [excited.any()], [LEVEL]]) & turns,
+        known=np.concatenate([np.ones(3, dtype=bool), excited, across, across, others]) & turns,
         blocks=len(draws),
         variance=variance,
         flight_bias=bias,
