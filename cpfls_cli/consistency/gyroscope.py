@@ -30,6 +30,9 @@ _SCAN_STEP_S, _ROUNDS = 0.005, 4
 # A rate about an axis counts as excited from this multiple of the residual variance; below it, noise of the
 # gyroscope would pull its scale by more than a tenth.
 _EXCITED = 10.0
+# Gain, 1/s, and its standard errors, from which on an attitude is levelled: no estimator takes longer than 100 s.
+_LEVELS, _SURELY = 0.01, 5.0
+_MOST = 3.0  # Standard errors that next to nothing exceeds.
 _NUMBERS = {"bias": slice(0, 3), "scale": slice(3, 6), "misalignment": slice(6, 9), "delay": slice(12, 13)}
 LONGEST_DELAY_S = 0.1
 """Longest shift between gyroscope and attitude that is looked for, s; a log beyond that is broken, not late."""
@@ -219,8 +222,11 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
     with the derivative of the reading, refined by Gauss-Newton steps.
 
+    An estimator that levels its attitude by the accelerometer makes it lead, most in slow motion, where a delay shows
+    least. Where that is significant it is fitted jointly; elsewhere the delay may be off by what it would change.
+
     None where there are too few blocks. Nothing is known where only some of them rotate.
-    Reference: Frisch 1934 (bounds of regression with noise on both sides).
+    Reference: Frisch 1934 (bounds of regression with noise on both sides); Hausman 1978 (what is left out).
     """
     index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])
     whole = sum(float(np.ptp(flight.centres)) for flight in flights)
@@ -228,9 +234,23 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     block = blocks_of(index, np.concatenate([flight.centres for flight in flights]), length_s)
     if block.max() + 1 < FEWEST_BLOCKS:
         return None
+    plain = _regressed(flights, scanned, index, block, levels=False)
+    levelled = _regressed(flights, scanned, index, block, levels=bool(scanned.excited[:2].any()))
+    if levelled.value[13] > max(_LEVELS, _SURELY * levelled.error[13]):
+        return levelled
+    # Levelling that is left out shifts the delay by about that, whose variance is the difference of both.
+    unsure = max(0.0, levelled.error[12] ** 2 - plain.error[12] ** 2) ** 0.5
+    plain.pull[12] = abs(levelled.value[12] - plain.value[12]) + _MOST * unsure
+    return plain
+
+
+def _regressed(
+    flights: Sequence[Kinematics], scanned: DelayScan, index: IntArray, block: IntArray, *, levels: bool
+) -> GyroFit:
+    """Fit all numbers; `index`, `block`, shape (window,): number of the flight and of the block of each window."""
     excited = scanned.excited
-    others = [excited.any(), excited[:2].any()]
-    # Axes that turn, the delay if any does, and levelling if the vehicle leans.
+    others = [excited.any(), levels]
+    # Axes that turn, and the delay if any does.
     columns = np.flatnonzero(np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), others]))
     matrix, delay, variance = np.eye(3), scanned.delay, scanned.variance
     for _ in range(_ROUNDS):
