@@ -13,6 +13,7 @@ from scipy.linalg import toeplitz
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.consistency.check import Audit
+from cpfls_cli.consistency.motion import OFFSET_M_S2
 from cpfls_cli.dynamics import InertiaModel, momentum_form
 from cpfls_cli.effects.catalogue.parameter_error import shown, with_thrust
 from cpfls_cli.effects.effect import Columns, Effect
@@ -25,7 +26,6 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.innovations import PER_WINDOW
 from cpfls_cli.weak_form.windows import Windows
 
-OFFSET = 0.1  # m/s^2: standard deviation of the offset that an accelerometer keeps over a flight.
 TURNING = 4.0  # Inertial torque in floors from which on noise shrinks an inertia by less than a sixteenth.
 CHANNELS = ("torque x", "torque y", "torque z", "force x", "force y", "force z")
 """Rows of the balance in each window, body axes, N m and N."""
@@ -217,7 +217,7 @@ def _offset_share(flight: WeakFlight, noise: Array) -> Array:
     share = np.zeros(6)
     if flight.signals.specific_force is not None:
         noise = np.maximum(noise, negligible(np.mean(flight.motion**2, axis=0)))[3:]
-        share[3:] = 1 - noise / np.hypot(noise, np.sqrt(len(flight)) * OFFSET * flight.signals.vehicle.mass_kg)
+        share[3:] = 1 - noise / np.hypot(noise, np.sqrt(len(flight)) * OFFSET_M_S2 * flight.signals.vehicle.mass_kg)
     return share
 
 
