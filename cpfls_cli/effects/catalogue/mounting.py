@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import degrees
+
 from cpfls_cli.effects.effect import Effect, of_axes
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import add, apply, cross, subtract
 
 
@@ -15,6 +19,11 @@ def _acts(see: Instant, p: Numbers) -> Wrench:
     momentum = subtract(apply(inertia, cross(turn, rate)), cross(turn, apply(inertia, rate)))
     torque = add(cross(turn, see.rotor_torque), cross(rate, momentum))
     return Wrench(torque, cross(turn, (0, 0, see.thrust)), momentum=momentum)
+
+
+def _describe(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
+    turns = ", ".join(f"{degrees(value):+.1f} deg about {name[-1]}" for name, value in values.items())
+    return f"Seen from the autopilot the airframe is turned, {turns}." if turns else ""
 
 
 EFFECT = Effect(
@@ -35,5 +44,6 @@ EFFECT = Effect(
     },
     source="first order of a rotation of Newton-Euler equations; PX4 SENS_BOARD_X_OFF, ArduPilot AHRS_TRIM_X",
     rate_derivative=True,
+    describe=_describe,
     acts=_acts,
 )

@@ -106,8 +106,12 @@ def test_a_drag_is_named_with_its_number_next_to_the_offset():
     assert abs(number.value - 2e-3) < 1e-4
 
 
-def test_an_autopilot_mounted_askew_is_named_with_its_angles():
-    found = diagnosed(sensed(lambda signals: askew(signals, TURN)))
+@pytest.mark.parametrize(
+    "way", [{"change": lambda signals: askew(signals, TURN)}, {"effects": {"mounting": TURN.tolist()}}]
+)
+def test_an_autopilot_mounted_askew_is_named_with_its_angles(way):
+    """By rotating exactly what its sensors say, and flown by the model with the effect."""
+    found = diagnosed(sensed(**way))
     assert (str(found.verdict), [effect.name for effect in found.effects]) == ("NAMED", ["mounting"])
     for number, truth in zip(found.effects[0].numbers, TURN, strict=True):
         assert number.low < truth < number.high
