@@ -10,6 +10,7 @@ from benchmarks.blind.gusts import GUSTS
 from benchmarks.blind.vehicles import VEHICLES
 from benchmarks.blind_study.air_tables import air_tables
 from benchmarks.blind_study.fly import flown, fly
+from benchmarks.blind_study.ordinary import ordinary
 from benchmarks.blind_study.run import CASES_AT_ONCE, judge_all, run
 from benchmarks.blind_study.score import scored
 from benchmarks.blind_study.sets import GROUPS, LEVELS, Size, sets
@@ -34,6 +35,8 @@ def main():
             fly([own], options.out)
     if options.command == "thin":
         print(thinned(options.out))
+    if options.command in ("ordinary", "askew"):
+        print(ordinary(options.out, askew=options.command == "askew"))
     if options.command == "judge":
         judge_all(options.out, options.processes)
     if options.command == "run":
@@ -65,7 +68,7 @@ def _quick(options):
 
 def _arguments():
     parser = argparse.ArgumentParser(prog="benchmarks.blind_study", description=__doc__)
-    parser.add_argument("command", choices=("fly", "thin", "judge", "score", "run", "quick"))
+    parser.add_argument("command", choices=("fly", "thin", "ordinary", "askew", "judge", "score", "run", "quick"))
     parser.add_argument("--out", type=Path, default=Path("data/blind"), help="folder of the study")
     parser.add_argument("--seed", type=int, default=31)
     parser.add_argument("--draws", type=int, default=2, help="draws of each effect")

@@ -120,5 +120,6 @@ _OF = {
     "gyro_scale": lambda h, _: _axes("e", h["scale"]),
     "imu_misalignment": lambda h, _: _axes("delta", h["rotation"]),
     "channel_delay": _delay,
+    "mounting": lambda h, _: _axes("theta", h["turn"]),
     "parameter_error": _parameters,
 }

@@ -253,6 +253,9 @@ def _gyro_notes(fit: GyroFit) -> tuple[str, ...]:
     apart = np.abs(fit.flight_bias) > np.maximum(_BIAS_APART, _BY_CHANCE * fit.flight_bias_error)
     cross = fit.known[9:12] & (np.abs(fit.value[9:12]) > np.maximum(_CROSS, _BY_CHANCE * fit.error[9:12]))
     notes = []
+    if fit.value[13]:
+        within = f"within {1 / fit.value[13]:.2g} s"
+        notes.append(f"The attitude is levelled by the accelerometer, {within}: it leans as the vehicle accelerates.")
     if apart.any():
         between = np.ptp(fit.flight_bias, axis=0).max()
         notes.append(f"The gyroscope's constant error differs by {between:.4f} rad/s between flights.")

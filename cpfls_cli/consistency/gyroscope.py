@@ -30,6 +30,9 @@ _SCAN_STEP_S, _ROUNDS = 0.005, 4
 # A rate about an axis counts as excited from this multiple of the residual variance; below it, noise of the
 # gyroscope would pull its scale by more than a tenth.
 _EXCITED = 10.0
+# Gain, 1/s, and its standard errors, from which on an attitude is levelled: no estimator takes longer than 100 s.
+_LEVELS, _SURELY = 0.01, 5.0
+_MOST = 3.0  # Standard errors that next to nothing exceeds.
 _NUMBERS = {"bias": slice(0, 3), "scale": slice(3, 6), "misalignment": slice(6, 9), "delay": slice(12, 13)}
 LONGEST_DELAY_S = 0.1
 """Longest shift between gyroscope and attitude that is looked for, s; a log beyond that is broken, not late."""
@@ -47,6 +50,7 @@ class Kinematics:
     rate: Array
     # Shape (window, sample, 3, 3): ``phi dt (r0 1 + [r]x)``, which turns a rate along the window into those axes.
     turning: Array
+    level: Array  # Shape (window, 3): the same of what an estimator levels its attitude by, for a unit of its gain.
     time: Array  # Shape (window, sample), s.
     gyro: "CubicSpline"  # Body rate over time; through smooth windows its interpolation error is nothing.
 
@@ -110,7 +114,23 @@ def kinematics(signals: Signals, windows: Windows) -> Kinematics | None:
         # Angles are what is averaged: in fast turns body axes are others after an update.
         gyro = _averaged(CubicSpline(signals.time, attitude_rate(signals.attitude, signals.body_rate)), of_attitude)
         gyro = CubicSpline(gyro.x, body_rate(signals.attitude[np.isin(signals.time, gyro.x)], gyro(gyro.x)))
-    return Kinematics(rate, weighted, np.asarray(time), gyro)
+    level = sliding_window_view(_levelling(signals)[inside], length, axis=0)[::hop]
+    return Kinematics(rate, weighted, np.einsum("wsab,wbs->wa", weighted, level), np.asarray(time), gyro)
+
+
+def _levelling(signals: Signals) -> Array:
+    """Compute the turn, shape (time, 3), by which an estimator levels its attitude, for a unit of its gain.
+
+    It takes what the accelerometer feels for the vertical: in flight about the axis of the thrust. So the attitude
+    follows ``omega + k (f / |f|) x R' e_z``; it leads by ``k / frequency^2``, which looks like a late gyroscope.
+    Reference: Mahony et al. 2008 (explicit complementary filter).
+    """
+    if signals.specific_force is None:
+        x, y, _ = signals.rotation[:, 2].T
+        return np.stack([-y, x, np.zeros_like(x)], axis=1)
+    felt = np.linalg.norm(signals.specific_force, axis=1, keepdims=True)
+    along = signals.specific_force / np.maximum(felt, np.finfo(float).tiny)
+    return np.asarray(np.cross(along, signals.rotation[:, 2]))
 
 
 def _averaged(values: "CubicSpline", spans: Sequence[float]) -> "CubicSpline":
@@ -177,12 +197,13 @@ def _precision(read: Array) -> Array:
 class GyroFit:
     """``omega_gyro(t) = (1 + scale + cross) C(misalignment) omega(t - delay) + bias``, estimated."""
 
-    # Shape (13,): bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s). The
-    # misalignment is the rotation of the gyroscope against the attitude, a rotation vector in body axes.
+    # Shape (14,): bias (3, rad/s), scale (3), misalignment (3, rad), symmetric cross-axis (yz, zx, xy), delay (s), gain
+    # by which the attitude is levelled (1/s). The misalignment is the rotation of the gyroscope against the attitude, a
+    # rotation vector in body axes.
     value: Array
-    error: Array  # Shape (13,): standard errors by the jackknife over blocks.
-    pull: Array  # Shape (13,): how far noise of the gyroscope can have pulled the value at most.
-    known: BoolArray  # Shape (13,): what the motion identifies.
+    error: Array  # Shape (14,): standard errors by the jackknife over blocks.
+    pull: Array  # Shape (14,): how far noise of the gyroscope can have pulled the value at most.
+    known: BoolArray  # Shape (14,): what the motion identifies.
     blocks: int
     variance: Array  # Shape (3,), rad^2/s^2: left about each axis.
     flight_bias: Array  # Shape (flight, 3), rad/s: bias of each flight less that of all.
@@ -201,8 +222,11 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     noise still pulls M by at most ``variance left / variance of the rate``, which is reported. The delay is a column
     with the derivative of the reading, refined by Gauss-Newton steps.
 
+    An estimator that levels its attitude by the accelerometer makes it lead, most in slow motion, where a delay shows
+    least. Where that is significant it is fitted jointly; elsewhere the delay may be off by what it would change.
+
     None where there are too few blocks. Nothing is known where only some of them rotate.
-    Reference: Frisch 1934 (bounds of regression with noise on both sides).
+    Reference: Frisch 1934 (bounds of regression with noise on both sides); Hausman 1978 (what is left out).
     """
     index = np.repeat(np.arange(len(flights)), [len(flight.rate) for flight in flights])
     whole = sum(float(np.ptp(flight.centres)) for flight in flights)
@@ -210,9 +234,24 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     block = blocks_of(index, np.concatenate([flight.centres for flight in flights]), length_s)
     if block.max() + 1 < FEWEST_BLOCKS:
         return None
+    plain = _regressed(flights, scanned, index, block, levels=False)
+    levelled = _regressed(flights, scanned, index, block, levels=bool(scanned.excited[:2].any()))
+    if levelled.value[13] > max(_LEVELS, _SURELY * levelled.error[13]):
+        return levelled
+    # Levelling that is left out shifts the delay by about that, whose variance is the difference of both.
+    unsure = max(0.0, levelled.error[12] ** 2 - plain.error[12] ** 2) ** 0.5
+    plain.pull[12] = abs(levelled.value[12] - plain.value[12]) + _MOST * unsure
+    return plain
+
+
+def _regressed(
+    flights: Sequence[Kinematics], scanned: DelayScan, index: IntArray, block: IntArray, *, levels: bool
+) -> GyroFit:
+    """Fit all numbers; `index`, `block`, shape (window,): number of the flight and of the block of each window."""
     excited = scanned.excited
+    others = [excited.any(), levels]
     # Axes that turn, and the delay if any does.
-    columns = np.flatnonzero(np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), [excited.any()]]))
+    columns = np.flatnonzero(np.concatenate([np.tile(excited, 3), np.ones(3, dtype=bool), others]))
     matrix, delay, variance = np.eye(3), scanned.delay, scanned.variance
     for _ in range(_ROUNDS):
         design, right = _design(flights, matrix, delay), scanned.seen - _read(flights, delay)
@@ -233,7 +272,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
         value=_faults(solution, base) if turns else np.zeros_like(solution),
         error=jackknife_error(draws),
         pull=_pull(scanned.read, variance),
-        known=np.concatenate([np.ones(3, dtype=bool), excited, across, across, [excited.any()]]) & turns,
+        known=np.concatenate([np.ones(3, dtype=bool), excited, across, across, others]) & turns,
         blocks=len(draws),
         variance=variance,
         flight_bias=bias,
@@ -246,12 +285,12 @@ def _design(flights: Sequence[Kinematics], matrix: Array, delay: float) -> Array
     for flight in flights:
         later = np.einsum("waij,ij->wa", flight.products(delay, 1), matrix)
         products = flight.products(delay).reshape(-1, 3, 9)
-        parts.append(np.concatenate([products, -flight.constants(), later[..., None]], axis=2))
+        parts.append(np.concatenate([products, -flight.constants(), later[..., None], flight.level[..., None]], axis=2))
     return np.concatenate(parts)
 
 
 def _padded(solutions: Array, columns: IntArray) -> Array:
-    whole = np.zeros((len(solutions), 13))
+    whole = np.zeros((len(solutions), 14))
     whole[:, columns] = solutions
     return whole
 
@@ -265,14 +304,14 @@ def _faults(solution: Array, base: float) -> Array:
     misalignment = -Rotation.from_matrix(turned).as_rotvec()
     cross = [stretched[1, 2], stretched[2, 0], stretched[0, 1]]
     bias, scale = inverse @ solution[9:12], np.diag(stretched) - 1
-    return np.concatenate([bias, scale, misalignment, cross, [base + solution[12]]])
+    return np.concatenate([bias, scale, misalignment, cross, [base + solution[12]], solution[13:]])
 
 
 def _pull(read: Array, variance: Array) -> Array:
     pull = variance[:, None] * np.abs(_precision(read))
     both = 0.5 * (pull + pull.T)
     across = np.array([both[1, 2], both[2, 0], both[0, 1]])
-    return np.concatenate([np.zeros(3), np.diag(pull), across, across, [0.0]])
+    return np.concatenate([np.zeros(3), np.diag(pull), across, across, [0.0, 0.0]])
 
 
 def _flight_bias(rest: Array, index: IntArray, block: IntArray) -> tuple[Array, Array]:

@@ -49,6 +49,7 @@ are tried from one window to the next."""
 
 _LEAST = {"velocity": 0.1, "acceleration": 0.2, "specific_force": 0.2}
 """Offsets that calibrated sensors do not have, m/s and m/s^2: of an accelerometer 2 % of gravity."""
+OFFSET_M_S2 = 0.1  # Standard deviation of what a calibrated accelerometer is off by all along a flight: 10 mg.
 _CHANCE = 1e-5  # That scatter of blocks makes one: a dozen are looked at, and slow errors scatter less than others.
 _APART = 0.5  # Share of an offset by which that of a half of the flight, or against the thrust, may be another.
 

@@ -304,7 +304,7 @@ def _picture(
     time = close.centres(flight.time)
     middle, half = 0.5 * (stretch.start_s + stretch.end_s), 0.5 * max(settings.block_s, stretch.end_s - stretch.start_s)
     shown = np.abs(time - middle) <= half
-    measured = repaired.averaged(repaired.inertial)[shown, channel]
+    measured = repaired.motion[shown, channel]
     logged = close.average(raw.signals.wrench)[shown, channel]
     after = measured - model.residual([repaired])[shown, channel]
     return WorstWindows(

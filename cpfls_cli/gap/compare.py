@@ -161,7 +161,7 @@ def compare(
 
 def _activity(hypothesis: System, known: BoolArray) -> Array:
     """Compute the root mean square of inertial or rotor wrench, whichever is larger."""
-    taken = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    taken = hypothesis.by_flight(lambda flight, _: flight.motion)
     given = hypothesis.by_flight(lambda flight, signals: flight.windows.average(signals.wrench))
     size = np.maximum(known_size(taken, known), known_size(given, known))
     # Sideways, too, a vehicle is moved by its thrust.

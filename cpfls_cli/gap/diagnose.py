@@ -156,7 +156,7 @@ def diagnose(
         *(refused.sentence for refused in named.refusals),
     ]
     notes = [*not_judged(held_out), *([] if named.differ else doubts)]
-    inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    inertial = hypothesis.by_flight(lambda flight, _: flight.motion)
     # Above the floor of the sensors alone.
     excited = bool((inertial[:, :3].std(axis=0) > TURNING * quiet[:3]).any())
     diagnosis = _concluded(named, judged, faults, excited, audited, notes, (training, held), settings)

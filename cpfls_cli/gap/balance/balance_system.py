@@ -12,15 +12,10 @@ from scipy.optimize import minimize_scalar
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Columns, Shape
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.noise_floor import noise_floor
+from cpfls_cli.gap.balance.noise_floor import negligible, noise_floor
 from cpfls_cli.gap.balance.weak_flight import Candidate, CandidateKey, WeakFlight, actuated, columns_of, nuisance
 from cpfls_cli.gap.settings import CLEAR, NOISE
 from cpfls_cli.vehicle.settings import VehicleSettings
-
-NEGLIGIBLE = 0.003
-"""Share of the torque or force below which nobody could use a correction; sampling alone leaves about as much."""
-_QUIET_AXIS = 0.3
-"""Torque of the most active axis that counts on every axis: what is negligible about one is so about the others."""
 
 
 @dataclass(frozen=True)
@@ -224,17 +219,8 @@ def floors(hypothesis: System, coefficients: Array) -> Array:
         square += len(flight) * flight.known * floor**2
         count += len(flight) * flight.known
     noise = np.sqrt(square / np.maximum(count, 1))
-    inertial = hypothesis.by_flight(lambda flight, _: flight.averaged(flight.inertial))
+    inertial = hypothesis.by_flight(lambda flight, _: flight.motion)
     return np.where(count > 0, np.maximum(noise, negligible(np.mean(inertial**2, axis=0))), 1.0)
-
-
-def negligible(power: Array) -> Array:
-    """Compute the size of a gap, shape (6,), N m and N, below which nobody could use a correction.
-
-    `power`: mean squares of torque and force of the motion, shape (6,), (N m)^2 and N^2, body axes; known of all.
-    """
-    torque, force = np.sqrt(power[:3]), np.sqrt(np.mean(power[3:]))
-    return NEGLIGIBLE * np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[force] * 3])
 
 
 def residual_along(hypothesis: System, number: int, coefficients: Array) -> Columns:

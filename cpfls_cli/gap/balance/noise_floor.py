@@ -23,6 +23,10 @@ _PASSED = 0.6
 _BAND = 1.5
 CORRELATIONS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95)  # From sample to sample; each halves the band of the one before about.
 _PADDED = 8  # Frequencies for each that a window resolves, so that a sum over them is an integral.
+NEGLIGIBLE = 0.003
+"""Share of the torque or force below which nobody could use a correction; sampling alone leaves about as much."""
+_QUIET_AXIS = 0.3
+"""Torque of the most active axis that counts on every axis: what is negligible about one is so about the others."""
 
 
 def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = None) -> Array:
@@ -44,6 +48,15 @@ def noise_floor(residual: Columns, windows: Windows, cut_off: Array | None = Non
         channels = np.flatnonzero(limit == edge)
         floor[channels] = _below(residual, windows, float(edge))[channels]
     return floor
+
+
+def negligible(power: Array) -> Array:
+    """Compute the size of a gap, shape (6,), N m and N, below which nobody could use a correction.
+
+    `power`: mean squares of torque and force of the motion, shape (6,), (N m)^2 and N^2, body axes; known of all.
+    """
+    torque, force = np.sqrt(power[:3]), np.sqrt(np.mean(power[3:]))
+    return NEGLIGIBLE * np.array([*np.maximum(torque, _QUIET_AXIS * torque.max()), *[force] * 3])
 
 
 def channel_cut_offs(signals: Signals, euler: bool) -> Array:

@@ -13,13 +13,14 @@ from scipy.linalg import toeplitz
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.consistency.check import Audit
+from cpfls_cli.consistency.motion import OFFSET_M_S2
 from cpfls_cli.dynamics import InertiaModel, momentum_form
 from cpfls_cli.effects.catalogue.parameter_error import shown, with_thrust
 from cpfls_cli.effects.effect import Columns, Effect
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals, as_slow_as_rotors
 from cpfls_cli.errors import InputError
-from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, noise_floor
+from cpfls_cli.gap.balance.noise_floor import channel_cut_offs, negligible, noise_floor
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.innovations import PER_WINDOW
@@ -70,6 +71,8 @@ class WeakFlight:
     air: Array = field(default_factory=lambda: np.zeros(6))
     # Shape (6, window): correlation of both by how many windows apart they are, while they last; empty without gusts.
     lasting: Array = field(default_factory=lambda: np.zeros((6, 0)))
+    # Shape (6,): share of their mean over the flight that rows are reduced by, which may be an accelerometer's offset.
+    offset_share: Array = field(default_factory=lambda: np.zeros(6))
     # Shape (6, window, window): takes the first rows to what of each those before do not predict, the last one also all
     # that follow; None for rows as averaged.
     whitening: Array | None = None
@@ -127,6 +130,11 @@ class WeakFlight:
         """Average columns, or a residual, over the windows, shape (window, 6, ...)."""
         return self.of_channels(self.windows.balance(columns.direct, columns.momentum))
 
+    @property
+    def motion(self) -> Array:
+        """Average the inertial torque and force over the windows, shape (window, 6), with an accelerometer's offset."""
+        return replace(self, offset_share=np.zeros(6)).averaged(self.inertial)
+
     @cached_property
     def innovations(self) -> WeakFlight:
         """Take of each row what the rows before do not predict: of gusts and noise these are alike and independent.
@@ -146,7 +154,8 @@ class WeakFlight:
 
     def of_channels(self, rows: Array) -> Array:
         """Give rows, shape (window, 6, ...), of the channels that the flight has, whitened where that is asked for."""
-        rows = rows * self.known.reshape(-1, *[1] * (rows.ndim - 2))
+        shape = (-1, *[1] * (rows.ndim - 2))
+        rows = (rows - self.offset_share.reshape(shape) * rows.mean(axis=0)) * self.known.reshape(shape)
         if self.whitening is not None:
             rows = np.stack([_whitened(each, rows[:, at]) for at, each in enumerate(self.whitening)], axis=1)
         return np.asarray(rows)
@@ -189,12 +198,27 @@ def weak_flight(
         noise = noise_floor(flight.residual(own), windows, cut_off) if floor is None else floor
         # Where the inertial torque of an axis hardly leaves the noise, a fit would shrink its inertia to lose the noise
         # of the gyroscope, which is not what anybody asked.
-        turning = flight.averaged(inertial)[:, :3].std(axis=0) > TURNING * noise[:3]
-        return replace(flight, turns=shown(turning))
+        turning = flight.motion[:, :3].std(axis=0) > TURNING * noise[:3]
+        return replace(flight, turns=shown(turning), offset_share=_offset_share(flight, noise))
 
     # Each stage rebuilds its model, and a flight is planned once.
     shared = model is None and floor is None
     return signals.once((weak_flight, windows, force, tuple(axes)), make) if shared else make()
+
+
+def _offset_share(flight: WeakFlight, noise: Array) -> Array:
+    """Give the share of their mean that rows of a random constant and of noise are reduced by to be independent.
+
+    The constant is the offset of an accelerometer, which is another in each flight.
+
+    `noise`, shape (6,), N m and N: of averages over windows.
+    Reference: Fuller and Battese 1974 (random effects).
+    """
+    share = np.zeros(6)
+    if flight.signals.specific_force is not None:
+        noise = np.maximum(noise, negligible(np.mean(flight.motion**2, axis=0)))[3:]
+        share[3:] = 1 - noise / np.hypot(noise, np.sqrt(len(flight)) * OFFSET_M_S2 * flight.signals.vehicle.mass_kg)
+    return share
 
 
 @lru_cache(maxsize=64)

@@ -14,7 +14,8 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import FEWEST_BLOCKS, block_length, half_width, jackknife_error
 from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.gap.balance.balance_system import System, negligible, residual_along
+from cpfls_cli.gap.balance.balance_system import System, residual_along
+from cpfls_cli.gap.balance.noise_floor import negligible
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.residual.air import known_motion
 from cpfls_cli.gap.settings import COUNTS

@@ -123,7 +123,7 @@ def test_all_are_there_and_in_order():
     modules = {module.name for module in pkgutil.iter_modules(catalogue.__path__)}
     assert set(CATALOGUE) == modules
     assert list(CATALOGUE)[:2] == ["linear_damping", "quadratic_damping"]
-    assert list(CATALOGUE)[31] == "parameter_error"
+    assert list(CATALOGUE)[32] == "parameter_error"
 
 
 def test_an_unknown_name_gives_the_nearest():
