@@ -151,10 +151,7 @@ def test_not_a_good_model(refuse, pipeline, study, tmp_path):
             {"model__fuzzy__coefficients": np.full(113, np.inf)},
             "model/fuzzy/coefficients: 113 of 113 values are not finite",
         ),
-        (
-            {"model__fuzzy__rigid_body": None},
-            "the cpfls/identified lacks /model/fuzzy/rigid_body; make it again",
-        ),
+        ({"model__fuzzy__rigid_body": None}, "the cpfls/identified lacks /model/fuzzy/rigid_body; make it again"),
     ],
 )
 def test_a_model_of_wrong_content(refuse, model, tmp_path, values, message):
@@ -258,9 +255,7 @@ def test_a_model_without_verdict_is_said(cpfls, model, tmp_path, form):
 
 def test_a_model_that_was_judged_unfit_is_marked(cpfls, refuse, model, tmp_path):
     with_fields(
-        model,
-        model,
-        verdict=Verdict("do-not-use", "", (Reason("it is fast", 1), Reason("it explains nothing", -1))),
+        model, model, verdict=Verdict("do-not-use", "", (Reason("it is fast", 1), Reason("it explains nothing", -1)))
     )
     (line,) = refuse("export", model, "-o", tmp_path / "m.c")
     assert line == f"{model}: its verdict is do-not-use; --anyway exports it, marked as such"

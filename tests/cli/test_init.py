@@ -378,10 +378,7 @@ def test_masses_and_arms_that_nothing_flies_with_are_refused(cpfls, log, tmp_pat
         (("--mass", MASS, "--arm", ARM, "--inertia", "40,44,75"), ("--inertia = 75: ", "75 is an inertia in kg cm^2")),
         (("--inertia", "0.004,0.004,0.02"), ("--inertia = 0.004,0.004,0.02: no body has this inertia",)),
         (("--inertia", "0.004,0.004"), ("is not three moments of inertia above 0; write IXX,IYY,IZZ in kg m^2",)),
-        (
-            ("--mass", MASS, "--arm", ARM, "--thrust-factor", "6.5e-8"),
-            ("6.5e-08: ", "6.5e-08 is a factor in N/rpm^2"),
-        ),
+        (("--mass", MASS, "--arm", ARM, "--thrust-factor", "6.5e-8"), ("6.5e-08: ", "6.5e-08 is a factor in N/rpm^2")),
     ],
 )
 def test_a_mass_and_an_arm_that_no_vehicle_has_are_refused_with_the_likely_unit(cpfls, log, tmp_path, words, said):

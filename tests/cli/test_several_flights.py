@@ -114,10 +114,7 @@ def test_a_flight_read_chunk_by_chunk_gives_the_same_bytes(cpfls, study, pipelin
 
 @pytest.mark.parametrize(
     ("dataset", "value", "said"),
-    [
-        ("torque", np.nan, "torque: 3 of 1647 values are not finite"),
-        ("time", 0.0, "time: does not ascend at index 7"),
-    ],
+    [("torque", np.nan, "torque: 3 of 1647 values are not finite"), ("time", 0.0, "time: does not ascend at index 7")],
 )
 def test_a_long_flight_is_checked_too(refuse, study, pipeline, tmp_path, monkeypatch, dataset, value, said):
     monkeypatch.setattr(training, "IN_MEMORY", 100)

@@ -333,10 +333,7 @@ def filled(tmp_path, monkeypatch):
         "# ALL GOOD: of {{ r.first.name }} {good}\n\nAnd more.\n\n- one\n"
     )
     monkeypatch.setattr(sys.modules[__name__], "__file__", str(tmp_path / "stages" / "look.py"))
-    monkeypatch.setattr(
-        "cpfls_cli.stages.report.page_about",
-        lambda _, paths: " ".join(path.name for path in paths),
-    )
+    monkeypatch.setattr("cpfls_cli.stages.report.page_about", lambda _, paths: " ".join(path.name for path in paths))
     log = tmp_path / "log.csv"
     log.write_text("1")
 

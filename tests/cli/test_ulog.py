@@ -163,11 +163,7 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(refuse, config, 
 
 def test_the_example_gives_torques_in_the_directions_of_px4(cpfls, write, tmp_path):
     """Roll to the right takes the left motors, nose up the front ones, nose to the right the counter-clockwise ones."""
-    fields = {
-        ATTITUDE: FIELDS[ATTITUDE],
-        RATE: FIELDS[RATE],
-        "actuator_motors": "uint64_t timestamp;float[12] control",
-    }
+    fields = {ATTITUDE: FIELDS[ATTITUDE], RATE: FIELDS[RATE], "actuator_motors": "uint64_t timestamp;float[12] control"}
     push = {"roll": (-1, 1, 1, -1), "pitch": (1, -1, 1, -1), "yaw": (1, 1, -1, -1)}
     moves = [0.6 + 0.1 * np.array(motors) for motors in push.values()]
     sent = [row for row in rows() if row[1] != 2]

@@ -107,11 +107,7 @@ def test_mcap_is_read_back_at_the_stamps_of_the_log(cpfls, logged, tmp_path):
     assert np.abs(stamps - 1000 * TIME_US[own]).max() < 1000
     read = [said["y"]["measured"] for _, said in found["/body_rate"]]
     np.testing.assert_allclose(read, RATE[own, 1], atol=1e-8)
-    assert about["/body_rate"][1] == {
-        "unit": "rad/s",
-        "frame": "body (FLU)",
-        "description": "body rates p, q, r",
-    }
+    assert about["/body_rate"][1] == {"unit": "rad/s", "frame": "body (FLU)", "description": "body rates p, q, r"}
     assert about["/pose"][0] == "foxglove.PoseInFrame"
     assert about["/tf/body"][0] == "foxglove.FrameTransform"
     stamp, pose = found["/pose"][7]

@@ -94,10 +94,7 @@ def test_killed_at_random_moments_it_ends_the_same(program, whole, tmp_path):
 
 
 # The initial population and six generations leave a checkpoint each; the eighth file is the model.
-@pytest.mark.parametrize(
-    ("call", "owner", "name"),
-    [(1, os, "fsync"), (8, os, "replace")],
-)
+@pytest.mark.parametrize(("call", "owner", "name"), [(1, os, "fsync"), (8, os, "replace")])
 def test_killed_while_writing_it_ends_the_same(program, whole, tmp_path, call, owner, name):
     output = tmp_path / "model.h5"
     killed = program(output, patch=at_call(call, owner, name, kill_itself)).wait()

@@ -95,14 +95,7 @@ def study(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def full(study):
-    given = (
-        study.trajectory,
-        study.flight,
-        study.noisy,
-        study.selection,
-        study.model,
-        study.ridge,
-    )
+    given = (study.trajectory, study.flight, study.noisy, study.selection, study.model, study.ridge)
     output = study.folder / "report.html"
     with drawn():
         summary = json.loads(cpfls("report", study.config, *given, "-o", output, "--json").stdout)

@@ -190,9 +190,7 @@ NO_OFFSET = {
     "attitude leans above an accelerometer": lambda s: leaning(s, felt=True),
     "scales": lambda s: replace(s, velocity=1.01 * s.velocity, acceleration=1.01 * (s.acceleration + UP) - UP),
     "a little rotated in steady flight": lambda s: replace(
-        s,
-        position=s.position + 4.0 * np.outer(s.time, EAST),
-        velocity=(s.velocity + 4.0 * EAST) @ turned(2.0).T,
+        s, position=s.position + 4.0 * np.outer(s.time, EAST), velocity=(s.velocity + 4.0 * EAST) @ turned(2.0).T
     ),
     "slow errors": lambda s: replace(
         s, velocity=s.velocity + 0.2 * slow_error(s, 1), acceleration=s.acceleration + 0.3 * slow_error(s, 2)

@@ -7,10 +7,7 @@ import pytest
 from scipy.interpolate import interp1d
 
 from cpfls_cli.effects.catalogue.rotor_mismatch import gains
-from cpfls_cli.effects.catalogue.vertical_descent import (
-    descent_state,
-    induced_velocity,
-)
+from cpfls_cli.effects.catalogue.vertical_descent import descent_state, induced_velocity
 from cpfls_cli.effects.hooks import second_order
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.lag import delayed, lagged

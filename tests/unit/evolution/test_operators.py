@@ -108,8 +108,7 @@ def test_intermediate_recombination_stays_in_range_and_takes_its_share_of_the_pa
 
 
 @pytest.mark.parametrize(
-    ("population", "subpopulations", "sizes"),
-    [(75, 5, [15] * 5), (17, 5, [4, 4, 3, 3, 3]), (6, 1, [6])],
+    ("population", "subpopulations", "sizes"), [(75, 5, [15] * 5), (17, 5, [4, 4, 3, 3, 3]), (6, 1, [6])]
 )
 def test_subpopulations_are_as_even_as_possible(population, subpopulations, sizes):
     groups = members(subpopulation_labels(population, subpopulations))

@@ -308,11 +308,7 @@ def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):
     [
         ("V", (12.5, -0.3), "voltage is 0 or less at 3 of 90 samples, so it is not used: drop these rows, or check"),
         ("1", (0.9, 0.0), "voltage is 0 or less at 1 of 90 samples"),
-        (
-            "1",
-            (12.5, 10.0),
-            r"12\.5 times that of a full battery, so it is not used: set import\.signals",
-        ),
+        ("1", (12.5, 10.0), r"12\.5 times that of a full battery, so it is not used: set import\.signals"),
     ],
 )
 @pytest.mark.parametrize("read", [recordings.read_flights, playback.flights_to_play])

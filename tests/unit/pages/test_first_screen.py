@@ -77,10 +77,7 @@ def next_steps(found):
             "These flights differ: what shows in some of them does not show in the others.",
         ),
         ({"named": ("gyro_bias",)}, "The sensors are at fault: gyro bias."),
-        (
-            {"named": ("channel_delay",)},
-            "The sensors are at fault: time shift between rotor and gyro channels.",
-        ),
+        ({"named": ("channel_delay",)}, "The sensors are at fault: time shift between rotor and gyro channels."),
         (
             {"named": ("parameter_error",)},
             "A parameter of the vehicle is wrong: Izz over yaw torque +24.0 % against the config.",

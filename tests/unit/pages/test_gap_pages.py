@@ -341,12 +341,7 @@ def test_noise_that_is_larger_than_gusts_is_named():
             f"{WITH}, part of the residual is repeatable, in the torque about y (pitch): more is missing.",
         ),
         # Squares: all of 1.2 of 4.0 is left.
-        (
-            PITCH,
-            1.2,
-            "9 %",
-            f"{WITH}, 9 % at most of the repeatable gap remains: no further effect shows.",
-        ),
+        (PITCH, 1.2, "9 %", f"{WITH}, 9 % at most of the repeatable gap remains: no further effect shows."),
         (
             PITCH + shares(yaw=[0.3, 0.0, 0.0, 0.4, 0.6, 0.0]),
             1.2,

@@ -23,10 +23,7 @@ def _part(first: int, count: int, **setpoints: Any) -> Signals:
 
 def test_setpoints_are_joined_where_all_stretches_know_them() -> None:
     wished = np.arange(60.0).reshape(20, 3)
-    parts = [
-        _part(0, 12, attitude=wished[:12], thrust=np.ones((12, 1))),
-        _part(30, 8, attitude=wished[12:]),
-    ]
+    parts = [_part(0, 12, attitude=wished[:12], thrust=np.ones((12, 1))), _part(30, 8, attitude=wished[12:])]
     flight = playback_flight(parts, "linear")
     assert list(flight.setpoints) == ["attitude"]
     assert flight.setpoints["attitude"] == pytest.approx(wished)

@@ -8,12 +8,7 @@ import pytest
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.reduction.survey import survey
-from cpfls_cli.reduction.training_set import (
-    check_streamed,
-    draw_pool,
-    random_streamed,
-    reduce_streamed,
-)
+from cpfls_cli.reduction.training_set import check_streamed, draw_pool, random_streamed, reduce_streamed
 from tests.builders.reductions import beginning, random_selections, reduce, row_space
 
 

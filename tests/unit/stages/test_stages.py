@@ -78,9 +78,7 @@ VIBRATION = SimpleNamespace(
     lines=(SimpleNamespace(hz=42.0),),
 )
 SHAPE = SimpleNamespace(
-    collective=np.array([0.3, 0.4, 0.5]),
-    specific_force=np.array([5.0, 8.0, 13.0]),
-    exponent=Estimate.around(2.0, 0.1),
+    collective=np.array([0.3, 0.4, 0.5]), specific_force=np.array([5.0, 8.0, 13.0]), exponent=Estimate.around(2.0, 0.1)
 )
 FOUND = SimpleNamespace(
     balance=SimpleNamespace(rotors=ROTORS),

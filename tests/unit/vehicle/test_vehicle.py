@@ -215,12 +215,7 @@ def test_cross_layout_follows_the_simulator_rotorpy():
         RotorSettings(position_m=(x, y, 0.0), spin=spin, thrust_factor_n_s2=k, drag_factor_n_m_s2=b)
         for x, y, spin in hubs
     )
-    expected = [
-        [k, k, k, k],
-        [k * d, -k * d, -k * d, k * d],
-        [-k * d, -k * d, k * d, k * d],
-        [b, -b, b, -b],
-    ]
+    expected = [[k, k, k, k], [k * d, -k * d, -k * d, k * d], [-k * d, -k * d, k * d, k * d], [b, -b, b, -b]]
     np.testing.assert_allclose(allocation_matrix(VehicleSettings(rotors=rotors)), expected)
 
 
