@@ -232,8 +232,7 @@ def test_selection_with_wrong_indices(refuse, changed, pipeline, study, tmp_path
         file["indices"] = values
 
     selection = changed("selection", change)
-    words = ("identify", study, pipeline.flight, "--selection", selection, "-o", tmp_path / "out.h5")
-    (line,) = refuse(*words)
+    (line,) = refuse("identify", study, pipeline.flight, "--selection", selection, "-o", tmp_path / "out.h5")
     assert line.startswith(f"{selection}: {message}")
 
 

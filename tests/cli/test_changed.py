@@ -234,8 +234,7 @@ def by_torque(tmp_path_factory):
 def test_a_ratio_that_is_reversed_today_is_a_change(cpfls, by_torque, today, number):
     result = compared(cpfls, by_torque, today)
     assert result.exit_code == 1, result.output
-    summary = json.loads((by_torque / "out" / "changed.json").read_text())
-    assert summary["reversed"] == [number]
+    assert json.loads((by_torque / "out" / "changed.json").read_text())["reversed"] == [number]
     assert "reversed, or nothing, and in no reference flight" in " ".join(result.stdout.split())
 
 

@@ -165,8 +165,7 @@ def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
     wrong = WRONG[name]
     config, (first, second) = logs(wrong.sign)
     words = (first, "--held-out", second, "-o", tmp_path / "vehicle.h5", "--anyway", *asked(wrong))
-    result = run.done("vehicle", config, *words)
-    label, sentence = result.stdout.splitlines()[:2]
+    label, sentence = run.done("vehicle", config, *words).stdout.splitlines()[:2]
     assert label.startswith("DO NOT USE: ")
     assert sentence.startswith(f"  Do not use it. {begins(wrong)}{first.name}: ")
     assert wrong.words in sentence

@@ -183,8 +183,7 @@ def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_p
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in made.stderr.splitlines()
     header = read(compared, Disagreement)[1]
     assert header.cautions[0] == f"vehicle.h5: {HEADLINE}"
-    answer = cpfls.summary("info", compared)
-    assert answer["cautions"] == list(header.cautions)
+    assert cpfls.summary("info", compared)["cautions"] == list(header.cautions)
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in cpfls("info", compared).stderr.splitlines()
     cpfls.done("report", config, compared, "-o", tmp_path / "page.md")
     summary = (tmp_path / "page.md").read_text().split("## ")[1]

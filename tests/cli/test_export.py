@@ -203,8 +203,7 @@ def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):
 @pytest.mark.parametrize("form", ENDINGS)
 def test_the_suffix_shows_the_form(cpfls, pipeline, tmp_path, form):
     output = tmp_path / f"m.{ENDINGS[form]}"
-    result = cpfls("export", pipeline.model, "-o", output, "--json")
-    assert json.loads(result.stdout)["format"] == form
+    assert json.loads(cpfls("export", pipeline.model, "-o", output, "--json").stdout)["format"] == form
     answer = tmp_path / "told" / output.name
     answer.parent.mkdir()
     cpfls.done("export", pipeline.model, "--format", form, "-o", answer)

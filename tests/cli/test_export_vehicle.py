@@ -401,8 +401,7 @@ def test_a_report_strikes_the_number_through_in_all_forms(cpfls, folder):
 
 @pytest.mark.parametrize(("command", "output"), [("export", "v.c"), ("export", "v.xml"), ("spread", "s.yaml")])
 def test_no_export_holds_it_unless_it_is_asked_for(cpfls, folder, tmp_path, command, output):
-    words = (command, folder / "vehicle.h5", "-o", tmp_path / output)
-    refused = cpfls(*words, "--force")
+    refused = cpfls(command, folder / "vehicle.h5", "-o", tmp_path / output, "--force")
     assert refused.exit_code == 2
     assert f"impossible numbers, which no such vehicle has: {HEAVY}" in refused.stderr
     assert "--anyway exports" in refused.stderr

@@ -36,8 +36,7 @@ def described(cpfls, *arguments):
 
 
 def test_one_format_is_described_without_a_file(cpfls):
-    every = described(cpfls, "--format", "flight")
-    (flight,) = every
+    (flight,) = described(cpfls, "--format", "flight")
     assert (flight["format"], flight["commands"]) == ("cpfls/flight", ["simulate", "import"])
     torque = flight["datasets"]["body_torque"]
     assert (torque["dimensions"], torque["units"], torque["frame"]) == (["time", "axis"], "N m", "body (FLU)")

@@ -217,8 +217,7 @@ def flights(fly):
 def test_the_model_of_one_flight_is_exact_on_another(cpfls, flights, tmp_path):
     first, _, other = flights
     words = ("identify", CONFIG, first, "--validate", other, "-o", tmp_path / "model.h5", "--json")
-    result = cpfls.done(*words)
-    summary = json.loads(result.stdout)
+    summary = json.loads(cpfls.done(*words).stdout)
     assert (summary["rank"], summary["parameters"]) == (61, 61)
     assert summary["held_out"][other.name]["relative_error"] < 1e-8
 

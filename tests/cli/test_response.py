@@ -201,8 +201,7 @@ def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
 
 def test_an_identified_model_is_judged_with_its_inertia(cpfls, pipeline, study, tmp_path):
     words = ("response", study, pipeline.flight, "--model", pipeline.model, "-o", tmp_path / "r.h5", "--json")
-    result = cpfls.done(*words)
-    summary = json.loads(result.stdout)
+    summary = json.loads(cpfls.done(*words).stdout)
     assert summary["model"] == "model.h5"
     assert list(summary["responses"])[:3] == ["roll", "pitch", "yaw"]
     assert any("model.h5" in warning and "learned" in warning for warning in summary["warnings"])
@@ -227,8 +226,7 @@ def test_repeats_of_a_path_show_the_vehicle(cpfls, folder, tmp_path):
     words = ("response", folder / "study.yaml", "-o", tmp_path / "r.h5", "--json", "--force")
     alone = json.loads(cpfls(*words, logs[0]).stdout)
     assert alone["instruments"] == "none"
-    together = cpfls.done(*words, *logs, folder / "heavy.csv")
-    summary = json.loads(together.stdout)
+    summary = json.loads(cpfls.done(*words, *logs, folder / "heavy.csv").stdout)
     assert summary["instruments"] == "repeats"
     assert any(warning.startswith("heavy.csv: no other of these flights") for warning in summary["warnings"])
     for name in ("roll", "pitch"):

@@ -184,8 +184,7 @@ def test_who_names_the_logged_columns_gets_them(log, config):
     assert own != text
     named = config.with_name("logged.yaml")
     named.write_text(own)
-    flight = commands(log, named)
-    assert flight.updated_hz["rotor_command"] == pytest.approx(10, rel=0.02)
+    assert commands(log, named).updated_hz["rotor_command"] == pytest.approx(10, rel=0.02)
 
 
 def test_a_log_of_which_nothing_can_be_rebuilt_is_refused(flown, config, tmp_path):

@@ -45,8 +45,7 @@ def short(tmp_path_factory, cpfls):
 @pytest.fixture
 def fly(short, cpfls, tmp_path):
     def call(*options, name="flight.h5"):
-        result = cpfls.done("simulate", *short, *options, "-o", tmp_path / name)
-        return tmp_path / name, result.stdout
+        return tmp_path / name, cpfls.done("simulate", *short, *options, "-o", tmp_path / name).stdout
 
     return call
 
@@ -215,8 +214,7 @@ def flown(tmp_path):
 def test_setpoints_go_into_the_flight_and_are_said(cpfls, flown, tmp_path):
     config, log, columns = flown
     flight = tmp_path / "flight.h5"
-    result = cpfls.done("import", config, log, "-o", flight)
-    words = " ".join(result.stdout.split())
+    words = " ".join(cpfls.done("import", config, log, "-o", flight).stdout.split())
     assert "Setpoints attitude, thrust (at 160 of 300 samples)" in words
     with h5py.File(flight) as file:
         np.testing.assert_allclose(file["setpoint_attitude"][:, 1], columns["pitch_sp"], atol=1e-12)

@@ -80,8 +80,7 @@ def test_gap_writes_the_corrected_file_and_leaves_mine(cpfls, folder, tmp_path):
     assert not output.exists()
     result = cpfls.done(*words)
     assert mine.read_bytes() == before
-    said = json.loads((output / "gap.json").read_text())["corrected"]
-    (change,) = said["changes"]
+    (change,) = json.loads((output / "gap.json").read_text())["corrected"]["changes"]
     assert (change["file"], change["element"]) == ("mine.sdf", "motorConstant")
     assert change["low"] < TRUE.thrust_factor < change["high"]
     assert "mine.sdf motorConstant 2.4e-08 → " in " ".join(result.stdout.split())
@@ -106,8 +105,7 @@ def test_a_second_fit_that_is_refused_leaves_the_first(cpfls, folder, tmp_path, 
     words = ("gap", folder / "mine.sdf", folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", tmp_path / "gap")
     cpfls.done(*words)
     assert len(asked) == 2
-    model = cpfls.summary("info", tmp_path / "gap" / "extended.h5")
-    assert "parameter_error" in json.dumps(model)
+    assert "parameter_error" in json.dumps(cpfls.summary("info", tmp_path / "gap" / "extended.h5"))
 
 
 def test_the_file_itself_is_no_output(cpfls, folder, tmp_path):

@@ -23,8 +23,7 @@ def vehicle(tmp_path):
 
 def written(cpfls, vehicle, ending, *words):
     output = vehicle.with_name(f"spread.{ending}")
-    result = cpfls.done("spread", vehicle, "-n", str(COUNT), "-o", output, "--force", *words)
-    return result, output
+    return cpfls.done("spread", vehicle, "-n", str(COUNT), "-o", output, "--force", *words), output
 
 
 def test_all_forms_hold_the_same(cpfls, vehicle):

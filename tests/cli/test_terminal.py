@@ -360,8 +360,7 @@ def test_held_out_part_and_other_flights_are_judged_by_name(cpfls, pipeline, stu
     cpfls("trajectory", study, "-o", path, "--set", "trajectory.sample_time_s=0.2")
     cpfls("simulate", study, path, "-o", other)
     words = ("identify", study, pipeline.flight, "--validate", other, "-o", tmp_path / "m.h5", "--json")
-    result = cpfls(*words, "--set", "identification.training_share=0.6")
-    held_out = json.loads(result.stdout)["held_out"]
+    held_out = json.loads(cpfls(*words, "--set", "identification.training_share=0.6").stdout)["held_out"]
     assert set(held_out) == {"held-out rest", "other.h5"}
     assert held_out["other.h5"]["samples"] == 275
     assert {"mse", "relative_error", "baselines"} <= set(held_out["held-out rest"])

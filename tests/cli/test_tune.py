@@ -73,8 +73,7 @@ def test_the_file_of_a_ground_station_holds_what_the_artifact_proposes(name, gai
     ranges = {each.name: each for each in AUTOPILOTS[name].parameters}
     assert all(ranges[each].low <= row.proposed <= ranges[each].high for each, row in rows.items())
     # A comment says of each what it is, and what the documentation allows.
-    text = (folder / f"{name}{ENDINGS[name]}").read_text()
-    assert text.count("documented range") == len(rows)
+    assert (folder / f"{name}{ENDINGS[name]}").read_text().count("documented range") == len(rows)
 
 
 def test_gains_are_those_of_the_least_favourable_vehicle(gains, folder):

@@ -133,8 +133,7 @@ def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, logged, mo
     def flown(name, *options):
         words = ("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / name)
         short = ("--set", "import.crop_s=[0.0, 2.0]")
-        result = cpfls.done(*words, "--model", logged / "vehicle.h5", *short, *options)
-        return result.stdout
+        return cpfls.done(*words, "--model", logged / "vehicle.h5", *short, *options).stdout
 
     calm = flown("calm.h5")
     assert "--gusts plays them" in calm

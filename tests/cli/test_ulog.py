@@ -119,8 +119,7 @@ def test_dropouts_of_the_logger_are_warned_of(flown):
     begin, end = (b"".join(data(*row) for row in part) for part in (sent[:cut], sent[cut:]))
     dropouts = message("O", struct.pack("<H", 40)) + message("O", struct.pack("<H", 120))
     _, _, stderr = flown(header() + definitions(FIELDS) + begin + dropouts + end)
-    words = " ".join(stderr.split())
-    assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 1.000 s" in words
+    assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 1.000 s" in " ".join(stderr.split())
 
 
 def test_an_end_that_is_cut_off_is_read_up_to_it(flown):

@@ -57,8 +57,7 @@ def logged(cpfls, tmp_path_factory):
 
 
 def exported(cpfls, artifact, output, *options):
-    result = cpfls.done("export", artifact, "-o", output, "--force", *options)
-    return result.stdout
+    return cpfls.done("export", artifact, "-o", output, "--force", *options).stdout
 
 
 def columns_of(path):

@@ -113,8 +113,7 @@ def sums(cpfls, config, folder):
 
     def call(model, flown, *options):
         words = ("replay", config, model, flown, "-o", folder / "r.h5", *BRIEF, "--force", "--json", *options)
-        result = cpfls.done(*words)
-        models = json.loads(result.stdout)["models"]
+        models = json.loads(cpfls.done(*words).stdout)["models"]
         return {name: np.array([models[name][signal]["sum"] for signal in SIGNALS]) for name in models}
 
     return call
@@ -167,8 +166,7 @@ def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
 
 def test_people_read_what_was_flown(cpfls, config, path, vehicle, tmp_path):
     top = ("--mode", "closed-loop", "--effect", "torque_bias.M_z=0.01")
-    words = ("simulate", config, path, "--model", vehicle, *top, "-o", tmp_path / "f.h5")
-    result = cpfls.done(*words)
+    result = cpfls.done("simulate", config, path, "--model", vehicle, *top, "-o", tmp_path / "f.h5")
     assert "effects, those of the model among them: linear_damping.d_x = " in result.stdout
     assert "torque_bias.M_x = 0, torque_bias.M_y = 0, torque_bias.M_z = 0.01" in result.stdout
     assert "with vehicle.h5" in result.stdout

@@ -119,8 +119,7 @@ def test_a_package_that_is_missing_is_named_with_the_command(pipeline, monkeypat
 
 def test_figures_are_those_of_the_report(cpfls, pipeline, study, tmp_path):
     flight, model = (cpfls_cli.read(path) for path in (pipeline.flight, pipeline.model))
-    given = (pipeline.flight, pipeline.model)
-    report = cpfls("report", study, *given, "-o", tmp_path / "r.md", "--json")
+    report = cpfls("report", study, pipeline.flight, pipeline.model, "-o", tmp_path / "r.md", "--json")
     figures = flight.figures(model)
     assert list(figures) == json.loads(report.stdout)["figures"]
     with matplotlib.rc_context({"font.size": 30}):
@@ -164,8 +163,7 @@ def test_a_replay_is_what_the_command_writes(cpfls, pipeline, study, tmp_path):
     model, flight = cpfls_cli.load_model(pipeline.model), cpfls_cli.read(pipeline.flight)
     options = ("--horizon", "0.3", "--every", "40", "--hold", "previous")
     cpfls("replay", study, pipeline.model, pipeline.flight, "-o", tmp_path / "command.h5", *options)
-    replay = model.replay(flight, horizon_s=0.3, every=40, hold="previous")
-    replay.write(tmp_path / "replay.h5")
+    model.replay(flight, horizon_s=0.3, every=40, hold="previous").write(tmp_path / "replay.h5")
     assert (tmp_path / "replay.h5").read_bytes() == (tmp_path / "command.h5").read_bytes()
 
 

@@ -143,8 +143,7 @@ def test_another_split_of_one_flight_is_other_data(compared, write):
     other = ("training_share: 1.0", "training_share: 0.9")
     _, blocks = compared(write("one.h5"), write("two.h5", config=other))
     assert any("cannot be ranked" in block.get("text", "") for block in blocks)
-    keys = table(blocks, "Key")
-    assert keys["rows"] == [["identification.training_share", "1.0", "0.9"]]
+    assert table(blocks, "Key")["rows"] == [["identification.training_share", "1.0", "0.9"]]
 
 
 def test_rigid_bodies_that_differ_are_distinguished_by_their_models(compared, write, bare):
@@ -252,8 +251,7 @@ def test_vehicles_of_equal_file_names_are_called_by_their_folders(cpfls, study, 
         )
         write_vehicle(path, replace(vehicle, numbers=tuple(numbers)))
     output = tmp_path / "report.html"
-    result = cpfls.done("report", study, *paths, "-o", output)
-    *_, one, two, differ = result.stdout.splitlines()
+    *_, one, two, differ = cpfls.done("report", study, *paths, "-o", output).stdout.splitlines()
     assert [line.split()[0] for line in (one, two)] == ["still/vehicle.h5", "gusty/vehicle.h5"]
     assert differ == "differ beyond both intervals: Ixx"
     page = output.read_text(encoding="utf-8")

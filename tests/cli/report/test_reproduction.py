@@ -136,8 +136,7 @@ def test_every_claim_and_every_figure_has_its_line(parted):
 
 def test_a_report_of_the_package_holds_nothing_against_the_paper(cpfls, parted):
     output = parted / "r.html"
-    given = [parted / "trajectory.h5"]
-    result = cpfls("report", parted / "study.yaml", *given, "-o", output, "--json")
+    result = cpfls("report", parted / "study.yaml", parted / "trajectory.h5", "-o", output, "--json")
     html = output.read_text(encoding="utf-8")
     assert "reproduction" not in json.loads(result.stdout)["sections"]
     assert "figures-of-the-paper" not in html

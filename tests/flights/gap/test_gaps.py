@@ -63,8 +63,7 @@ def changed(tmp_path_factory):
     def call(today, since):
         flown, before = ([path_of_log("real/crazypad_usd", name) for name in side] for side in (today, since))
         words = ("changed", CONFIGS / "crazypad_usd.yaml", *flown, "--since", *before, "-o", out, "--json", "--force")
-        result = run.done(*words)
-        return json.loads(result.stdout)
+        return json.loads(run.done(*words).stdout)
 
     return call
 
@@ -130,8 +129,7 @@ def test_a_filter_of_the_import_changes_no_floor(answer_of):
 
 def test_flights_without_weight_have_no_offset(answer_of):
     normal = tuple(f"normal_flight__E9_log0{number}" for number in range(3))
-    answer = answer_of("crazypad", CRAZYPAD, *normal[:2], held_out=normal[2:])
-    assert names_of(answer) == set()
+    assert names_of(answer_of("crazypad", CRAZYPAD, *normal[:2], held_out=normal[2:])) == set()
 
 
 def test_weights_move_the_centre_of_mass_towards_the_motor_they_hang_at(light, heavy, coefficients_of):

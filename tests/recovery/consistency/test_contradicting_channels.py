@@ -565,8 +565,7 @@ def test_a_low_passed_log_has_the_floors_of_the_raw_one_and_says_so_first(flight
 
 
 def test_a_log_without_noise_has_no_floor_that_is_known():
-    found = audit([signals_of(flown(8.0))], WINDOWS)
-    assert "noise floor is not known" in found.filtered[0]
+    assert "noise floor is not known" in audit([signals_of(flown(8.0))], WINDOWS).filtered[0]
 
 
 def read_with_repeats(flight, updates_hz, channels, late_s):

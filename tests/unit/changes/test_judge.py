@@ -199,8 +199,7 @@ def test_a_mass_and_weak_rotors_look_alike(more, what):
     before = flights(6, rng)
     mean = {name: float(np.mean([flight.values[name] for flight in before])) for name in NAMES}
     today = [having(before[0], {**mean, **{name: mean[name] + x for name, x in zip(LOADS, more, strict=True)}})]
-    found = changed(today, before, QUAD, rng)
-    (first,) = found.causes
+    (first,) = changed(today, before, QUAD, rng).causes
     assert {what, "mass"} <= {first.name, *(each.name for each in first.alike)}
     assert first.belief < NAMED if what != "mass" else first.name == "mass"
 
@@ -250,8 +249,7 @@ def test_a_change_since_a_flight_of_today_is_not_hidden_by_those_before():
     rng = np.random.default_rng(11)
     before = flights(8, rng)
     weak = -np.log(0.75) * (np.arange(10) == 2)
-    today = [*flights(4, rng), *flights(2, rng, weak)]
-    found = changed(today, before, QUAD, rng)
+    found = changed([*flights(4, rng), *flights(2, rng, weak)], before, QUAD, rng)
     assert found.p <= FALSE_ALARM
     assert found.since_flight == 4
     assert found.causes[0].name == "rotor M3"
@@ -307,8 +305,7 @@ def test_a_lag_that_makes_the_loop_answer_gusts_otherwise_is_no_second_change():
     answered = np.array([-0.02 * name.startswith("delay") for name in names])
     rng = np.random.default_rng(21)
     before = flights(6, rng, names=names)
-    today = flights(3, rng, slower + answered, names)
-    found = changed(today, before, QUAD, rng)
+    found = changed(flights(3, rng, slower + answered, names), before, QUAD, rng)
     assert [each.name for each in found.causes if each.named] == ["lag"]
     assert found.causes[0].sizes[0].low < 0.02 < found.causes[0].sizes[0].high
     for change, name in ((answered, "delay"), (slower, "lag")):

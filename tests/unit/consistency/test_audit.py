@@ -177,8 +177,7 @@ def test_the_motion_follows_the_torque(turning, commanded, whom):
     momentum = clean.body_rate @ inertia
     torque = np.gradient(momentum, clean.time, axis=0) + np.cross(clean.body_rate, momentum)
     early = np.roll(torque, -5, axis=0)
-    found = audit([replace(clean, stated_torque=early, commanded=commanded)], WINDOWS)
-    (note,) = found.notes
+    (note,) = audit([replace(clean, stated_torque=early, commanded=commanded)], WINDOWS).notes
     # Of an interval that is narrower than a millisecond the digits are shown.
     says = re.fullmatch(rf"The motion follows the {whom} by (\d+\.\d+) ms \[(\d+\.\d+), (\d+\.\d+)\]\.", note)
     delay, low, high = map(float, says.groups())

@@ -102,8 +102,7 @@ def test_swing_under_a_hook_that_tumbles_with_the_vehicle(flight, depth, acceler
     signals = signals if accelerometer else replace(signals, acceleration=None)
     way = hook_way(signals, depth)
     expected = hanging(lambda t: way(t, 2) + GRAVITY, TIME, 1.5, 0.2)
-    found = swing(signals, 1.5, 0.2, depth)
-    np.testing.assert_allclose(found[:, :3], expected, atol=0.01)
+    np.testing.assert_allclose(swing(signals, 1.5, 0.2, depth)[:, :3], expected, atol=0.01)
     assert np.abs(expected[:, :2]).max() > 0.3
 
 

@@ -38,8 +38,7 @@ def test_ground_levels_a_tilted_vehicle(columns, flight):
 @pytest.mark.parametrize("height", [0.0, -0.2])
 def test_ground_effect_at_most_doubles_the_thrust(columns, flight, height):
     on_ground = level(flight, height)
-    found = columns("ground_effect", on_ground, G=16.0).direct[:, 5, 0]
-    np.testing.assert_allclose(found, on_ground.thrust)
+    np.testing.assert_allclose(columns("ground_effect", on_ground, G=16.0).direct[:, 5, 0], on_ground.thrust)
 
 
 def sinking(flight, speed, sideways=0.0):

@@ -147,8 +147,7 @@ def test_nobody_moves(subpopulations, rate):
 
 
 def test_a_share_that_is_whole_is_not_rounded_down():
-    labels = subpopulation_labels(200, 2)
-    source = migrate(labels, 0.29, np.random.default_rng(4))
+    source = migrate(subpopulation_labels(200, 2), 0.29, np.random.default_rng(4))
     assert np.count_nonzero(source[:100] != np.arange(100)) == 29
 
 

@@ -56,8 +56,7 @@ def test_gradient_of_the_conditioning_is_that_of_differences():
     times, variables = path.times(200), variables_of(path)
     laid_out = design(path, times)
     gradient = laid_out.gradient(conditioning_gradient(FIRST_ORDER, laid_out.motion(variables), 2.0)[1])
-    rng = np.random.default_rng(0)
-    directions = rng.standard_normal((8, *variables.shape))
+    directions = np.random.default_rng(0).standard_normal((8, *variables.shape))
     step = 1e-6
     differences = [
         (smoothed(variables + step * way, path, times) - smoothed(variables - step * way, path, times)) / (2 * step)
@@ -209,8 +208,7 @@ def test_harmonic_columns_reach_the_torque_there_too():
     attitude, *_ = motion = through_vertical()
     structure = model_structure(StructureSettings())
     diagonal = np.diag([0.6, 0.7, 1.2])
-    rng = np.random.default_rng(0)
-    seen = rng.uniform(-3, 3, (3, 400, 3))
+    seen = np.random.default_rng(0).uniform(-3, 3, (3, 400, 3))
     coefficients = np.linalg.lstsq(
         regressor_of(structure, seen).reshape(-1, structure.parameters), torque(*seen, diagonal).ravel()
     )[0]

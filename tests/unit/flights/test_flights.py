@@ -327,8 +327,7 @@ def test_a_voltage_that_no_battery_has_is_not_used_and_said(tmp_path, unit, volt
 
 @pytest.mark.parametrize(("unit", "shares"), [("1", True), ("rad/s", False), (None, False)])
 def test_a_flight_to_play_says_whether_its_commands_are_shares_of_a_full_speed(tmp_path, unit, shares):
-    path = driven(tmp_path / "flight.h5", commands=unit)
-    (flight,) = playback.flights_to_play([path], Study())
+    (flight,) = playback.flights_to_play([driven(tmp_path / "flight.h5", commands=unit)], Study())
     assert flight.shares is shares
 
 

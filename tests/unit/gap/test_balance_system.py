@@ -36,8 +36,7 @@ def test_variance_is_there_where_the_vehicle_sinks():
 def test_the_size_of_the_scatter_comes_back(size):
     variance = scatter_variance(system([weak(sinking())], [RING]))
     floor = np.full(6, 0.05)
-    rng = np.random.default_rng(0)
-    residual = rng.standard_normal(variance.shape) * np.sqrt(floor**2 + size**2 * variance)
+    residual = np.random.default_rng(0).standard_normal(variance.shape) * np.sqrt(floor**2 + size**2 * variance)
     assert scatter_size(variance, residual, floor) == pytest.approx(size**2, rel=0.3)
 
 

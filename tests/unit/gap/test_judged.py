@@ -85,8 +85,7 @@ def test_names_stand_that_the_unseen_flights_need(raised, after, name, monkeypat
 def test_what_the_others_held_within_bounds_goes_without_them(monkeypatch):
     """However much of the gap it takes off: next to those that are left its number is impossible."""
     impossible = Refusal("large", "its c_z would surely be beyond what is possible", True)
-    found = refused({"large": 2500.0, "small": 90.0}, 1.1, monkeypatch, beyond=impossible)
-    assert found.name == "large"
+    assert refused({"large": 2500.0, "small": 90.0}, 1.1, monkeypatch, beyond=impossible).name == "large"
 
 
 def test_what_no_flight_learned_from_shows_is_no_difference_between_flights():

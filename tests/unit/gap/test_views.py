@@ -46,8 +46,7 @@ def test_noise_alone_has_no_stretch_and_many_bursts_are_cut_to_the_largest():
 
 
 def test_cells_hold_the_mean_and_count_every_known_window():
-    rng = np.random.default_rng(0)
-    first, second, residual = rng.standard_normal((3, 500))
+    first, second, residual = np.random.default_rng(0).standard_normal((3, 500))
     second[::50] = np.nan
     found = heat_map("torque x", residual, ("first", "second"), {"first": first, "second": second}, bins=6)
     edges = (found.first_edge, found.second_edge)

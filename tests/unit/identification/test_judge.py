@@ -266,8 +266,7 @@ def test_rows_are_weighted_by_axis():
 
 
 def test_variances_are_the_same_chunk_by_chunk(monkeypatch):
-    rng = np.random.default_rng(9)
-    torque, error = rng.standard_normal((2, 50, 3)) + 5.0
+    torque, error = np.random.default_rng(9).standard_normal((2, 50, 3)) + 5.0
     data = still_flight(torque)
     monkeypatch.setattr("cpfls_cli.identification.data.CHUNK", 7)
     predicted = [(torque - error)[start : start + 7] for start in range(0, 50, 7)]

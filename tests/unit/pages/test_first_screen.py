@@ -180,8 +180,7 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_sepa
 
 def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_shows_them():
     pair = (Alternative("motor_lag", "low_pass_filter", 1.0, "log the speeds of the rotors", "command_delay"),)
-    answer = diagnosis("AMBIGUOUS", named=("low_pass_filter",), alternatives=pair)
-    box, facts, *_ = screen(answer)
+    box, facts, *_ = screen(diagnosis("AMBIGUOUS", named=("low_pass_filter",), alternatives=pair))
     assert "from motor lag with delay of the command" in str(box)
     assert "trajectory" not in facts["Next"]
 

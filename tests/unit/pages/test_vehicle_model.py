@@ -62,8 +62,7 @@ def with_first(own, **changed):
 
 
 def of_inertia(own, *moments):
-    model = replace(own.model, vehicle=replace(own.model.vehicle, inertia_kg_m2=moments))
-    return replace(own, model=model)
+    return replace(own, model=replace(own.model, vehicle=replace(own.model.vehicle, inertia_kg_m2=moments)))
 
 
 def test_numbers_without_a_meaning_of_their_own_are_counted_and_not_listed():

@@ -21,8 +21,7 @@ def innovations_of(new, *, predicted=None, noise=0.0, moved=None):
 
 
 def test_noise_that_nothing_predicts_is_no_part_of_innovations():
-    rng = np.random.default_rng(1)
-    signal, noise = rng.standard_normal((2, len(BLOCK), 6))
+    signal, noise = np.random.default_rng(1).standard_normal((2, len(BLOCK), 6))
     share, without = innovations_of(signal + noise, predicted=0.5 * signal, noise=1.0).shares
     assert share == pytest.approx(0.5, abs=0.1)
     assert without.shape == (BLOCKS, 6)

@@ -26,8 +26,7 @@ def residual():
 
 
 def test_what_lasts_is_found_below_noise_that_is_differentiated(residual):
-    found = whitening(residual, np.ones(2, dtype=bool))
-    assert np.allclose(found.kept, KEPT, atol=0.002)
+    assert np.allclose(whitening(residual, np.ones(2, dtype=bool)).kept, KEPT, atol=0.002)
 
 
 def test_innovations_are_white_and_correlate_with_nothing_before(residual):

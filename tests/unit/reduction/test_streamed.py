@@ -13,8 +13,7 @@ from tests.builders.reductions import beginning, random_selections, reduce, row_
 
 
 def regressor(samples=3000, columns=7, seed=0):
-    rng = np.random.default_rng(seed)
-    return rng.standard_normal((samples, 3, columns)) * np.geomspace(1.0, 0.02, columns)
+    return np.random.default_rng(seed).standard_normal((samples, 3, columns)) * np.geomspace(1.0, 0.02, columns)
 
 
 def chunked(Q, size):

@@ -121,8 +121,7 @@ def pendulum_wrench(signals, values):
 def test_load_pulls_as_a_pendulum_under_the_hook_does():
     values = {"mass": 0.5, "mass_times_depth": 0.05, "mass_times_right": 0.02, "mass_times_behind": -0.01}
     values |= {shape.name: shape.grid[1] for shape in CATALOGUE["payload"].shapes}
-    flight = flown(effects={"payload": values})
-    signals = signals_of(flight)
+    signals = signals_of(flown(effects={"payload": values}))
     weak, left = balance(signals)
     expected = weak.windows.average(pendulum_wrench(signals, values))
     assert rms(expected).min() > 0.02
@@ -204,8 +203,7 @@ def test_battery_empties_by_the_share_that_was_asked_for():
 def test_effects_add_up():
     names = ("com_offset", "rotor_drag", "products_of_inertia", "rotor_acceleration")
     chosen = {name: typical(name) for name in names}
-    flight = flown(effects=chosen)
-    signals = signals_of(flight)
+    signals = signals_of(flown(effects=chosen))
     weak, left = balance(signals)
     listed = simulated_effects(chosen, VEHICLE).listed
     expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in listed)

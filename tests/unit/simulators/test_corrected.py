@@ -616,8 +616,7 @@ def test_a_direction_that_no_flight_shows_stays(mine):
     """The log states another one, and its flight has no speeds of rotors."""
     of = replace(of_log(read_model(mine), None, None), spins=(-1, 1, -1, -1))
     found = SimpleNamespace(verdict="NO_GAP", contradictions=(), rivals={}, effects=(), not_excited=())
-    flight = SimpleNamespace(name="one.csv", rotor_speed=None)
-    said, files = corrected(of, SMALL.vehicle, found, [flight])
+    said, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name="one.csv", rotor_speed=None)])
     assert files["mine.sdf"] == mine.read_bytes()
     assert said.unchanged[0].startswith("directions of rotors: no flight of more than 5 s")
 

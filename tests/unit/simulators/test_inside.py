@@ -264,8 +264,7 @@ def held():
 
 def both(of, held, texts, horizon_s=0.3):
     """Playback and simulator along held-out flights, the file as given and as corrected."""
-    settings = GapSettings(horizon_s=horizon_s)
-    pairs = played(of, texts, TRUE.vehicle, held, held, settings)
+    pairs = played(of, texts, TRUE.vehicle, held, held, GapSettings(horizon_s=horizon_s))
     replayed = PlaybackChange.of_pairs(pairs, errors_by_horizon(pairs, horizon_s))
     return replayed, inside.in_simulator(of, texts, TRUE.vehicle, held, pairs, horizon_s)
 
@@ -399,6 +398,5 @@ def test_what_a_simulator_refuses_is_part_of_the_answer(refused):
     said = Corrected(files=("v.xml",), changes=(), unchanged=(), elsewhere=(), diff="", in_simulator=why)
     page = environment(TEMPLATES, {}).get_template("corrected.md.j2").render(r={"corrected": said})
     answer, details = page.split(":::", 1)
-    line = "- **In MuJoCo 4.0.0**: Not flown: it refuses v.xml as given: no."
-    assert (line in answer) == refused
+    assert ("- **In MuJoCo 4.0.0**: Not flown: it refuses v.xml as given: no." in answer) == refused
     assert ("Not flown in MuJoCo" in details) == (not refused)

@@ -82,8 +82,7 @@ def test_every_number_has_its_line(tmp_path):
     path.write_text(sdf_of(SMALL))
     read, lines = read_model(path), path.read_text().splitlines()
     thrust = read.rotors[1].thrust
-    line = int(thrust.where.partition("line ")[2].partition(":")[0])
-    assert "<motorConstant>" in lines[line - 1]
+    assert "<motorConstant>" in lines[int(thrust.where.partition("line ")[2].partition(":")[0]) - 1]
     assert path.read_bytes()[thrust.span.start : thrust.span.end] == f"{thrust.value:.6g}".encode()
     assert "base_link" in read.where_of_mass
 
@@ -113,8 +112,7 @@ def test_links_with_poses_add_up(tmp_path):
 
 def test_a_plugin_without_a_number_has_its_own(tmp_path):
     path = tmp_path / "mine.sdf"
-    text = sdf_of(SMALL).replace("<momentConstant>0.006</momentConstant>", "")
-    path.write_text(text)
+    path.write_text(sdf_of(SMALL).replace("<momentConstant>0.006</momentConstant>", ""))
     ratio = read_model(path).rotors[0].ratio
     assert ratio.value == 0.016
     assert ratio.span is None

@@ -195,8 +195,7 @@ def test_windows_apart_do_not_overlap():
 
 
 def test_torque_is_scaled_by_axis_and_left_out_where_the_pitch_is_vertical():
-    rng = np.random.default_rng(63)
-    torque = rng.standard_normal((400, 3)) * [10.0, 1.0, 0.1]
+    torque = np.random.default_rng(63).standard_normal((400, 3)) * [10.0, 1.0, 0.1]
     attitude = np.zeros((400, 3))
     attitude[::7, 1] = np.pi / 2
     result = np.arange(400) % 7 != 0
