@@ -1,4 +1,4 @@
-"""The search for effects: what cannot be distinguished, steps of their shapes, and the surest of small ones by samples."""
+"""The search for effects: what cannot be distinguished, steps of their shapes, and small ones by samples."""
 
 from dataclasses import replace
 from itertools import permutations
