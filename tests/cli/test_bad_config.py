@@ -268,8 +268,7 @@ def test_unknown_section(refuse, study):
 
 
 def test_overrides_need_a_config(refuse):
-    (line,) = refuse("config", "--set", "seed=2")
-    assert line == "--set seed=2: needs a CONFIG"
+    assert refuse("config", "--set", "seed=2") == ["--set seed=2: needs a CONFIG"]
 
 
 def test_overrides_show(cpfls, study):

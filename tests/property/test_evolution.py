@@ -98,32 +98,6 @@ def test_ranks_are_those_of_the_definition(method, objectives):
     assert rank(objectives, method).tolist() == BRUTE[method](costs_of(objectives))
 
 
-@pytest.mark.parametrize("method", BRUTE)
-@given(objectives=OBJECTIVES)
-def test_the_dominating_individual_ranks_first(method, objectives):
-    costs, ranks = costs_of(objectives), rank(objectives, method)
-    for i, one in enumerate(costs):
-        for j, other in enumerate(costs):
-            if dominates(one, other):
-                assert ranks[i] < ranks[j]
-
-
-@pytest.mark.parametrize("method", BRUTE)
-@given(objectives=OBJECTIVES, data=st.data())
-def test_ranks_follow_the_individuals_when_they_are_reordered(method, objectives, data):
-    order = np.array(data.draw(st.permutations(range(len(objectives)))))
-    np.testing.assert_array_equal(rank(objectives[order], method), rank(objectives, method)[order])
-
-
-@given(OBJECTIVES)
-def test_dominance_behind_the_count_is_transitive(objectives):
-    costs, ranks = costs_of(objectives), rank(objectives, "pareto-count")
-    for i, one in enumerate(costs):
-        above = [j for j, other in enumerate(costs) if dominates(other, one)]
-        # All who dominate a dominator dominate too, so the count exceeds that of each dominator.
-        assert all(ranks[i] >= ranks[j] + 1 for j in above)
-
-
 @given(OBJECTIVES)
 def test_the_front_is_every_non_dominated_vector_once(objectives):
     costs, front = costs_of(objectives), pareto_front(objectives)
