@@ -25,7 +25,7 @@ from tests.builders import blackbox_logs, ulogs
 from tests.builders.artifacts import seal
 from tests.builders.command_line import invoked, run
 from tests.builders.dataflash_logs import dataflash
-from tests.builders.studies import TINY, VEHICLE, stages
+from tests.builders.studies import LOG_STUDY, TINY, VEHICLE, stages
 from tests.builders.usd_logs import usd
 
 FAULTS = ("traceback", "hang", "wrong exit code", "file left", "accepted nonsense", "terminal orders", "memory")
@@ -44,13 +44,6 @@ FIELDS = (
 NAMES = ("\x1b[2J", "\x1b]0;x\x07", "\x9b31m", "\u202e", "a\rb", "a\nb", 5000 * "a", "", "-o", "{x}", "$\\frac{$")
 PLACES = (0.0, 0.0, 0.3, -0.3, 1e-9, 1e3)
 COLUMNS = ("t", "roll", "pitch", "yaw", "mx", "my", "mz")
-LOG_STUDY = """\
-import:
-  time_column: t
-  signals:
-    attitude: {columns: [roll, pitch, yaw], unit: rad}
-    body_torque: {columns: [mx, my, mz], unit: N m}
-"""
 ULOG_STUDY = """\
 import:
   time_column: rates.timestamp

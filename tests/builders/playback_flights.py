@@ -21,16 +21,14 @@ from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.vehicle.tracing import Graph, array_symbols, traced_in_two
 from tests.builders.recorded_flights import columns_of_log
+from tests.builders.vehicles import OPEN_FACTORS, alike
 
 KINDS = ("multisine", "steps", "figure")
 STATED = VehicleSettings(
     mass_kg=0.8,
     inertia_kg_m2=(0.0040, 0.0044, 0.0075),
     rotor_speed_max_rad_s=1500.0,
-    rotors=tuple(
-        RotorSettings(position_m=(x, y, 0.02), spin=spin, thrust_factor_n_s2=6e-6, drag_factor_n_m_s2=1.4e-7)
-        for x, y, spin in ((0.12, -0.11, 1), (-0.12, -0.11, -1), (-0.12, 0.11, 1), (0.12, 0.11, -1))
-    ),
+    rotors=alike(((0.12, -0.11, 1), (-0.12, -0.11, -1), (-0.12, 0.11, 1), (0.12, 0.11, -1)), 6e-6, 1.4e-7, height=0.02),
 )
 FINE_STEP_S = 0.01
 MOTOR_S = 0.03
@@ -116,8 +114,7 @@ def loaded():
 
 def nothing_known(vehicle=STATED):
     """Keep mass and geometry of a vehicle, with guesses of the rest as a config that leaves it null has."""
-    open_ = {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
-    rotors = [{"position_m": rotor.position_m, "spin": rotor.spin, **open_} for rotor in vehicle.rotors]
+    rotors = [{"position_m": rotor.position_m, "spin": rotor.spin, **OPEN_FACTORS} for rotor in vehicle.rotors]
     known = {"mass_kg": vehicle.mass_kg, "rotor_speed_max_rad_s": vehicle.rotor_speed_max_rad_s}
     guessed = with_guesses({"vehicle": {**known, "inertia_kg_m2": [None] * 3, "rotors": rotors}})["vehicle"]
     return VehicleSettings(
@@ -416,20 +413,11 @@ def logged(name, states, speed, period, hold, noise, rng):
     return PlaybackFlight(name=name, motion=motion, speed=measured, hold=hold, stretches=(slice(0, len(states)),))
 
 
-ROTORPY_ARM = 0.1202081528
 ROTORPY = VehicleSettings(
     mass_kg=0.5,
     inertia_kg_m2=(0.00365, 0.00368, 0.00703),
     rotor_speed_max_rad_s=1500.0,
-    rotors=tuple(
-        RotorSettings(
-            position_m=(x * ROTORPY_ARM, y * ROTORPY_ARM, 0.0),
-            spin=spin,
-            thrust_factor_n_s2=5.57e-6,
-            drag_factor_n_m_s2=1.36e-7,
-        )
-        for x, y, spin in ((1, 1, -1), (1, -1, 1), (-1, -1, -1), (-1, 1, 1))
-    ),
+    rotors=alike(((1, 1, -1), (1, -1, 1), (-1, -1, -1), (-1, 1, 1)), 5.57e-6, 1.36e-7, 0.1202081528),
 )
 ROTORPY_HIDDEN = {
     "none": (),

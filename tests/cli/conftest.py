@@ -8,15 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.builders import command_line
-from tests.builders.studies import TINY, VEHICLE, stages
-
-LOG_STUDY = """\
-import:
-  time_column: t
-  signals:
-    attitude: {columns: [roll, pitch, yaw], unit: rad}
-    body_torque: {columns: [mx, my, mz], unit: N m}
-"""
+from tests.builders.studies import LOG_STUDY, TINY, VEHICLE, stages
 
 
 @pytest.fixture(scope="session")

@@ -119,7 +119,6 @@ def test_values_that_no_flight_has_are_refused(wrong, content, message):
 
 QUATERNIONS = """\
 import:
-  time_column: t
   signals:
     quaternion: {columns: [qw, qx, qy, qz], unit: "1"}
   torque_source: null

@@ -2,7 +2,7 @@
 
 import json
 import warnings
-from dataclasses import replace
+from dataclasses import asdict, replace
 from html import unescape
 from typing import NamedTuple
 
@@ -47,24 +47,10 @@ class WrongLog(NamedTuple):
     sign: tuple[float, ...] = (1.0, 1.0, 1.0)
 
 
-def _reversed_spins():
-    rotors = [_rotor(rotor, -rotor.spin) for rotor in VEHICLE.rotors]
-    return f"vehicle.rotors={json.dumps(rotors)}"
-
-
-def _rotor(rotor, spin):
-    return {
-        "position_m": list(rotor.position_m),
-        "spin": spin,
-        "thrust_factor_n_s2": rotor.thrust_factor_n_s2,
-        "drag_factor_n_m_s2": rotor.drag_factor_n_m_s2,
-        "radius_m": rotor.radius_m,
-    }
-
-
+REVERSED = [asdict(rotor) | {"spin": -rotor.spin} for rotor in VEHICLE.rotors]
 WRONG = {
     "gyroscope mirrored about x": WrongLog((), "opposite signs", (-1.0, 1.0, 1.0)),
-    "spins swapped": WrongLog((_reversed_spins(),), "the motion, the rotors are"),
+    "spins swapped": WrongLog((f"vehicle.rotors={json.dumps(REVERSED)}",), "the motion, the rotors are"),
     "FLU declared FRD": WrongLog(("import.body_frame=FRD",), UPSIDE_DOWN),
     "a mass 20 times too large": WrongLog((f"vehicle.mass_kg={20 * VEHICLE.mass_kg}",), "which lifts no vehicle"),
     "ENU declared NED": WrongLog(("import.world_frame=NED",), UPSIDE_DOWN),
@@ -81,16 +67,9 @@ def config_of(folder):
         "rotor_speed": (["w1", "w2", "w3", "w4"], "rad/s"),
     }
     signals = {name: {"columns": names, "unit": unit} for name, (names, unit) in columns.items()}
-    vehicle = {
-        "mass_kg": VEHICLE.mass_kg,
-        "inertia_kg_m2": list(VEHICLE.inertia_kg_m2),
-        "rotor_speed_max_rad_s": VEHICLE.rotor_speed_max_rad_s,
-        "rotors": [_rotor(rotor, rotor.spin) for rotor in VEHICLE.rotors],
-    }
     study = {
-        "seed": 1,
-        "vehicle": vehicle,
-        "import": {"time_column": "t", "signals": signals, "torque_source": "rotor-speed"},
+        "vehicle": asdict(VEHICLE),
+        "import": {"signals": signals, "torque_source": "rotor-speed"},
         "gap": {"horizon_s": 0.1},
         "identification": LEARNED,
         "playback": {**SEARCH, "leave_out": left_out(TRIED)},

@@ -22,6 +22,7 @@ from cpfls_cli.store import read
 from tests.builders.artifacts import edited, read_result, with_fields
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
+from tests.builders.vehicles import OPEN_FACTORS
 
 ROOT = Path(__file__).parents[2]
 HEADLINE = (
@@ -46,7 +47,7 @@ def config(folder):
     data, path = yaml.safe_load(CONFIG), folder / "found.yaml"
     data["vehicle"]["inertia_kg_m2"] = [None, None, None]
     for rotor in data["vehicle"]["rotors"]:
-        rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+        rotor |= OPEN_FACTORS
     path.write_text(yaml.safe_dump(data, sort_keys=False))
     return path
 
@@ -261,7 +262,7 @@ def written(open_folder, name, change):
 def open_constants(data):
     data["vehicle"]["inertia_kg_m2"] = None
     for rotor in data["vehicle"]["rotors"]:
-        rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+        rotor |= OPEN_FACTORS
 
 
 @pytest.fixture(scope="module")

@@ -13,15 +13,12 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.response.flown import Responses
 from tests.builders import vehicle_models
+from tests.builders.shifted_flights import ALLOCATION, INERTIA
 from tests.builders.studies import VEHICLE
 
 CONFIG = """\
 import:
-  time_column: t
   torque_source: null
-  rate_hz: null
-  lowpass_hz: null
-  spike_deviations: null
   acceleration_frame: body-specific-force
   signals:
     body_rate: {columns: [p, q, r], unit: rad/s}
@@ -30,17 +27,7 @@ import:
     acceleration: {columns: [fx, fy, fz], unit: m/s^2, required: false}
     setpoint_body_rate: {columns: [ps, qs, rs], unit: rad/s, required: false}
 """
-MASS, INERTIA = 6.0, np.array([0.6, 0.6, 1.2])
-ARM, THRUST, DRAG = 0.3, 121.5e-6, 2.7e-6
-ALLOCATION = np.array(
-    [
-        [THRUST] * 4,
-        [0, -ARM * THRUST, 0, ARM * THRUST],
-        [-ARM * THRUST, 0, ARM * THRUST, 0],
-        [-DRAG, DRAG, -DRAG, DRAG],
-    ]
-)
-LAG_S = 0.04
+MASS, LAG_S = 6.0, 0.04
 
 
 def flight_table(seed, scale=1.0, samples=3000):

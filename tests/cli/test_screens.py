@@ -25,6 +25,7 @@ from tests.builders.spread_vehicles import found_record
 from tests.builders.studies import VEHICLE
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
+from tests.builders.vehicles import OPEN_FACTORS
 
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
 COARSE = ("--set", "simulation.closed_loop.integration_rate_hz=100")
@@ -145,7 +146,7 @@ def _of_open_numbers(show, folder):
     write_vehicle(folder / "own" / "wide.h5", vehicle_of(wide), resolved_yaml(study))
     data["vehicle"]["inertia_kg_m2"] = None
     for rotor in data["vehicle"]["rotors"]:
-        rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+        rotor |= OPEN_FACTORS
     config.write_text(yaml.safe_dump(data))
     show("open: trajectory", "trajectory", "open.yaml", output="open-path.h5")
     guesses, model = ("--accept-guesses",), ("--model", "own/vehicle.h5")

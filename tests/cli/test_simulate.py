@@ -181,7 +181,6 @@ def test_lost_flight_is_refused_with_a_remedy(short, refuse, tmp_path):
 
 CONFIG = """\
 import:
-  time_column: t
   torque_source: null
   signals:
     attitude: {columns: [roll, pitch, yaw], unit: rad}

@@ -1,6 +1,7 @@
 """`cpfls simulate` along a flight: its own setpoints, an autopilot's law, and where simulator and flight part."""
 
 import json
+from dataclasses import asdict
 
 import h5py
 import numpy as np
@@ -18,20 +19,6 @@ from tests.builders.spread_vehicles import found_record
 from tests.builders.twins import LOOP, PERIOD, flown
 from tests.builders.vehicle_models import write_vehicle
 
-STATED = {
-    "mass_kg": CROSS.mass_kg,
-    "inertia_kg_m2": list(CROSS.inertia_kg_m2),
-    "rotor_speed_max_rad_s": CROSS.rotor_speed_max_rad_s,
-    "rotors": [
-        {
-            "position_m": list(rotor.position_m),
-            "spin": rotor.spin,
-            "thrust_factor_n_s2": rotor.thrust_factor_n_s2,
-            "drag_factor_n_m_s2": rotor.drag_factor_n_m_s2,
-        }
-        for rotor in CROSS.rotors
-    ],
-}
 FIELDS = {"attitude": 3, "body_rate": 3, "rotor_speed": 4, "setpoint_attitude": 3, "setpoint_thrust": 1}
 UNITS = {"attitude": "rad", "body_rate": "rad/s", "rotor_speed": "rad/s", "setpoint_attitude": "rad"}
 GAINS = {"MC_ROLLRATE_P": 0.15, "MC_PITCHRATE_P": 0.15, "UNRELATED": 7.0}
@@ -54,7 +41,7 @@ def logged(tmp_path_factory):
     }
     loop = {"rotor_time_constant_s": LOOP.rotor_time_constant_s, "integration_rate_hz": LOOP.integration_rate_hz}
     study = {
-        "vehicle": STATED,
+        "vehicle": asdict(CROSS),
         "simulation": {"closed_loop": loop},
         "import": {"time_column": None, "torque_source": None, "signals": signals},
     }
@@ -180,7 +167,7 @@ def test_the_gains_of_a_blackbox_are_read_out_of_its_lines(tmp_path):
 def test_a_flight_that_was_simulated_knows_its_autopilot(cpfls, tmp_path):
     loop = {"integration_rate_hz": 400.0, "rotor_time_constant_s": 0.03, "autopilot_parameters": {}}
     study = {
-        "vehicle": STATED,
+        "vehicle": asdict(CROSS),
         "trajectory": {"sample_time_s": 0.01},
         "simulation": {"mode": "closed-loop", "closed_loop": loop, "noise": {"body_rate": 0.01}},
     }

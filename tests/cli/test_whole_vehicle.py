@@ -24,6 +24,7 @@ from tests.builders.artifacts import edited
 from tests.builders.exported_vehicles import on_numpy
 from tests.builders.playback_flights import STATED, truth
 from tests.builders.vehicle_models import remainder, vehicle_of, write_vehicle
+from tests.builders.vehicles import OPEN_FACTORS
 
 CONFIG = f"""\
 seed: 1
@@ -293,7 +294,7 @@ def open_config(tmp_path, written_log):
     """Leave inertia and the factors of the rotors open; give the config and a log."""
     log, settings = written_log()
     settings["torque_source"] = None
-    rotors = [{**asdict(rotor), "thrust_factor_n_s2": None, "drag_factor_n_m_s2": None} for rotor in STATED.rotors]
+    rotors = [asdict(rotor) | OPEN_FACTORS for rotor in STATED.rotors]
     stated = {**asdict(STATED), "inertia_kg_m2": None, "rotors": rotors}
     (tmp_path / "open.yaml").write_text(json.dumps({"seed": 1, "vehicle": stated, "import": settings}))
     return tmp_path / "open.yaml", log

@@ -5,7 +5,6 @@ import pytest
 from tests.builders.studies import VEHICLE
 
 SEARCH = """\
-seed: 1
 trajectory: {sample_time_s: 0.1}
 identification:
   consequents: seesaw

@@ -19,7 +19,7 @@ from cpfls_cli.report.content import sentence
 from cpfls_cli.result import datasets
 from cpfls_cli.validation import validate
 from tests.builders.identified_models import write_changed
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import IDENTIFICATION, LOG_STUDY, VEHICLE
 
 EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "verdict")
 VALIDATION = [path for path, _ in datasets(IdentifiedModel) if path.split("/")[0] in EVIDENCE]
@@ -225,25 +225,8 @@ def test_a_model_of_another_vehicle_is_named(cpfls, study, pipeline, tmp_path):
     assert any(said in str(each.message) for each in noted)
 
 
-STUDY = """\
-seed: 1
-import:
-  signals:
-    attitude: {columns: [roll, pitch, yaw], unit: rad}
-    body_rate: {columns: [p, q, r], unit: rad/s}
-    body_torque: {columns: [mx, my, mz], unit: N m}
-identification:
-  structure: cpfls
-  base: none
-  input_map: data-range
-  consequents: seesaw
-  products: additive
-  membership_functions: 5
-  population: 10
-  generations: 1
-  local_search: {enabled: false}
-  validation: {enabled: false}
-"""
+BODY_RATE = "    body_rate: {columns: [p, q, r], unit: rad/s}\n"
+STUDY = f"{LOG_STUDY}{BODY_RATE}{IDENTIFICATION}  validation: {{enabled: false}}\n"
 INERTIA = np.array([0.6, 0.6, 1.2])
 
 

@@ -3,6 +3,7 @@
 import json
 import shutil
 import sys
+from dataclasses import asdict
 from itertools import pairwise
 
 import matplotlib
@@ -217,16 +218,8 @@ def test_an_identified_model_flies_as_it_is_played_back(pipeline):
 
 
 def test_a_stated_vehicle_falls_and_hovers(tmp_path):
-    rotors = "".join(
-        f"    - {{position_m: {list(r.position_m)}, spin: {r.spin}, thrust_factor_n_s2: {r.thrust_factor_n_s2},"
-        f" drag_factor_n_m_s2: {r.drag_factor_n_m_s2}}}\n"
-        for r in STATED.rotors
-    )
     config = tmp_path / "study.yaml"
-    config.write_text(
-        f"vehicle:\n  mass_kg: {STATED.mass_kg}\n  gravity_m_s2: 9.81\n  inertia_kg_m2: {list(STATED.inertia_kg_m2)}\n"
-        f"  rotor_speed_max_rad_s: {STATED.rotor_speed_max_rad_s}\n  rotors:\n{rotors}"
-    )
+    config.write_text(json.dumps({"vehicle": asdict(STATED)}))
     vehicle = cpfls_cli.stated_vehicle(config)
     fallen = vehicle.fly(vehicle.state(), np.zeros((11, 4)), 0.1)
     np.testing.assert_allclose(fallen.position[-1], [0, 0, -9.81 / 2], atol=1e-12)

@@ -14,17 +14,15 @@ from cpfls_cli.changes.numbers import UnsureRatio
 from cpfls_cli.changes.reference import Reference, kinds_of, thrust_directions, usual_covariance
 from cpfls_cli.stages.changed import flown_unlike
 from cpfls_cli.vehicle.rotors import allocation_matrix
-from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.drawn_numbers import flight_of, having
+from tests.builders.vehicles import alike
 
 ARM = 0.2
 QUAD = VehicleSettings(
     mass_kg=1.2,
     inertia_kg_m2=(0.01, 0.012, 0.02),
-    rotors=tuple(
-        RotorSettings(position_m=(x * ARM, y * ARM, 0.0), spin=spin, thrust_factor_n_s2=1e-5, drag_factor_n_m_s2=2e-7)
-        for x, y, spin in ((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1))
-    ),
+    rotors=alike(((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1)), 1e-5, 2e-7, ARM),
 )
 LOADS = [f"thrust M{index}" for index in range(1, 5)]
 NAMES = [*LOADS, *(f"vibration gyroscope {axis}" for axis in "xyz"), "delay roll", "delay pitch", "delay yaw"]

@@ -30,6 +30,7 @@ from cpfls_cli.vehicle.values import (
     transposed,
     zero,
 )
+from tests.builders.vehicles import alike
 
 F = ARRAYS
 CASES = {
@@ -210,11 +211,7 @@ def test_plus_layout_follows_the_hand_formulas():
 
 def test_cross_layout_follows_the_simulator_rotorpy():
     d, k, b = 0.1202081528, 5.57e-6, 1.36e-7
-    hubs = [(d, d, -1), (d, -d, 1), (-d, -d, -1), (-d, d, 1)]
-    rotors = tuple(
-        RotorSettings(position_m=(x, y, 0.0), spin=spin, thrust_factor_n_s2=k, drag_factor_n_m_s2=b)
-        for x, y, spin in hubs
-    )
+    rotors = alike([(1, 1, -1), (1, -1, 1), (-1, -1, -1), (-1, 1, 1)], k, b, d)
     expected = [[k, k, k, k], [k * d, -k * d, -k * d, k * d], [-k * d, -k * d, k * d, k * d], [b, -b, b, -b]]
     np.testing.assert_allclose(allocation_matrix(VehicleSettings(rotors=rotors)), expected)
 
