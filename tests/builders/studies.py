@@ -34,6 +34,12 @@ import:
 """
 
 
+def put_file(path, content):
+    """Write a file; give its path."""
+    (path.write_bytes if isinstance(content, bytes) else path.write_text)(content)
+    return path
+
+
 def stages(study, folder):
     """Give the artifacts of a study by stage, and the commands that make them."""
     paths = {stage: folder / f"{stage}.h5" for stage in ("trajectory", "flight", "selection", "model")}

@@ -10,7 +10,7 @@ import pytest
 
 from cpfls_cli.flightlog.smoothing import low_pass
 from cpfls_cli.rotations import body_rate
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 
 NAMES = ["t", "roll", "pitch", "yaw", "mx", "my", "mz"]
 FIELDS = "each row needs one field for each column name; a field that holds a separator needs quotes"
@@ -31,9 +31,7 @@ def table():
 @pytest.fixture
 def write(tmp_path):
     def call(content, name="log.csv"):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return path
+        return put_file(tmp_path / name, content if isinstance(content, bytes) else content.encode())
 
     return call
 

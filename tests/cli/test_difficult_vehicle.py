@@ -20,6 +20,7 @@ from cpfls_cli.playback.replay import Playback
 from cpfls_cli.result import plain
 from cpfls_cli.store import read
 from tests.builders.artifacts import edited, read_result, with_fields
+from tests.builders.studies import put_file
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 from tests.builders.vehicles import OPEN_FACTORS
@@ -254,9 +255,7 @@ def flights(cpfls, open_folder):
 def written(open_folder, name, change):
     data = yaml.safe_load(CONFIG) | {"playback": dict(SEARCH)}
     change(data)
-    path = open_folder / name
-    path.write_text(yaml.safe_dump(data, sort_keys=False))
-    return path
+    return put_file(open_folder / name, yaml.safe_dump(data, sort_keys=False))
 
 
 def open_constants(data):
@@ -295,8 +294,7 @@ def test_a_torque_of_unknown_rotors_is_refused(refuse, open_folder):
             "signals": {"rotor_speed": {"columns": ["a", "b", "c", "d"], "unit": "rad/s"}},
         }
 
-    log = open_folder / "log.csv"
-    log.write_text("t,a,b,c,d\n0,1,1,1,1\n")
+    log = put_file(open_folder / "log.csv", "t,a,b,c,d\n0,1,1,1,1\n")
     (message,) = refuse("import", written(open_folder, "torque.yaml", change), log, "-o", open_folder / "x.h5")
     assert message.startswith("import.torque_source = rotor-speed: needs vehicle.")
 

@@ -14,7 +14,7 @@ from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.response.flown import Responses
 from tests.builders import vehicle_models
 from tests.builders.shifted_flights import ALLOCATION, INERTIA
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 
 CONFIG = """\
 import:
@@ -180,8 +180,7 @@ def test_what_is_refused(refuse, folder, tmp_path):
 
 
 def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
-    config = tmp_path / "open.yaml"
-    config.write_text(CONFIG + VEHICLE.replace("[0.6, 0.6, 1.2]", "null"))
+    config = put_file(tmp_path / "open.yaml", CONFIG + VEHICLE.replace("[0.6, 0.6, 1.2]", "null"))
     (message,) = refuse("response", config, folder / "light.csv", "-o", tmp_path / "r.h5")
     assert "vehicle.inertia_kg_m2: not known in this config, but `cpfls response` needs" in message
 
@@ -196,8 +195,7 @@ def test_an_identified_model_is_judged_with_its_inertia(cpfls, pipeline, study, 
 
 def test_air_that_a_flight_does_not_know_is_still(cpfls, folder, tmp_path):
     """A vehicle with drag along flights without velocity."""
-    config = tmp_path / "study.yaml"
-    config.write_text(CONFIG + VEHICLE)
+    config = put_file(tmp_path / "study.yaml", CONFIG + VEHICLE)
     model = tmp_path / "vehicle.h5"
     drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
     whole = VehicleModel(vehicle=load_study(config).vehicle, effects=(drag,))

@@ -22,7 +22,7 @@ from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import write_flights
 from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
 from tests.builders.spread_vehicles import found_record
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 from tests.builders.vehicles import OPEN_FACTORS
@@ -97,8 +97,7 @@ def _of_torque(show):
 
 
 def _of_gaps(show, folder):
-    config = folder / "gap.yaml"
-    config.write_text(CONFIG + VEHICLE)
+    config = put_file(folder / "gap.yaml", CONFIG + VEHICLE)
     flights = [save(folder / f"flight_{number}.csv", flight_table(number, OFFSET)) for number in (1, 2, 3)]
     exact = save(folder / "exact.csv", flight_table(4))
     show("compare", "compare", "gap.yaml", *(each.name for each in flights), output="disagreement.h5")

@@ -12,6 +12,7 @@ from cpfls_cli.flights import training
 from cpfls_cli.flights.recordings import imported
 from tests.builders.artifacts import edited
 from tests.builders.command_line import run
+from tests.builders.studies import put_file
 from tests.builders.thinned_logs import Flown, write_px4
 
 
@@ -95,8 +96,7 @@ def test_each_file_is_hashed_once(cpfls, study, pipeline, second, tmp_path, monk
 
 
 def test_a_flight_trains_once(refuse, study, pipeline, tmp_path):
-    copy = tmp_path / "copy.h5"
-    copy.write_bytes(pipeline.flight.read_bytes())
+    copy = put_file(tmp_path / "copy.h5", pipeline.flight.read_bytes())
     (message,) = refuse("identify", study, pipeline.flight, copy, "-o", tmp_path / "model.h5")
     assert "holds the same flight as" in message
 
@@ -118,8 +118,7 @@ def test_a_flight_read_chunk_by_chunk_gives_the_same_bytes(cpfls, study, pipelin
 )
 def test_a_long_flight_is_checked_too(refuse, study, pipeline, tmp_path, monkeypatch, dataset, value, said):
     monkeypatch.setattr(training, "IN_MEMORY", 100)
-    broken = tmp_path / "broken.h5"
-    broken.write_bytes(pipeline.flight.read_bytes())
+    broken = put_file(tmp_path / "broken.h5", pipeline.flight.read_bytes())
     with edited(broken) as file:
         file[dataset][7] = value
     (message,) = refuse("identify", study, broken, "-o", tmp_path / "model.h5")
@@ -130,8 +129,7 @@ def test_a_long_flight_without_torque_is_refused_where_it_is_needed(
     cpfls, refuse, study, pipeline, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(training, "IN_MEMORY", 100)
-    lacking = tmp_path / "lacking.h5"
-    lacking.write_bytes(pipeline.flight.read_bytes())
+    lacking = put_file(tmp_path / "lacking.h5", pipeline.flight.read_bytes())
     with edited(lacking) as file:
         del file["torque"]
     cpfls.done("reduce", study, lacking, "-o", tmp_path / "selection.h5")
@@ -182,8 +180,7 @@ def test_who_names_the_logged_columns_gets_them(log, config):
     for motor in range(4):
         own = own.replace(f'"rebuilt.rotor[{motor}]"', f'"actuator_motors.control[{motor}]"')
     assert own != text
-    named = config.with_name("logged.yaml")
-    named.write_text(own)
+    named = put_file(config.with_name("logged.yaml"), own)
     assert commands(log, named).updated_hz["rotor_command"] == pytest.approx(10, rel=0.02)
 
 

@@ -16,6 +16,7 @@ from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.stages import extend
 from tests.builders.gusty_flights import CALM, SMALL, Flight, gusty_flights
 from tests.builders.simulator_files import sdf_of, write_log
+from tests.builders.studies import put_file
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
@@ -55,8 +56,7 @@ def test_init_takes_the_log_too(cpfls, folder, tmp_path):
 
 
 def test_rotors_that_turn_the_other_way_in_the_log_are_named(cpfls, folder, tmp_path):
-    mine = tmp_path / "turned.sdf"
-    mine.write_text(sdf_of(TRUE, spins=(-1, 1, -1, -1)))
+    mine = put_file(tmp_path / "turned.sdf", sdf_of(TRUE, spins=(-1, 1, -1, -1)))
     result = cpfls.done("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
     assert "rotor_3 turns clockwise in the file and counter-clockwise by the log" in result.stderr
     assert [rotor.spin for rotor in load_study(tmp_path / "study.yaml").vehicle.rotors] == [-1, 1, -1, 1]
@@ -116,8 +116,7 @@ def test_a_second_fit_that_is_refused_leaves_the_first(cpfls, folder, tmp_path, 
 
 def test_the_file_itself_is_no_output(cpfls, folder, tmp_path):
     """Its own folder as the output would put the corrected file in its place."""
-    mine = tmp_path / "mine.sdf"
-    mine.write_bytes((folder / "mine.sdf").read_bytes())
+    mine = put_file(tmp_path / "mine.sdf", (folder / "mine.sdf").read_bytes())
     before = mine.read_bytes()
     words = ("gap", mine, folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", tmp_path, "--force")
     result = cpfls(*words)
@@ -192,8 +191,7 @@ ROUND = """<mujoco><worldbody><body name="b"><freejoint/>
 
 def test_a_direction_that_nobody_states_is_asked_for(cpfls, refuse, folder, tmp_path):
     """The first actuator turns nothing: its spin is that of a log that is sure of it, and else asked for."""
-    mine = tmp_path / "mine.xml"
-    mine.write_text(ROUND)
+    mine = put_file(tmp_path / "mine.xml", ROUND)
     result = cpfls.done("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
     assert [rotor.spin for rotor in load_study(tmp_path / "study.yaml").vehicle.rotors] == [-1, 1, -1, 1]
     # Rotors of another time say nothing of the motion.

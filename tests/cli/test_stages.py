@@ -19,7 +19,7 @@ from cpfls_cli.report.content import Box, Text
 from cpfls_cli.result import about, part, result
 from cpfls_cli.stage import Filled, Run, stage, unique_names
 from cpfls_cli.store import read, stage_of
-from tests.builders.studies import TINY, VEHICLE
+from tests.builders.studies import TINY, VEHICLE, put_file
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 
 STAGE = '''\
@@ -332,8 +332,7 @@ def filled(tmp_path, monkeypatch):
     )
     monkeypatch.setattr(sys.modules[__name__], "__file__", str(tmp_path / "stages" / "look.py"))
     monkeypatch.setattr("cpfls_cli.stages.report.page_about", lambda _, paths: " ".join(path.name for path in paths))
-    log = tmp_path / "log.csv"
-    log.write_text("1")
+    log = put_file(tmp_path / "log.csv", "1")
 
     def fill(output=tmp_path / "out", log=log, **given):
         run = Run(validate({}, "default"), output, False, False, lambda *_: None, lambda _: None)

@@ -19,7 +19,7 @@ from cpfls_cli.page import said
 from cpfls_cli.report.content import Folded, Outcome, Text
 from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.forked import Forked
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 
 
 @pytest.fixture
@@ -134,8 +134,7 @@ def test_an_answer_says_what_shows_more_of_it_without_computing_it_again(answer,
     *_, more, last = answer(Outcome({}, blocks, written=pipeline.model))[0]
     assert (more, last) == ("more with -v: why", f"or with cpfls info {pipeline.model} -v")
     # What is no file of results does not hold what was answered.
-    page = tmp_path / "page.html"
-    page.write_text("<!DOCTYPE html>")
+    page = put_file(tmp_path / "page.html", "<!DOCTYPE html>")
     assert answer(Outcome({}, blocks, written=page))[0][-1] == "more with -v: why"
     assert answer(Outcome({}, (Text("all"),), written=pipeline.model))[0] == ["all"]
 
@@ -271,8 +270,7 @@ SIGNALS = "{body_rate: {columns: [p, q, r], unit: rad/s}, body_torque: {columns:
 @pytest.fixture
 def words(pipeline, tmp_path):
     """Arguments of each stage command, inputs first."""
-    log = tmp_path / "log.csv"
-    log.write_text(LOG)
+    log = put_file(tmp_path / "log.csv", LOG)
     return {
         "trajectory": ([], []),
         "simulate": ([pipeline.trajectory], []),

@@ -10,7 +10,7 @@ import pytest
 
 from cpfls_cli.rotations import rotation_matrix
 from tests.builders import ulogs
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 from tests.builders.ulogs import data, definitions, header, message
 
 EXAMPLE = Path(__file__).parents[2] / "configs" / "px4.yaml"
@@ -64,17 +64,13 @@ def ulog(sent=None, fields=FIELDS):
 
 @pytest.fixture
 def config(tmp_path):
-    path = tmp_path / "study.yaml"
-    path.write_text(CONFIG + VEHICLE)
-    return path
+    return put_file(tmp_path / "study.yaml", CONFIG + VEHICLE)
 
 
 @pytest.fixture
 def write(tmp_path):
     def call(content):
-        path = tmp_path / "log.ulg"
-        path.write_bytes(content)
-        return path
+        return put_file(tmp_path / "log.ulg", content)
 
     return call
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 
 SEARCH = """\
 trajectory: {sample_time_s: 0.1}
@@ -21,9 +21,7 @@ identification:
 
 @pytest.fixture(scope="session")
 def search(tmp_path_factory):
-    path = tmp_path_factory.mktemp("search") / "search.yaml"
-    path.write_text(SEARCH + VEHICLE)
-    return path
+    return put_file(tmp_path_factory.mktemp("search") / "search.yaml", SEARCH + VEHICLE)
 
 
 @pytest.fixture(scope="session")

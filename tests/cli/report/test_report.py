@@ -14,7 +14,7 @@ from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.store import read
 from tests.builders.artifacts import read_result, with_fields
 from tests.builders.command_line import drawn, run
-from tests.builders.studies import IDENTIFICATION, VEHICLE
+from tests.builders.studies import IDENTIFICATION, VEHICLE, put_file
 
 CONFIG = f"""
 seed: 3
@@ -70,8 +70,7 @@ def cpfls(*arguments, code=0):
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
-    config = folder / "study.yaml"
-    config.write_text(CONFIG + VEHICLE)
+    config = put_file(folder / "study.yaml", CONFIG + VEHICLE)
     names = ("trajectory", "flight", "selection", "model", "ridge", "noisy")
     files = SimpleNamespace(folder=folder, config=config, **{name: folder / f"{name}.h5" for name in names})
     cpfls("trajectory", config, "-o", files.trajectory)

@@ -19,6 +19,7 @@ from tests.builders.flown_exports import fly_sdf
 from tests.builders.gusty_flights import LARGE
 from tests.builders.playback_flights import STATED, truth
 from tests.builders.simulator_files import sdf_of
+from tests.builders.studies import put_file
 
 ARM = 0.12
 X = [(ARM, -ARM), (-ARM, -ARM), (-ARM, ARM), (ARM, ARM)]
@@ -32,8 +33,7 @@ class Coaxial(type(LARGE)):
 
 def of(folder, spins, logged, sure="stated", truth=LARGE):
     """Make the vehicle of a file, and of a log whose rotors are (x, y, spin)."""
-    path = folder / "mine.sdf"
-    path.write_text(sdf_of(truth, spins=spins))
+    path = put_file(folder / "mine.sdf", sdf_of(truth, spins=spins))
     rotors = tuple(RotorPlace("", (x, y), spin) for x, y, spin in logged)
     airframe = Airframe(rotors, True, "parameters", sure)
     proposal = SimpleNamespace(airframe=airframe, rotors=len(rotors), speed_max=900.0, share_of_speed=False)
@@ -78,8 +78,7 @@ def test_single_rotors_turn_as_the_log_has_them(tmp_path, turned, sure, has_log)
 
 def test_a_largest_speed_that_a_log_let_one_guess_is_that_of_the_model(tmp_path):
     """Whose config was made with another log: what is guessed makes no other vehicle."""
-    path = tmp_path / "mine.sdf"
-    path.write_text(sdf_of(LARGE, spins=(-1, 1, -1, 1)))
+    path = put_file(tmp_path / "mine.sdf", sdf_of(LARGE, spins=(-1, 1, -1, 1)))
     model = read_model(path)
     fast = 1.3 * model.speed_max.value
     proposal = SimpleNamespace(airframe=None, rotors=4, speed_max=fast, share_of_speed=False)
