@@ -138,8 +138,9 @@ def vehicle_of(model, **changed):
 
 
 def write_vehicle(path, vehicle, config=ORIGIN.config, **more):
-    """Write a vehicle, as its command would."""
+    """Write a vehicle, as its command would; give its path."""
     store.write(path, vehicle, replace(ORIGIN, config=config, **more))
+    return path
 
 
 def source_of_vehicle(vehicle, label="vehicle.h5"):

@@ -108,8 +108,7 @@ def folder(cpfls, tmp_path_factory):
     (folder / "points.csv").write_text("x_m,y_m,z_m\n0,0,1\n1,0,1\n1,1,1\n")
     cpfls.done("trajectory", study, "-o", path)
     for number in ("", 2, 3):
-        flight = folder / f"flight{number}.h5"
-        cpfls.done("simulate", study, path, "-o", flight, "--seed", number or 1)
+        cpfls.made("simulate", study, path, "--seed", number or 1, at=folder / f"flight{number}.h5")
     return folder
 
 

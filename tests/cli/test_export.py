@@ -107,8 +107,7 @@ def test_hostile_text_in_a_model_stays_text(cpfls, model, tmp_path, form):
     with edited(model) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
     model.rename(hostile)
-    output = tmp_path / f"m.{ENDINGS[form]}"
-    cpfls.done("export", hostile, "--format", form, "-o", output, "--force")
+    output = cpfls.made("export", hostile, "--format", form, "--force", at=tmp_path / f"m.{ENDINGS[form]}")
     if form == "json":
         document = json.loads(output.read_text())
         assert document["verdict"]["label"] == document["findings"][0] == HOSTILE

@@ -226,8 +226,7 @@ def test_attitudes_not_visited_are_trusted_to_one_rule_with_known_coefficients(c
     """One flight of 12 s leaves the condition number at 3000; three of them bring it to 40."""
     other = fly(4)
     for name, training, said in (("a", flights[:1], "do not trust"), ("b", flights, "the same coefficients hold")):
-        model = tmp_path / f"{name}.h5"
-        cpfls.done("identify", CONFIG, *training, "-o", model)
+        model = cpfls.made("identify", CONFIG, *training, at=tmp_path / f"{name}.h5")
         with pytest.warns(UserWarning, match=f"samples lie outside the attitudes that training visited: {said}"):
             cpfls_cli.load_model(model).predict(other)
 

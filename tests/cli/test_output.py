@@ -152,7 +152,6 @@ def test_a_replaced_file_keeps_its_permissions(cpfls, study, tmp_path):
 
 def test_names_that_are_not_text(cpfls, pipeline, study, tmp_path):
     flight = put_file(tmp_path / os.fsdecode(b"fl\xffight.h5"), pipeline.flight.read_bytes())
-    output = tmp_path / os.fsdecode(b"selec\xfetion.h5")
-    cpfls.done("reduce", study, flight, "-o", output)
+    output = cpfls.made("reduce", study, flight, at=tmp_path / os.fsdecode(b"selec\xfetion.h5"))
     assert cpfls.summary("info", output)["inputs"]["flight"]["name"] == "fl\ufffdight.h5"
     cpfls.done("report", study, output, "-o", tmp_path / os.fsdecode(b"\xfd.html"))

@@ -150,8 +150,7 @@ def test_the_answer_begins_with_what_the_flights_tell(cpfls, folder, tmp_path):
 @pytest.mark.usefixtures("sketched")
 def test_a_report_shows_bode_plots(cpfls, summary, folder, tmp_path):
     _, output, _ = summary(folder / "light.csv")
-    page = tmp_path / "page.html"
-    cpfls.done("report", folder / "study.yaml", output, "-o", page)
+    page = cpfls.made("report", folder / "study.yaml", output, at=tmp_path / "page.html")
     html = page.read_text()
     assert "How a vehicle answers its rotors" in html
     assert "Frequency responses" in html

@@ -97,7 +97,7 @@ def _of_torque(show):
 
 
 def _of_gaps(show, folder):
-    config = put_file(folder / "gap.yaml", CONFIG + VEHICLE)
+    put_file(folder / "gap.yaml", CONFIG + VEHICLE)
     flights = [save(folder / f"flight_{number}.csv", flight_table(number, OFFSET)) for number in (1, 2, 3)]
     exact = save(folder / "exact.csv", flight_table(4))
     show("compare", "compare", "gap.yaml", *(each.name for each in flights), output="disagreement.h5")

@@ -35,8 +35,7 @@ def stored(path, *names):
 
 
 def test_two_flights_train_one_model(cpfls, study, pipeline, second, tmp_path):
-    model = tmp_path / "model.h5"
-    cpfls.done("identify", study, pipeline.flight, second, "-o", model, "--seed", "3")
+    model = cpfls.made("identify", study, pipeline.flight, second, "--seed", "3", at=tmp_path / "model.h5")
     lengths = [len(stored(path, "time")[0]) for path in (pipeline.flight, second)]
     (indices, samples) = stored(model, "training_indices", "judged/samples")
     np.testing.assert_array_equal(indices, np.arange(sum(lengths)))
@@ -69,8 +68,7 @@ def test_a_selection_of_two_flights_counts_them_one_after_the_other(cpfls, study
 
 
 def test_a_selection_must_be_of_the_same_flights(cpfls, refuse, study, pipeline, second, tmp_path):
-    selection = tmp_path / "selection.h5"
-    cpfls.done("reduce", study, pipeline.flight, second, "-o", selection)
+    selection = cpfls.made("reduce", study, pipeline.flight, second, at=tmp_path / "selection.h5")
     output = ("-o", tmp_path / "model.h5")
     (message,) = refuse("identify", study, pipeline.flight, "--selection", selection, *output)
     assert "was made from 2 flights, and 1 is given; " in message

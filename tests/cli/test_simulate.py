@@ -229,8 +229,7 @@ def test_readers_of_flights_give_what_is_known_throughout(cpfls, flown, tmp_path
     config, log, columns = flown
     path = log
     if imported:
-        path = tmp_path / "flight.h5"
-        cpfls.done("import", config, log, "-o", path)
+        path = cpfls.made("import", config, log, at=tmp_path / "flight.h5")
     study = load_study(config)
     (played,) = flights_to_play([path], study)
     flight = read_flights([path], study).flights[0]

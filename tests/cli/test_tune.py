@@ -118,8 +118,7 @@ def test_a_vehicle_that_flights_do_not_tell_is_refused_with_the_flight_that_is_m
         ("playback", vehicle, "not judged", "one that is kept aside"),
         ("wide", replace(found_vehicle(), numbers=wide), "not identified: ", "cpfls trajectory"),
     ):
-        path = tmp_path / f"{name}.h5"
-        write_vehicle(path, own, STUDY)
+        path = write_vehicle(tmp_path / f"{name}.h5", own, STUDY)
         message = refuse("tune", folder / "study.yaml", path, "--autopilot", "px4", "-o", tmp_path / "g.h5")
         assert words in " ".join(message)
         assert f"The flight that is missing: {missing}" in " ".join(message)
@@ -263,9 +262,7 @@ def looked(monkeypatch, folder):
         monkeypatch.setattr("cpfls_cli.stages.tune.read_flight", lambda *_: own)
         monkeypatch.setattr("cpfls_cli.stages.tune.effectiveness", lambda _: plants)
         monkeypatch.setattr("cpfls_cli.stages.tune.vibration_of", lambda _: SimpleNamespace(changes=changes))
-        log = folder / "log.csv"
-        save(log, np.zeros((9, 2)), "t,p")
-        return log
+        return save(folder / "log.csv", np.zeros((9, 2)), "t,p")
 
     return of
 

@@ -88,8 +88,7 @@ def test_other_gains_part_and_the_answer_says_where(cpfls, logged):
 
 
 def test_an_imported_flight_is_flown_with_the_gains_of_its_log_and_by_another_law_with_usual_ones(cpfls, logged):
-    flight = logged / "flight.h5"
-    cpfls.done("import", logged / "study.yaml", logged / "log.ulg", "-o", flight)
+    flight = cpfls.made("import", logged / "study.yaml", logged / "log.ulg", at=logged / "flight.h5")
     words = ("simulate", logged / "study.yaml", flight, "--json", "--force", "-o", logged / "usual.h5")
     said = json.loads(cpfls(*words, "--autopilot", "px4").stdout)
     assert said["gains"]["source"] == "log"

@@ -302,8 +302,7 @@ def open_config(tmp_path, written_log):
 
 def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_config, tmp_path):
     left_open, log = open_config
-    vehicle = tmp_path / "vehicle.h5"
-    write_vehicle(vehicle, vehicle_of(WHOLE), resolved_yaml(load_study(left_open)))
+    vehicle = write_vehicle(tmp_path / "vehicle.h5", vehicle_of(WHOLE), resolved_yaml(load_study(left_open)))
     cpfls.done("import", left_open, log, "-o", tmp_path / "f.h5")
     with warnings.catch_warnings(action="ignore"):
         assert cpfls_cli.load_model(vehicle, left_open).predict(tmp_path / "f.h5").score.r2_body.min() > 0.999

@@ -71,15 +71,13 @@ def other_config(gap_config, tmp_path_factory):
 
 
 def test_flight_of_another_vehicle(cpfls, refuse, gap_config, other_config, shifted, tmp_path):
-    flight = tmp_path / "flight.h5"
-    cpfls.done("import", other_config, shifted[0], "-o", flight)
+    flight = cpfls.made("import", other_config, shifted[0], at=tmp_path / "flight.h5")
     (message,) = refuse("compare", gap_config, flight, "-o", tmp_path / "x.h5")
     assert "was made with another vehicle; these differ: vehicle.mass_kg (7.0 there, 6.0 in the config)" in message
 
 
 def test_disagreement_of_another_vehicle(cpfls, refuse, gap_config, other_config, shifted, tmp_path):
-    source = tmp_path / "disagreement.h5"
-    cpfls.done("compare", other_config, *shifted[:2], "-o", source)
+    source = cpfls.made("compare", other_config, *shifted[:2], at=tmp_path / "disagreement.h5")
     (message,) = refuse("diagnose", gap_config, source, "-o", tmp_path / "x.h5")
     assert "vehicle.mass_kg" in message
 

@@ -225,8 +225,7 @@ def test_error_is_the_gap_that_remains(gap_config, extended, flown):
 
 
 def test_without_attitude_nothing_is_predicted(cpfls, gap_config, extended, shifted, tmp_path):
-    flight = tmp_path / "flight.h5"
-    cpfls.done("import", gap_config, shifted[0], "-o", flight)
+    flight = cpfls.made("import", gap_config, shifted[0], at=tmp_path / "flight.h5")
     with pytest.raises(InputError, match="lacks the attitude"):
         cpfls_cli.load_model(extended).predict(flight)
 
@@ -252,8 +251,7 @@ def test_the_file_says_what_the_effects_and_what_the_base_learned_from(extended,
 def test_stages_hand_the_flights_on(cpfls, gap_config, two_models, tmp_path):
     """Another model to extend brings its own flights."""
     diagnosis = two_models.with_name("diagnosis.h5")
-    again = tmp_path / "again.h5"
-    cpfls.done("extend", gap_config, diagnosis, "-o", again)
+    again = cpfls.made("extend", gap_config, diagnosis, at=tmp_path / "again.h5")
     assert learned(again) == learned(two_models)
 
 

@@ -217,8 +217,7 @@ def test_report_shows_it(cpfls, gap_config, of_vehicle, tmp_path):
 
 
 def test_a_report_of_it_alone_has_a_title_of_its_own(cpfls, gap_config, of_vehicle, tmp_path):
-    page = tmp_path / "page.md"
-    cpfls.done("report", gap_config, of_vehicle[1], "-o", page)
+    page = cpfls.made("report", gap_config, of_vehicle[1], at=tmp_path / "page.md")
     assert page.read_text().startswith("# What a model predicts of flights\n")
 
 

@@ -72,8 +72,7 @@ def unfolded(blocks):
 
 def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls, study, tmp_path):
     model, text, _ = validated
-    page = tmp_path / "report.json"
-    cpfls.done("report", study, model, "-o", page)
+    page = cpfls.made("report", study, model, at=tmp_path / "report.json")
     sections = json.loads(page.read_text(encoding="utf-8"))["sections"]
     blocks = [block for section in sections for block in unfolded(section["blocks"])]
     lines = [" ".join(line.split()) for line in text.splitlines()]

@@ -45,8 +45,7 @@ def test_the_summary_shows_runs_and_excitation(mission):
 
 
 def test_runs_flown_in_closed_loop_are_found_equal(cpfls, config, mission, tmp_path):
-    flight = tmp_path / "flight.h5"
-    cpfls.done("simulate", config, mission[0], "--mode", "closed-loop", "-o", flight)
+    flight = cpfls.made("simulate", config, mission[0], "--mode", "closed-loop", at=tmp_path / "flight.h5")
     planned, flown = read(mission[0], PlannedPath)[0], read(flight, Flight)[0]
     firsts = [round(run.begin / planned.time[1]) for run in planned.runs]
     length = round(planned.runs[0].end / planned.time[1]) + 1

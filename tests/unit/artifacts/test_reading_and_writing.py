@@ -265,8 +265,7 @@ MODELS = {
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
 def test_the_round_trip_is_exact(model, tmp_path):
-    path = tmp_path / "vehicle.h5"
-    write_vehicle(path, vehicle_of(model))
+    path = write_vehicle(tmp_path / "vehicle.h5", vehicle_of(model))
     assert store.examine(path, Vehicle)[2] == []
     assert is_model(path)
     assert is_found(path)
