@@ -18,6 +18,7 @@ from cpfls_cli.playback.vehicle import FoundNumber, Share
 from cpfls_cli.report.source import source_of_result
 from cpfls_cli.vehicle.motion import Acting
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from tests.builders.vehicles import alike
 
 QUAD = VehicleSettings(
     mass_kg=0.9,
@@ -37,14 +38,8 @@ QUAD = VehicleSettings(
 HEXA = VehicleSettings(
     mass_kg=2.0,
     inertia_kg_m2=(0.02, 0.021, 0.04),
-    rotors=tuple(
-        RotorSettings(
-            position_m=(0.3 * np.cos(k * np.pi / 3), 0.3 * np.sin(k * np.pi / 3), 0.0),
-            spin=1 - 2 * (k % 2),
-            thrust_factor_n_s2=8e-6,
-            drag_factor_n_m_s2=1.2e-7,
-        )
-        for k in range(6)
+    rotors=alike(
+        [(np.cos(k * np.pi / 3), np.sin(k * np.pi / 3), 1 - 2 * (k % 2)) for k in range(6)], 8e-6, 1.2e-7, arm=0.3
     ),
 )
 RESPONSE = RotorResponse(delay_s=0.013, lag_s=0.035, slow_roll_pitch=-0.4, slow_yaw=0.3, slow_s=0.45)
@@ -106,6 +101,7 @@ def number_of(name, value=1.0, low=0.9, high=1.1, stated=np.nan, *, determined=T
 def vehicle_of(model, **changed):
     """A vehicle, as if it had been found by a search over two structures."""
     names = ("chosen", "best", "added", "everything", "nothing", "front", "front")
+    two = ("inertia", "linear_damping")
     rows = zip(names, (0.0, 0.0, 0.0, 0.1, 0.4, 0.0, 0.4), (4, 4, 4, 9, 0, 4, 0), strict=True)
     given = {
         "model": model,
@@ -118,15 +114,7 @@ def vehicle_of(model, **changed):
         "trades": (),
         "correlation": np.eye(len(changed.get("numbers", "ab"))),
         "structures": tuple(
-            TriedStructure(
-                name,
-                () if name == "nothing" else ("inertia", "linear_damping"),
-                0.5 + worse,
-                worse,
-                0.01,
-                numbers,
-                30.0,
-            )
+            TriedStructure(name, () if name == "nothing" else two, 0.5 + worse, worse, 0.01, numbers, 30.0)
             for name, worse, numbers in rows
         ),
         "evaluated": 2,

@@ -15,6 +15,7 @@ from cpfls_cli.vehicle.rotors import body_wrench, gain_modes, opposite_pairs
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.vehicle.stepping import Machine, RotorMotion
 from cpfls_cli.vehicle.values import Each
+from tests.builders.vehicles import alike
 
 
 def level(flight, height, roll=0.0):
@@ -136,12 +137,8 @@ def with_gains(vehicle, thrust, drag=(0.0,) * 4):
 
 def circle(number):
     angles = 2 * np.pi * np.arange(number) / number
-    return VehicleSettings(
-        rotors=tuple(
-            RotorSettings(position_m=(0.3 * np.cos(angle), 0.3 * np.sin(angle), 0.0), spin=1 - 2 * (index % 2))
-            for index, angle in enumerate(angles)
-        )
-    )
+    places = zip(np.cos(angles), np.sin(angles), ([1, -1] * number)[:number], strict=True)
+    return VehicleSettings(rotors=alike(places, arm=0.3))
 
 
 def test_columns_are_what_other_factors_do(columns, flight):

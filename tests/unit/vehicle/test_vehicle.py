@@ -191,12 +191,7 @@ THRUST, DRAG, ARM = 121.5e-6, 2.7e-6, 0.3
 
 def ring(count, spins):
     angles = 2 * np.pi * np.arange(count) / count
-    return VehicleSettings(
-        rotors=tuple(
-            RotorSettings(position_m=(np.cos(angle), np.sin(angle), 0.0), spin=spin)
-            for angle, spin in zip(angles, spins, strict=True)
-        )
-    )
+    return VehicleSettings(rotors=alike(zip(np.cos(angles), np.sin(angles), spins, strict=True)))
 
 
 def test_plus_layout_follows_the_hand_formulas():
