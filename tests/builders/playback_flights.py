@@ -296,15 +296,8 @@ class _Fleet:
         torque, force = (np.stack(np.broadcast_arrays(*each), axis=1) for each in wrench)
         angular = (torque - _cross(rate, rate @ body.inertia)) @ body.inverse
         acceleration = (rotation @ force[:, :, None])[:, :, 0] / body.mass - self.weight
-        parts = [
-            velocity,
-            acceleration,
-            _turning(quaternion, rate),
-            angular,
-            change,
-            (acting**2 - slow) / response.slow_s,
-        ]
-        return np.concatenate(parts, axis=1)
+        slowly, turning = (acting**2 - slow) / response.slow_s, _turning(quaternion, rate)
+        return np.concatenate([velocity, acceleration, turning, angular, change, slowly], axis=1)
 
     def command(self, sample, state):
         """Ask for rotor speeds."""

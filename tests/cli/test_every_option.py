@@ -31,15 +31,8 @@ SETTINGS = {
         },
     },
 }
-COMMON = {
-    "--json": "",
-    "--set": "seed=3",
-    "--seed": "4",
-    "--force": "",
-    "--verbose": "",
-    "--accept-guesses": "",
-    "--model": "vehicle.h5",
-}
+COMMON = dict.fromkeys(("--json", "--force", "--verbose", "--accept-guesses"), "")
+COMMON |= {"--set": "seed=3", "--seed": "4", "--model": "vehicle.h5"}
 """What is typed after the options of a line where the command takes it."""
 ALONE = ("--dry-run", "--quiet")
 """Common options that are typed in turn: the first writes nothing, the second prints nothing."""

@@ -38,16 +38,8 @@ def logged(cpfls, tmp_path_factory):
     signals = {name: {"columns": columns, "unit": unit} for name, (columns, unit) in SIGNALS.items()} | {
         "setpoint_attitude": {"columns": NAMES[:3], "unit": "rad"}
     }
-    section = {
-        "import": {
-            "time_column": "stamp",
-            "time_unit": "us",
-            "crop_s": [1.0, 3.0],
-            "torque_source": None,
-            "signals": signals,
-        }
-    }
-    (folder / "study.yaml").write_text(VEHICLE + yaml.safe_dump(section))
+    read = {"time_column": "stamp", "time_unit": "us", "crop_s": [1.0, 3.0], "torque_source": None, "signals": signals}
+    (folder / "study.yaml").write_text(VEHICLE + yaml.safe_dump({"import": read}))
     for words in (
         ("import", "study.yaml", "log.csv", "-o", "flight.h5"),
         ("replay", "study.yaml", "vehicle", "flight.h5", "log.csv", "-o", "replay.h5", "--every", "9"),
