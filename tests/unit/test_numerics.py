@@ -66,12 +66,8 @@ def test_an_unknown_unit_is_refused_with_the_nearest_names():
         to_si(np.zeros(1), "degs")
 
 
-@pytest.fixture
-def values():
-    return np.random.default_rng(2).standard_normal((12, 3)) @ np.triu(np.ones((3, 3)))
-
-
-def test_of_a_mean_the_jackknife_says_what_its_standard_error_says(values):
+def test_of_a_mean_the_jackknife_says_what_its_standard_error_says():
+    values = np.random.default_rng(2).standard_normal((12, 3)) @ np.triu(np.ones((3, 3)))
     left_out = (values.sum(axis=0) - values) / (len(values) - 1)
     np.testing.assert_allclose(jackknife_error(left_out), mean_error(values), rtol=1e-12)
     np.testing.assert_allclose(jackknife_covariance(left_out), np.cov(values.T) / len(values), rtol=1e-12)

@@ -90,11 +90,6 @@ def heavy(answer_of):
     return answer_of("crazypad", CRAZYPAD, "add_weight_W3_near_M3__E9_log00", held_out=held)
 
 
-@pytest.fixture(scope="module")
-def light(answer_of):
-    return answer_of("crazypad", CRAZYPAD, "add_weight_W1_near_M3__E9_log04")
-
-
 def names_of(answer):
     return {effect["name"] for effect in answer["effects"]}
 
@@ -132,8 +127,9 @@ def test_flights_without_weight_have_no_offset(answer_of):
     assert names_of(answer_of("crazypad", CRAZYPAD, *normal[:2], held_out=normal[2:])) == set()
 
 
-def test_weights_move_the_centre_of_mass_towards_the_motor_they_hang_at(light, heavy, coefficients_of):
+def test_weights_move_the_centre_of_mass_towards_the_motor_they_hang_at(answer_of, heavy, coefficients_of):
     """M3 is back left; the heavier weight moves it further."""
+    light = answer_of("crazypad", CRAZYPAD, "add_weight_W1_near_M3__E9_log04")
     offsets = [coefficients_of(answer, "com_offset") for answer in (light, heavy)]
     back = [-found["c_x"]["value"] for found in offsets]
     left = [found["c_y"]["value"] for found in offsets]

@@ -219,16 +219,12 @@ def test_nothing_moves_where_nothing_is_asked():
 PRINTED = [64.0, 8.0, 2.0, 1.0, 1.0, 2.0, 2 * np.pi]
 
 
-@pytest.fixture
-def unit_profile():
-    return BaseProfile(amplitude=1.0, period=1.0)
-
-
-def test_peaks_are_the_printed_ones(unit_profile):
-    peaks = unit_profile.peaks
+def test_peaks_are_the_printed_ones():
+    profile = BaseProfile(amplitude=1.0, period=1.0)
+    peaks = profile.peaks
     values = [peaks.displacement, peaks.velocity, peaks.acceleration, peaks.jerk, peaks.snap, peaks.crackle, peaks.pop]
     np.testing.assert_allclose(values, PRINTED, rtol=1e-12)
-    assert unit_profile.duration == 16.0
+    assert profile.duration == 16.0
 
 
 def test_covering_chooses_the_amplitude():
