@@ -14,6 +14,7 @@ from benchmarks.blind_study.sets import Set
 from tests.builders.command_line import run
 
 HIDDEN = ("com_offset", "rotor_drag")
+DAMPING, ACROSS, ALONG = 0.04 * 0.027, 9.1785e-7, 10.311e-7
 
 
 @pytest.fixture(scope="module")
@@ -63,9 +64,6 @@ def test_extended_model_leaves_the_gap_that_was_promised(answer):
     gap = run.summary("compare", answer.logs / "study.yaml", *flights, "--model", model, "-o", again)["gap"]
     assert gap["torque_n_m"] == pytest.approx(answer.summary["gap_after"]["torque_n_m"], rel=1e-6)
     assert max(gap["floors"]) < 1.5
-
-
-DAMPING, ACROSS, ALONG = 0.04 * 0.027, 9.1785e-7, 10.311e-7
 
 
 @pytest.fixture(scope="module")

@@ -33,6 +33,7 @@ STATED = VehicleSettings(
 FINE_STEP_S = 0.01
 MOTOR_S = 0.03
 """Time in which rotors of a flight with measured speeds follow their commands, before the model's own lag."""
+_FLOWN = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,9 +165,6 @@ def flown(model, kinds=KINDS, *, stated=STATED, duration_s=20.0, rate_hz=100.0, 
         logged(f"{kind}-{seed}-{number}", states[:, number], speeds[:, number], period, hold, noise or Noise(), rng)
         for number, kind in enumerate(kinds)
     ]
-
-
-_FLOWN = {}
 
 
 def _flown_once(model, stated, plan, period, hold):

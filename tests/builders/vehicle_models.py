@@ -44,6 +44,7 @@ HEXA = VehicleSettings(
 )
 RESPONSE = RotorResponse(delay_s=0.013, lag_s=0.035, slow_roll_pitch=-0.4, slow_yaw=0.3, slow_s=0.45)
 SEVEN_RULES = (0.0, 0.1, 0.25, 0.4, 0.6, 0.7, 0.9, 1.0)
+ORIGIN = Origin(stage="vehicle", seed=1, config="seed: 1\n")
 
 
 @cache
@@ -88,9 +89,6 @@ def whole(vehicle=QUAD, *, order=2, **changed):
         remainder=remainder(order),
     )
     return replace(model, **changed)
-
-
-ORIGIN = Origin(stage="vehicle", seed=1, config="seed: 1\n")
 
 
 def number_of(name, value=1.0, low=0.9, high=1.1, stated=np.nan, *, determined=True, at_bound=False, possible=True):

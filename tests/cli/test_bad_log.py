@@ -14,6 +14,7 @@ from tests.builders.studies import VEHICLE, put_file
 
 NAMES = ["t", "roll", "pitch", "yaw", "mx", "my", "mz"]
 FIELDS = "each row needs one field for each column name; a field that holds a separator needs quotes"
+NOISE = np.random.default_rng(5).standard_normal((2000, 10))
 
 
 def rows():
@@ -270,9 +271,6 @@ def test_measured_speeds_are_named_and_a_column_needs_no_words(imported):
     assert "body torque: of vehicle.rotors at their measured speeds" in lines
     lines, _, _ = imported("attitude", "body_torque", source="column")
     assert not any("body torque" in line for line in lines)
-
-
-NOISE = np.random.default_rng(5).standard_normal((2000, 10))
 
 
 @pytest.fixture

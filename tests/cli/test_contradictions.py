@@ -37,6 +37,7 @@ LEARNED = {
 }
 UPSIDE_DOWN = "the vehicle is upside down on average"
 TRIED = ("linear_damping",)
+ITS_CONFIG = {"the motion, the rotors are", "which lifts no vehicle"}
 
 
 class WrongLog(NamedTuple):
@@ -90,9 +91,6 @@ def log_of(path, seed, sign=(1.0, 1.0, 1.0), duration=8.0):
     header = "t,qw,qx,qy,qz,p,q,r,vx,vy,vz,x,y,z,w1,w2,w3,w4"
     np.savetxt(path, values, delimiter=",", header=header, comments="", fmt="%.9g")
     return path
-
-
-ITS_CONFIG = {"the motion, the rotors are", "which lifts no vehicle"}
 
 
 def begins(wrong):

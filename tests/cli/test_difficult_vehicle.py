@@ -35,6 +35,7 @@ ROTATION = ("--set", "trajectory.path=full-rotation")
 TRUE = (0.05, 0.0044, 0.0075)
 HEAVY_BODY = (0.05, 0.045, 0.0075)
 GUESSED = "guesses from mass and arms are used for what the config leaves open (--accept-guesses)"
+COMMANDS = ("simulate", "replay", "trajectory", "gap", "compare", "response", "identify")
 
 
 @pytest.fixture(scope="module")
@@ -117,9 +118,6 @@ def test_an_error_says_what_it_came_about_with(cpfls, config, vehicle, tmp_path)
     result = cpfls("trajectory", config, *ROTATION, "--model", vehicle, "-o", tmp_path / "path.h5")
     assert (result.exit_code, result.stdout) == (1, "")
     assert result.stderr.splitlines()[-1] == f"cpfls: note: vehicle.h5: {HEADLINE}"
-
-
-COMMANDS = ("simulate", "replay", "trajectory", "gap", "compare", "response", "identify")
 
 
 @pytest.mark.parametrize("name", COMMANDS)

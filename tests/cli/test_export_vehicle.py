@@ -28,6 +28,9 @@ from tests.builders.vehicle_models import HEXA, QUAD, is_held, polynomial_effect
 
 pytestmark = pytest.mark.usefixtures("brief")
 ENDINGS = {"json": "json", "c": "c"}
+LOAD = ModelEffect("payload", {"length_m": 0.3, "damping_1_s": 0.6, "depth_m": 0.05}, np.array([0.03, 0.0, 0.0, 0.3]))
+HOSTILE = '--> </sdf> <x a="\'&]]>--\n"""\nraise SystemExit(7)\n\u202e -'
+HEAVY = "Ixx 1.28 kg m^2"
 
 
 @pytest.fixture
@@ -168,10 +171,6 @@ def test_the_page_lists_what_an_export_cannot_hold():
             refused.remove(known.name)
     (said,) = re.findall(r"Not every effect is held: (.*?) are not", PAGE, re.DOTALL)
     assert sorted(re.findall(r"`(\w+)`", said)) == sorted(refused)
-
-
-LOAD = ModelEffect("payload", {"length_m": 0.3, "damping_1_s": 0.6, "depth_m": 0.05}, np.array([0.03, 0.0, 0.0, 0.3]))
-HOSTILE = '--> </sdf> <x a="\'&]]>--\n"""\nraise SystemExit(7)\n\u202e -'
 
 
 @pytest.fixture
@@ -360,9 +359,6 @@ def test_a_vehicle_that_should_not_be_used(cpfls, refuse, vehicle_file, tmp_path
     mark = "DO NOT USE: this is the verdict on the model"
     assert mark in result.stdout
     assert mark in output.read_text()[:600]
-
-
-HEAVY = "Ixx 1.28 kg m^2"
 
 
 @pytest.fixture(scope="module")

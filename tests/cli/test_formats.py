@@ -13,6 +13,7 @@ from cpfls_cli.result import datasets
 from cpfls_cli.stages.info import formats
 
 PAGE = (Path(__file__).parents[2] / "docs" / "format.md").read_text()
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def test_page_names_the_schema_version_and_every_root_attribute():
@@ -80,9 +81,6 @@ def test_every_benchmark_starts(name):
     app = typer.Typer()
     app.command()(module.main)
     assert CliRunner().invoke(app, ["--help"]).exit_code == 0
-
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def test_control_with_a_model_follows_closer_than_feedback_alone(cpfls, study, pipeline, tmp_path, capsys):

@@ -19,6 +19,7 @@ FUNCTIONS = {
     "D33": ((2, 2), "rp"),
 }
 NAMES = {"r": ("roll", 0), "p": ("pitch", 1)}
+PARTITIONS = ("D13(pitch)", "D22(roll)", "D23(roll)", "D23(pitch)", "D33(roll)", "D33(pitch)")
 
 
 def wrapped(angle):
@@ -45,9 +46,6 @@ def membership(x, peaks):
         right = falling(peak, peaks[k + 1]) if k + 1 < len(peaks) else 1.0
         degrees.append(left * right)
     return np.column_stack(degrees)
-
-
-PARTITIONS = ("D13(pitch)", "D22(roll)", "D23(roll)", "D23(pitch)", "D33(roll)", "D33(pitch)")
 
 
 class Stored:

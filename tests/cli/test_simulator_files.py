@@ -20,6 +20,8 @@ from tests.builders.studies import put_file
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
+ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / "configs" / "simulators.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -206,10 +208,6 @@ def test_a_direction_that_nobody_states_is_asked_for(cpfls, refuse, folder, tmp_
     (message,) = refuse("gap", mine, tmp_path / "mixed.csv", "-o", tmp_path / "gap")
     assert "does not state all that a gap needs; `cpfls init --from" in message
     assert "write spin of M1 in place of ASK" in message
-
-
-ROOT = Path(__file__).parents[2]
-CONFIG = ROOT / "configs" / "simulators.yaml"
 
 
 def test_a_flight_in_mujoco_comes_back(cpfls, tmp_path):

@@ -17,6 +17,7 @@ from tests.builders.artifacts import edited
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
 DAMPING = 0.012
+RESUME = "the same command with --resume goes on"
 
 
 @pytest.fixture(scope="module")
@@ -191,9 +192,6 @@ def interrupt_at(monkeypatch):
 
 def names(folder):
     return sorted(path.name for path in folder.iterdir())
-
-
-RESUME = "the same command with --resume goes on"
 
 
 def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, interrupt_at):

@@ -16,6 +16,7 @@ from cpfls_cli.lag import best_delay, delayed, fit_delay, lagged
 from cpfls_cli.units import KNOWN_UNITS, UnitName, to_si
 
 WAVES = np.random.default_rng(1).standard_normal((400, 3)) + np.array([0.0, 5.0, -80.0])
+BETWEEN = pytest.mark.parametrize("between", ["cubic", "linear", "previous"])
 
 
 @pytest.mark.parametrize("upper", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.5, 1.0, 2.0)])
@@ -133,9 +134,6 @@ def test_a_number_on_its_bound_stays_there_and_the_others_move_as_without_it():
     hessian, gradient = np.array([[2.0, 0.5], [0.5, 1.0]]), np.array([-1.0, -1.0])
     found = damped_step(hessian, gradient, 0.0, np.full(2, -5.0), np.array([0.0, 5.0]))
     np.testing.assert_allclose(found, [0.0, 1.0])
-
-
-BETWEEN = pytest.mark.parametrize("between", ["cubic", "linear", "previous"])
 
 
 @pytest.fixture

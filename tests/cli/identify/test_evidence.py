@@ -36,6 +36,11 @@ SHORT = {
     "do-not-use": "do not use",
 }
 SIGNS = {1: "For it", -1: "Against it", 0: "To know"}
+HELD_OUT = ("--set", "identification.choice=held-out")
+SEARCH = ("--set", "identification.generations=2")
+BODY_RATE = "    body_rate: {columns: [p, q, r], unit: rad/s}\n"
+STUDY = f"{LOG_STUDY}{BODY_RATE}{IDENTIFICATION}  validation: {{enabled: false}}\n"
+INERTIA = np.array([0.6, 0.6, 1.2])
 
 
 @pytest.fixture(scope="module")
@@ -140,10 +145,6 @@ def test_use_of_a_model_that_was_judged_unfit_is_said(validated, cpfls, study, p
         assert (answer in stderr) if answer else ("verdict" not in stderr)
 
 
-HELD_OUT = ("--set", "identification.choice=held-out")
-SEARCH = ("--set", "identification.generations=2")
-
-
 @pytest.fixture(scope="module")
 def others(cpfls, study, tmp_path_factory):
     """Two more flights of the tiny study."""
@@ -222,11 +223,6 @@ def test_a_model_of_another_vehicle_is_named(cpfls, study, pipeline, tmp_path):
         warnings.simplefilter("always")
         load_model(pipeline.model, other).predict(pipeline.flight)
     assert any(said in str(each.message) for each in noted)
-
-
-BODY_RATE = "    body_rate: {columns: [p, q, r], unit: rad/s}\n"
-STUDY = f"{LOG_STUDY}{BODY_RATE}{IDENTIFICATION}  validation: {{enabled: false}}\n"
-INERTIA = np.array([0.6, 0.6, 1.2])
 
 
 @pytest.fixture

@@ -24,6 +24,7 @@ identification: {consequents: seesaw, products: additive, membership_functions: 
   local_search: {enabled: false}, validation: {enabled: false}}
 """
 SIZE = ("--set", "identification.population=8", "--set", "identification.generations=2")
+TIMES = [EvaluationTime(samples=n, svd_s=n / 10, evaluation_s=n / 5, compiled_s=1.0) for n in (10, 20, 40)]
 
 
 @pytest.fixture(scope="module")
@@ -86,9 +87,6 @@ def table_cells(html, name):
     return [
         [unescape(re.sub("<.*?>", "", c)).strip() for c in re.findall(r"<t[hd].*?</t[hd]>", row, re.S)] for row in rows
     ]
-
-
-TIMES = [EvaluationTime(samples=n, svd_s=n / 10, evaluation_s=n / 5, compiled_s=1.0) for n in (10, 20, 40)]
 
 
 @pytest.fixture(scope="module")

@@ -40,6 +40,7 @@ from tests.builders.vehicle_models import HEXA, QUAD, remainder, vehicle_of, who
 ORIGIN = store.Origin(
     stage="reduce", seed=4, config="seed: 4\n", inputs={"flight": InputFile("f.h5", "ab" * 32, "cpfls/flight")}
 )
+ALL_ROUND = np.eye(72, dtype=bool)
 
 
 def write(path, seed=1, **changes):
@@ -202,9 +203,6 @@ def test_hdf5_meets_a_full_disk(tmp_path, room):
                 written[name][...] = np.random.default_rng(1).random((1000, 3))
         with pytest.raises(OSError, match="No space left"):
             file.require_written()
-
-
-ALL_ROUND = np.eye(72, dtype=bool)
 
 
 def made(**values):

@@ -20,6 +20,7 @@ CRAZYFLIE = VehicleSettings(
     inertia_kg_m2=(1.43e-5, 1.43e-5, 2.89e-5),
     rotors=alike(((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1)), 2.3e-8, 7.8e-10, 0.0304),
 )
+VEHICLES = {"6 kg": SIX_KILOGRAMS, "Crazyflie": CRAZYFLIE}
 
 
 def waves(time, channels, amplitude, offset=0.0):
@@ -58,9 +59,6 @@ def columns():
         return CATALOGUE[name].columns(signals, shape)
 
     return of
-
-
-VEHICLES = {"6 kg": SIX_KILOGRAMS, "Crazyflie": CRAZYFLIE}
 
 
 @pytest.fixture

@@ -25,6 +25,9 @@ from tests.builders.christoffel import torque
 
 # A low order of the harmonics keeps the curvature over the step in attitude small.
 FIRST_ORDER = model_structure(StructureSettings(harmonic_order=1))
+DURATION, STRUCTURE, VEHICLE = 20.0, StructureSettings(), VehicleSettings()
+SMALL = {"starts": 3, "iterations": 20}
+INERTIA = np.array([[0.6, 0.02, -0.01], [0.02, 0.7, 0.03], [-0.01, 0.03, 1.2]])
 
 
 def drawn():
@@ -107,10 +110,6 @@ def test_a_path_without_pitch_excites_no_rule_of_pitch():
     assert condition_number(path, structure, 400) > 1e14
 
 
-DURATION, STRUCTURE, VEHICLE = 20.0, StructureSettings(), VehicleSettings()
-SMALL = {"starts": 3, "iterations": 20}
-
-
 def optimised(seed=0, progress=None, structure=STRUCTURE, **settings):
     chosen = RotationSettings(**(SMALL | settings))
     return optimised_rotation(chosen, DURATION, structure, VEHICLE, np.random.default_rng(seed), progress)
@@ -181,9 +180,6 @@ def test_without_iterations_the_best_random_path_remains():
 def test_turns_beyond_the_limits_are_refused():
     with pytest.raises(SettingError, match="complete turns"):
         optimised(turns=(20, 1, 1))
-
-
-INERTIA = np.array([[0.6, 0.02, -0.01], [0.02, 0.7, 0.03], [-0.01, 0.03, 1.2]])
 
 
 def through_vertical():

@@ -32,6 +32,9 @@ from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, common_windows
 
 TIME = np.arange(3.0)
 THREE = np.zeros((3, 3))
+SAMPLES = 20
+LENGTH = 30
+PERIOD_S = 0.5
 
 
 @pytest.mark.parametrize(
@@ -90,9 +93,6 @@ def test_a_file_that_does_not_know_its_legs_shows_the_whole_path():
     time, curves = replace(trajectory(), legs=()).first_leg()
     assert len(time) == 5487
     assert curves["displacement"].max() == pytest.approx(64.0)
-
-
-SAMPLES = 20
 
 
 def read(vehicle, speed, **changes):
@@ -230,9 +230,6 @@ def imported(**given):
     return Imported(**(counts | said | given))
 
 
-LENGTH = 30
-
-
 def write_flight(path, samples):
     rng = np.random.default_rng(2)
     signals = {name: rng.normal(size=(samples, 3)) for name in (*MOTION, "torque")}
@@ -278,9 +275,6 @@ def test_another_file_is_refused_with_path_and_remedy(source, change, said):
     change(source.path)
     with pytest.raises(InputError, match=f"{source.path}: {said}.*put the same file there on each"):
         next(source.chunks())
-
-
-PERIOD_S = 0.5
 
 
 def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):

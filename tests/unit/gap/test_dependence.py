@@ -19,6 +19,9 @@ FLIGHT_INDEX = np.repeat(np.arange(FLIGHTS), LENGTH)
 BLOCK = np.arange(FLIGHTS * LENGTH) // 20
 TIME = 5.0 + 0.01 * np.arange(1000)
 VEHICLE = VehicleSettings()
+HOP = 0.2
+CENTRES = np.tile(0.3 + HOP * np.arange(200), 2)
+OF_FLIGHT = np.repeat([0, 1], 200)
 
 
 def correlated(rng, channels, correlation):
@@ -167,11 +170,6 @@ def test_what_a_flight_lacks_is_not_a_number_there():
     assert np.isnan(joined["voltage"][: len(without["time"])]).all()
     assert joined["voltage"][len(without["time"]) :] == pytest.approx(1)
     assert np.isfinite(joined["body rate x"]).all()
-
-
-HOP = 0.2
-CENTRES = np.tile(0.3 + HOP * np.arange(200), 2)
-OF_FLIGHT = np.repeat([0, 1], 200)
 
 
 def quiet():

@@ -17,6 +17,8 @@ from tests.builders.gap_flights import candidate, fly, weak
 
 PERIOD, SIZE, MEMORY = 0.02, 2.0, 1.2
 WINDOWS = windows(PERIOD, 0.4, 0.5)
+LENGTHS = [2000, 1500]
+RING = candidate("vertical_descent", sideways=1.0)
 
 
 def flights(*seconds):
@@ -97,9 +99,6 @@ def test_rows_of_long_flights_are_predicted_from_as_many_as_a_gust_lasts():
     np.testing.assert_allclose(whitened @ covariance @ whitened.T / covariance[0, 0], np.eye(count), atol=1e-3)
 
 
-LENGTHS = [2000, 1500]
-
-
 def red(rng, amplitude=0.0):
     time = 0.2 * np.arange(2000)
     noise = lfilter([1], [1, -0.8], rng.standard_normal((2, 1, 2000)), axis=2)
@@ -160,9 +159,6 @@ def test_no_noise_is_drawn_for_what_is_not_significant_any_more(amplitude, all_d
     early = narrow_band(residual, rates, 0.2, 99, np.random.default_rng(5), significance=0.05)
     assert (len(drawn) == 198) is all_drawn
     assert (early.p_value <= 0.05) is (whole.p_value <= 0.05) is all_drawn
-
-
-RING = candidate("vertical_descent", sideways=1.0)
 
 
 def sinking():

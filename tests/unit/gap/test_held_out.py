@@ -18,6 +18,8 @@ from tests.builders.drawn_numbers import flight_of
 from tests.builders.gap_flights import candidate, fly, weak
 
 KNOWN = np.tile([True, True, True, False, False, False], (1000, 1))
+LOADS = [f"thrust M{index}" for index in range(1, 5)]
+GUSTS = [f"gusts {axis}" for axis in ("roll", "pitch", "yaw")]
 
 
 def noise(*sizes):
@@ -158,10 +160,6 @@ def test_flights_without_the_signals_of_an_effect_are_refused(chosen):
     fitted = system([weak(seen)], [chosen])
     with pytest.raises(InputError, match="lack a signal that a named effect needs"):
         held_out([blind], [blind], fitted, np.zeros(fitted.base.shape[2]), np.ones(6))
-
-
-LOADS = [f"thrust M{index}" for index in range(1, 5)]
-GUSTS = [f"gusts {axis}" for axis in ("roll", "pitch", "yaw")]
 
 
 @pytest.fixture

@@ -14,6 +14,9 @@ from tests.builders.gap_artifacts import named_effect
 
 RIVAL = Alternative("torque_bias", "com_offset", 0.99, "change the thrust")
 LEFT = Unexplained("torque y", 5.2, "yaw rate", 0.8, None, "neither")
+GONE = np.ones(6)
+GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
+NOTHING = np.zeros(6)
 
 
 def effect(name="com_offset", share=0.9):
@@ -68,10 +71,6 @@ def test_a_gap_that_remains_is_not_all_explained():
     assert verdict_of([BIG], [], True, (0.99,), True, GapSettings()) is GapVerdict.PARTIAL
 
 
-GONE = np.ones(6)
-GAP = np.array([3.0, 20.0, np.nan, np.nan, np.nan, np.nan])
-
-
 @pytest.mark.parametrize(
     ("left", "expected"),
     [
@@ -106,9 +105,6 @@ def test_what_several_effects_leave_may_be_what_one_fills_in_for_another():
     before, after = np.array([40.0, 30.0, 1.0, 1.0, 1.0, np.nan]), np.array([1.0, 1.6, 1.0, 1.0, 1.0, np.nan])
     assert [gap_remains(before, after, [], 0.9, effects) for effects in (0, 1, 2)] == [False, False, True]
     assert not gap_remains(before, np.where(after > 1.5, 1.4, after), [], 0.9, 2)
-
-
-NOTHING = np.zeros(6)
 
 
 def channel(value, of=0):

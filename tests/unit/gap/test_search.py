@@ -21,6 +21,8 @@ from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak
 
 SETTINGS = GapSettings()
+NAMES = "linear_damping", "rotor_drag", "torque_bias"
+ROUNDED = 1 + np.array([2e-12, 1e-12, 0.0])
 
 
 def hand_made(name, *directions):
@@ -203,10 +205,6 @@ def test_columns_are_evaluated_again_only_where_their_shape_or_the_signals_chang
         alone = system(moved.flights, moved.chosen)
         assert np.array_equal(moved.base, alone.base)
         assert np.array_equal(moved.residual, alone.residual)
-
-
-NAMES = "linear_damping", "rotor_drag", "torque_bias"
-ROUNDED = 1 + np.array([2e-12, 1e-12, 0.0])
 
 
 class Learned:

@@ -18,6 +18,7 @@ from tests.builders.vehicle_search import CONFIG
 BEFORE_AND_AFTER = "held-out flights before and after, and what to know of the verdict"
 USE = "Take the model with it, extended.h5"
 WRONG = "the inertia about z would have to be 29 times that of the config"
+GUESSED = "guesses from mass and arms are used for what the config leaves open (--accept-guesses); as multiples"
 
 
 def screen(found, **origin):
@@ -111,9 +112,6 @@ def test_a_wrong_number_of_the_vehicle_is_named_as_people_do():
         "Wrong inertia or thrust scale (parameter_error): Izz over yaw torque +24.0 % [+20.0, +28.1] (p < 10⁻⁶, 93 % of"
         " the gap)."
     ]
-
-
-GUESSED = "guesses from mass and arms are used for what the config leaves open (--accept-guesses); as multiples"
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from tests.builders.playback_flights import STATED, flown, truth
 
 FREE = FreeNumbers(STATED, blocks_of(STATED), Rules(1, 0))
 NAMED = replace(FREE, chosen=tuple(block for block in FREE.chosen if block not in LEARNED))
+PERIOD = 0.01
 
 
 @pytest.fixture(scope="module")
@@ -120,9 +121,6 @@ def test_effects_of_motion_and_rotors_are_the_blocks_that_are_tried():
     of_motion = {"flapping_moment", "linear_damping", "quadratic_damping", "rolling_moment", "rotor_plane_damping"}
     of_rotors = {"rotor_acceleration", "rotor_gyroscopic", "rotor_mismatch", "com_offset", "torque_bias"}
     assert set(blocks_of(STATED)) & set(CATALOGUE) == of_air | of_motion | of_rotors
-
-
-PERIOD = 0.01
 
 
 def _flown(path, late=0.0, drift=1.0, seconds=30.0, **given):

@@ -23,6 +23,8 @@ from tests.builders.vehicle_models import HEXA, QUAD, accelerations, whole
 
 MODELS = {"quad": whole(), "hexa, seesaw": whole(HEXA, order=0), "plain": VehicleModel(vehicle=QUAD)}
 PERIOD = 0.01
+FINER = 50
+RESPONSE = RotorResponse(delay_s=0.014, lag_s=0.03, slow_s=0.2)
 
 
 @pytest.fixture(params=MODELS)
@@ -114,10 +116,6 @@ def test_a_copy_of_a_flight_has_nothing_that_was_made_of_it() -> None:
     logged = [_part(0, 200), _part(300, 200)]
     known_motion(logged)
     assert "made" not in vars(pickle.loads(pickle.dumps(logged[0])))
-
-
-FINER = 50
-RESPONSE = RotorResponse(delay_s=0.014, lag_s=0.03, slow_s=0.2)
 
 
 def two_speeds(period, duration=2.0):

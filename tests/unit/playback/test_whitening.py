@@ -11,6 +11,12 @@ from cpfls_cli.playback.lack import Lack, lack_of
 from tests.builders.playback_flights import truth
 
 KEPT = np.array([0.97, 0.99])
+BLOCKS, WINDOWS = 24, 60
+BLOCK = np.repeat(np.arange(BLOCKS), WINDOWS)
+GUSTS = Gusts(np.array([1e-4, 2e-4, 0.0, 0.01, 0.02, 0.03]), np.array([0.3, 1.2, 1.0, 1.0, 0.1, 0.5]))
+PIECES, FREQUENCIES, STEP_S = 800, 30, 0.02
+KNOWN = np.linspace(2.0, 0.5, FREQUENCIES)
+SHARE, REST, MEMORY_S = np.array([0.3, 0.1, 0.0]), 0.4, 0.5
 
 
 def white_of(found, rows):
@@ -103,10 +109,6 @@ def test_a_mean_is_taken_off_and_a_constant_leaves_nothing(residual):
     assert about_mean(rows[:0]).shape == (0, 3)
 
 
-BLOCKS, WINDOWS = 24, 60
-BLOCK = np.repeat(np.arange(BLOCKS), WINDOWS)
-
-
 def innovations_of(new, *, predicted=None, noise=0.0, moved=None):
     nothing = np.zeros((len(BLOCK), 6))
     return ResidualInnovations(
@@ -143,9 +145,6 @@ def test_what_stands_still_grows_with_nothing():
     assert not found.grows(0.05).any()
 
 
-GUSTS = Gusts(np.array([1e-4, 2e-4, 0.0, 0.01, 0.02, 0.03]), np.array([0.3, 1.2, 1.0, 1.0, 0.1, 0.5]))
-
-
 def test_a_gust_has_its_size_and_falls_to_37_percent_within_its_memory():
     step, count = 0.02, 200_000
     drawn = GUSTS.drawn(np.random.default_rng(1), step, count)
@@ -173,11 +172,6 @@ def test_white_noise_grows_as_steps_get_shorter():
         drawn = white.drawn(np.random.default_rng(4), step, 20_000)
         assert drawn.std(axis=0) * np.sqrt(step) == pytest.approx(white.white, rel=0.03)
         assert np.abs(np.corrcoef(drawn[1:, 0], drawn[:-1, 0])[0, 1]) < 0.05
-
-
-PIECES, FREQUENCIES, STEP_S = 800, 30, 0.02
-KNOWN = np.linspace(2.0, 0.5, FREQUENCIES)
-SHARE, REST, MEMORY_S = np.array([0.3, 0.1, 0.0]), 0.4, 0.5
 
 
 @pytest.fixture(scope="module")

@@ -33,6 +33,7 @@ PROP = """  <link name="prop{index}_link"><inertial><origin xyz="{x} {y} 0"/><ma
 
 
 ONE, TWO = (SimpleNamespace(name=f"{name}.csv") for name in ("one", "two"))
+SHIFT = np.array([0.004, -0.003, 0.002])
 
 
 def urdf():
@@ -608,9 +609,6 @@ def test_a_direction_that_no_flight_shows_stays(mine):
     said, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name="one.csv", rotor_speed=None)])
     assert files["mine.sdf"] == mine.read_bytes()
     assert said.unchanged[0].startswith("directions of rotors: no flight of more than 5 s")
-
-
-SHIFT = np.array([0.004, -0.003, 0.002])
 
 
 def shifted(path):

@@ -39,6 +39,7 @@ HORIZON = 50
 AGREE = 0.005
 """Share of the errors after half a second: of a step of second order as long as a sample, 0.2 to 0.3 %."""
 PACKAGES = {"xml": "mujoco", "py": "rotorpy", "urdf": "pybullet"}
+MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
 
 def require(ending):
@@ -251,9 +252,6 @@ def test_what_an_export_says_of_controls_holds(tmp_path, flight):
     mixed = replace(flight, speed=flight.speed[:, order])
     _, theirs = flown(of, mixed)
     assert (apart(own, theirs) < AGREE).all()
-
-
-MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,7 @@ from tests.builders.studies import put_file
 
 ARM = 0.12
 X = [(ARM, -ARM), (-ARM, -ARM), (-ARM, ARM), (ARM, ARM)]
+PARENT = """<sdf version="1.9"><model name="x"><include merge="true"><uri>model://base</uri></include></model></sdf>"""
 
 
 class Coaxial(type(LARGE)):
@@ -85,9 +86,6 @@ def test_a_largest_speed_that_a_log_let_one_guess_is_that_of_the_model(tmp_path)
     like = replace(LARGE.vehicle, rotor_speed_max_rad_s=1.5 * model.speed_max.value)
     assert of_log(model, proposal, None).speed_max == fast
     assert of_log(model, proposal, None, like).speed_max == like.rotor_speed_max_rad_s
-
-
-PARENT = """<sdf version="1.9"><model name="x"><include merge="true"><uri>model://base</uri></include></model></sdf>"""
 
 
 def model(lag_s=0.0, **effects):

@@ -34,6 +34,9 @@ from tests.builders.flights import bent_torque, random_flight, still_flight
 
 BLOCKS, ROWS, PARAMETERS = 6, 9, 5
 TOLERANCE = 1e-10
+CONSTANT = np.array([0.4, -0.3, 0.2])
+SAMPLES = 300
+VALIDATION = ValidationSettings(folds=4)
 
 
 @pytest.fixture(params=[0.0, 3.0], ids=["free", "penalised"])
@@ -118,9 +121,6 @@ def test_a_block_that_alone_determines_a_direction_gives_finite_draws():
     gram[0, 0, 0] = gram[1, 1, 1] = 1.0
     scores = BlockScores(gram, np.zeros((2, 2)), np.zeros(2), np.ones(2), power=1.0)
     np.testing.assert_array_equal(scores.draws(np.ones((3, 2)), TOLERANCE), np.zeros((3, 2)))
-
-
-CONSTANT = np.array([0.4, -0.3, 0.2])
 
 
 def test_equal_models_differ_by_chance_as_often_as_they_should():
@@ -325,10 +325,6 @@ def test_one_rule_of_harmonics_has_no_use_for_an_input_map():
 )
 def test_names(keys, name):
     assert structure_name(StructureSettings(**keys)) == name
-
-
-SAMPLES = 300
-VALIDATION = ValidationSettings(folds=4)
 
 
 def bending_flight(bent=0.0, noise=0.05, samples=SAMPLES):

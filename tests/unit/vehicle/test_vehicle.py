@@ -48,6 +48,9 @@ CASES = {
     "rotors": lambda x, y: F.total(F.rotors([1.0, -2.0, 0.5]) * x + y) * x + F.total(F.rotors([1.0, 2.0]) * y),
     "vectors": lambda x, y: dot(cross((x, y, 0), (0, y, x)), (1.0, 2.0, x)),
 }
+A, B = (0.3, -1.2, 2.5), (1.1, 0.4, -0.7)
+THRUST, DRAG, ARM = 121.5e-6, 2.7e-6, 0.3
+REACTION = CATALOGUE["rotor_acceleration"]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -84,9 +87,6 @@ def test_a_polynomial_has_a_value_for_each_product_of_its_numbers():
 def test_what_is_no_polynomial_is_refused(case):
     with pytest.raises(NoPolynomialError):
         case(Polynomial.number("a"))
-
-
-A, B = (0.3, -1.2, 2.5), (1.1, 0.4, -0.7)
 
 
 def formulas(functions, a, b):
@@ -186,9 +186,6 @@ def test_derivatives_are_written_as_numbers_with_derivatives_have_them():
         np.testing.assert_allclose(own[-1], (one - other) / 2e-6, rtol=1e-6, atol=1e-7)
 
 
-THRUST, DRAG, ARM = 121.5e-6, 2.7e-6, 0.3
-
-
 def ring(count, spins):
     angles = 2 * np.pi * np.arange(count) / count
     return VehicleSettings(rotors=alike(zip(np.cos(angles), np.sin(angles), spins, strict=True)))
@@ -278,9 +275,6 @@ def test_a_wrench_that_is_not_finite_is_refused():
 def test_wrong_number_of_rotors_is_refused():
     with pytest.raises(ComputationError, match=r"rotor_speed: expected shape \(time, 4\), got \(1, 6\)"):
         body_wrench(VehicleSettings(), np.zeros((1, 6)))
-
-
-REACTION = CATALOGUE["rotor_acceleration"]
 
 
 @pytest.mark.parametrize(
