@@ -15,6 +15,8 @@ from cpfls_cli import __version__
 from tests.builders.artifacts import circular, edited, seal
 from tests.builders.studies import put_file
 
+HEADER = "t,roll,pitch,yaw,mx,my,mz\n"
+
 
 @pytest.fixture
 def changed(pipeline, tmp_path):
@@ -333,9 +335,6 @@ def test_a_signal_ends_it_too(looping):
         _, said = process.communicate(timeout=60)
     assert process.returncode == -signal.SIGKILL
     assert said == f"cpfls: error: {looping}: interrupted while HDF5 was reading it\n"
-
-
-HEADER = "t,roll,pitch,yaw,mx,my,mz\n"
 
 
 @pytest.fixture

@@ -15,6 +15,8 @@ from tests.builders.command_line import run
 from tests.builders.studies import put_file
 from tests.builders.thinned_logs import Flown, write_px4
 
+SWAPPED = {"CA_ROTOR0_PX": -0.16, "CA_ROTOR0_PY": -0.16, "CA_ROTOR1_PX": 0.16, "CA_ROTOR1_PY": 0.16}
+
 
 @pytest.fixture(scope="module")
 def second(cpfls, study, tmp_path_factory):
@@ -133,9 +135,6 @@ def test_a_long_flight_without_torque_is_refused_where_it_is_needed(
     cpfls.done("reduce", study, lacking, "-o", tmp_path / "selection.h5")
     (message,) = refuse("identify", study, lacking, "-o", tmp_path / "model.h5")
     assert "lacks torque" in message
-
-
-SWAPPED = {"CA_ROTOR0_PX": -0.16, "CA_ROTOR0_PY": -0.16, "CA_ROTOR1_PX": 0.16, "CA_ROTOR1_PY": 0.16}
 
 
 @pytest.fixture(scope="module")

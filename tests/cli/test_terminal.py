@@ -21,6 +21,8 @@ from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.forked import Forked
 from tests.builders.studies import VEHICLE, put_file
 
+COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "report")
+
 
 @pytest.fixture
 def on_terminal(tmp_path_factory):
@@ -279,9 +281,6 @@ def words(pipeline, tmp_path):
         "identify": ([pipeline.flight], []),
         "report": ([pipeline.trajectory, pipeline.selection], []),
     }
-
-
-COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "report")
 
 
 @pytest.mark.parametrize("command", COMMANDS)

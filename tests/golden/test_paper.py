@@ -19,6 +19,10 @@ from cpfls_cli.vehicle.rotors import allocation_matrix, rotor_demand
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.reductions import beginning, random_selections, row_space
 
+PAPER = {"consequents": "seesaw", "products": "additive"}
+ADDITIVE = {"consequents": "harmonic", "harmonic_order": 1, "products": "additive"}
+TENSOR = {"consequents": "harmonic", "products": "tensor"}
+
 
 @pytest.fixture(scope="module", params=[("along-path", [10.662, 9.480]), ("per-axis", [19.864, 17.762])])
 def paper_path(request):
@@ -50,11 +54,6 @@ def test_largest_roll_and_pitch(paper_path):
     # Pinned because partitions scaled to the data range depend on it; method.md: the path stays within +-20 deg.
     trajectory, tilt = paper_path
     np.testing.assert_allclose(np.degrees(np.abs(trajectory.attitude[:, :2]).max(axis=0)), tilt, atol=1e-3)
-
-
-PAPER = {"consequents": "seesaw", "products": "additive"}
-ADDITIVE = {"consequents": "harmonic", "harmonic_order": 1, "products": "additive"}
-TENSOR = {"consequents": "harmonic", "products": "tensor"}
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from cpfls_cli.evolution.archive import pareto_front, rank
 from cpfls_cli.evolution.engine import gray_decode, gray_encode, linear_ranking_fitness, stochastic_universal_sampling
 
+RANKS = arrays(np.int64, st.integers(2, 40), elements=st.integers(-5, 5))
+
 
 @given(st.data(), st.integers(1, 20))
 def test_decoding_undoes_encoding(data, bits_per_gene):
@@ -23,9 +25,6 @@ def test_decoding_undoes_encoding(data, bits_per_gene):
 def test_encoding_undoes_decoding(data, bits_per_gene):
     bits = data.draw(arrays(np.bool_, (3, 2 * bits_per_gene)))
     np.testing.assert_array_equal(gray_encode(gray_decode(bits, bits_per_gene), bits_per_gene), bits)
-
-
-RANKS = arrays(np.int64, st.integers(2, 40), elements=st.integers(-5, 5))
 
 
 @given(RANKS, st.floats(1, 2))

@@ -21,6 +21,10 @@ from cpfls_cli.vehicle.rotors import body_wrench
 from tests.builders.artifacts import read_result, with_fields
 from tests.builders.exported_vehicles import on_numpy
 
+PATH = {"legs": 1, "displacement_m": 1.0, "period_s": 0.18, "duration_s": 3.0, "yaw_turn_rad": 0.3}
+CLOSED = ("--mode", "closed-loop", "--set", "simulation.closed_loop.integration_rate_hz=200")
+COLUMNS = "t,wx,wy,wz,om1,om2,om3,om4,phi,theta,psi"
+
 
 def test_an_extended_model_holds_the_vehicle_with_its_effects(extended):
     record = read(extended, Extended)[0]
@@ -88,10 +92,6 @@ def test_the_json_of_an_extended_model_says_what_it_is_worth(cpfls, extended, tm
     document = json.loads((tmp_path / "m.json").read_text())
     assert any(line.startswith("On held-out flights its largest gap is ") for line in document["worth"])
     assert "com_offset" in document["effects"]
-
-
-PATH = {"legs": 1, "displacement_m": 1.0, "period_s": 0.18, "duration_s": 3.0, "yaw_turn_rad": 0.3}
-CLOSED = ("--mode", "closed-loop", "--set", "simulation.closed_loop.integration_rate_hz=200")
 
 
 @pytest.fixture(scope="module")
@@ -190,9 +190,6 @@ def test_extended_model_predicts_and_is_compared(cpfls, gap_config, answer, with
     # What was held out for the diagnosis, seen again through the extended model.
     gap = json.loads(result.stdout)["gap"]["torque_n_m"]
     assert gap == pytest.approx(summary["gap_after"]["torque_n_m"], rel=1e-6)
-
-
-COLUMNS = "t,wx,wy,wz,om1,om2,om3,om4,phi,theta,psi"
 
 
 @pytest.fixture(scope="module")

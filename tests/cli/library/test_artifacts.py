@@ -25,6 +25,9 @@ from tests.builders.identified_models import write_changed
 from tests.builders.playback_flights import STATED
 from tests.builders.results import craft, drawn
 
+PERIOD = 0.01
+HOVER = np.sqrt(vehicle_models.QUAD.mass_kg * 9.81 / sum(r.thrust_factor_n_s2 for r in vehicle_models.QUAD.rotors))
+
 
 @pytest.mark.parametrize("stage", formats(), ids=lambda stage: stage.name)
 def test_every_dataset_of_every_format_has_its_values_dimensions_and_unit(stage, tmp_path):
@@ -129,10 +132,6 @@ def test_figures_are_those_of_the_report(cpfls, pipeline, study, tmp_path):
     assert [axes.get_title(loc) for axes in drawn.axes for loc in ("left", "right") if axes.get_title(loc)]
     assert drawn.axes[0].yaxis.label.get_size() == 9.5
     assert len(drawn.axes[0].lines[0].get_xdata()) == len(flight["time"])
-
-
-PERIOD = 0.01
-HOVER = np.sqrt(vehicle_models.QUAD.mass_kg * 9.81 / sum(r.thrust_factor_n_s2 for r in vehicle_models.QUAD.rotors))
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,8 @@ import pytest
 from tests.builders.command_line import run
 from tests.builders.recorded_flights import path_of_log
 
+ARPL, CRAZYPAD, CRAZYSWARM = (f"real/{name}" for name in ("arpl_crazyflie_1khz", "crazypad_com", "crazyswarm2_lee"))
+
 
 def test_nothing_hidden_is_no_gap(answer_of):
     answer = answer_of("rotorpy", "rotorpy", "none")
@@ -79,9 +81,6 @@ def test_a_cut_propeller_is_named_and_pulls_the_less_the_more_is_cut(changed):
     assert all(each["causes"][0]["named"] for each in output)
     losses = [each["causes"][0]["sizes"][0]["value"] for each in output]
     assert all(0 < less < more for less, more in pairwise(losses))
-
-
-ARPL, CRAZYPAD, CRAZYSWARM = (f"real/{name}" for name in ("arpl_crazyflie_1khz", "crazypad_com", "crazyswarm2_lee"))
 
 
 @pytest.fixture(scope="module")

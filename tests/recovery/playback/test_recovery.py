@@ -30,6 +30,10 @@ from tests.builders.playback_flights import (
     truth,
 )
 
+RATE = 3
+# Mean length of the difference of two 3-vectors of noise, for a deviation of 1.
+DIFFERENCE = np.sqrt(2) * np.sqrt(8 / np.pi)
+
 
 def fitted(vehicle, blocks, flights):
     windows = [own for flight in flights for own in windows_of([flight], 0.5, 0.6)]
@@ -124,11 +128,6 @@ def test_the_drag_of_another_simulator_is_found():
         # Without noise, another block may be left to make up for the step of 10 ms: it is next to nothing.
         true = known.get(effect.name, np.zeros(len(scale)))
         assert effect.coefficients == pytest.approx(true, rel=0.02, abs=1e-4 * scale.max())
-
-
-RATE = 3
-# Mean length of the difference of two 3-vectors of noise, for a deviation of 1.
-DIFFERENCE = np.sqrt(2) * np.sqrt(8 / np.pi)
 
 
 def errors(model, flights):

@@ -22,6 +22,10 @@ from cpfls_cli.units import KNOWN_UNITS
 from cpfls_cli.vehicle.rotors import body_wrench
 from tests.builders.studies import VEHICLE, put_file
 
+FOLDER = Path(__file__).parents[3] / "configs" / "gap"
+SPEED = np.array([[300.0, 350.0, 400.0, 470.0]])
+O1, O2, O3, O4 = SPEED[0] ** 2
+
 
 def all_keys(settings, prefix=""):
     for key in keys_of(settings):
@@ -200,11 +204,6 @@ def test_merge_keys_and_anchors_are_plain_yaml():
 def test_messages_name_line_and_column():
     with pytest.raises(ConfigError, match=r"^file:2:1: not valid YAML: key 'a' appears twice$"):
         parse_yaml("a: 1\na: 2\n", "file")
-
-
-FOLDER = Path(__file__).parents[3] / "configs" / "gap"
-SPEED = np.array([[300.0, 350.0, 400.0, 470.0]])
-O1, O2, O3, O4 = SPEED[0] ** 2
 
 
 def study(name):

@@ -15,6 +15,10 @@ from cpfls_cli.evolution.engine import (
     subpopulation_labels,
 )
 
+PARENTS, OFFSPRING = subpopulation_labels(30, 2), subpopulation_labels(24, 2)
+RANKS = np.random.default_rng(1).permutation(54)
+GENES = np.arange(54)[:, np.newaxis]
+
 
 def test_three_bit_code_is_the_published_table():
     table = ["000", "001", "011", "010", "110", "111", "101", "100"]
@@ -149,11 +153,6 @@ def test_nobody_moves(subpopulations, rate):
 def test_a_share_that_is_whole_is_not_rounded_down():
     source = migrate(subpopulation_labels(200, 2), 0.29, np.random.default_rng(4))
     assert np.count_nonzero(source[:100] != np.arange(100)) == 29
-
-
-PARENTS, OFFSPRING = subpopulation_labels(30, 2), subpopulation_labels(24, 2)
-RANKS = np.random.default_rng(1).permutation(54)
-GENES = np.arange(54)[:, np.newaxis]
 
 
 def split(values, labels):

@@ -14,6 +14,9 @@ from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
+DAMPING, OFFSET, WIND = (CATALOGUE[name] for name in ("linear_damping", "com_offset", "wind"))
+SURE = np.full(3, 1e-6)
+
 
 def result(name, vehicle=None, **values):
     numbers = [Estimate(key, "1", v, v - e, v + e, (-1.0, 1.0)) for key, (v, e) in values.items()]
@@ -136,10 +139,6 @@ def test_one_block_makes_nothing_certain(sign):
     (own, other) = likely([np.r_[sign * 40.0, np.zeros(11)]])
     assert 0.005 < min(own, other) < 0.1
     assert (other > own) == (sign > 0)
-
-
-DAMPING, OFFSET, WIND = (CATALOGUE[name] for name in ("linear_damping", "com_offset", "wind"))
-SURE = np.full(3, 1e-6)
 
 
 def test_a_refused_sign_takes_out_one_coefficient_only():

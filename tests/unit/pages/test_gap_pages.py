@@ -31,6 +31,10 @@ from tests.builders.forms import in_all_forms, phrases, words
 from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights
 from tests.builders.vehicle_models import QUAD, source_of_vehicle, vehicle_of, whole
 
+WITH = "With offset of the centre of mass"
+NO_EFFECT = "The residual is not repeatable: no effect of the vehicle explains it."
+NOTHING = np.zeros((6, 6))
+
 
 def test_curves_are_distinguished_without_colour():
     looks = [(str(style["linestyle"]), style["linewidth"], style.get("marker")) for style in (MEASURED, BEFORE, HELD)]
@@ -254,11 +258,6 @@ def test_flights_stand_one_after_another_without_overlap(flights):
 )
 def test_signals_carry_their_units(signal, words):
     assert _signal_words(signal) == words
-
-
-WITH = "With offset of the centre of mass"
-NO_EFFECT = "The residual is not repeatable: no effect of the vehicle explains it."
-NOTHING = np.zeros((6, 6))
 
 
 def shares(**parts):

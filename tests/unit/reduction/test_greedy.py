@@ -10,6 +10,9 @@ from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.reduction.training_set import check_space
 from tests.builders.reductions import random_selections, reduce, row_space
 
+FEW = [((11, 12, columns), 8) for columns in (1, 2, 3, 4)]
+REGRESSOR = np.random.default_rng(0).standard_normal((20, 3, 10))
+
 
 def problem(seed, samples=40, columns=8):
     rng = np.random.default_rng(seed)
@@ -54,9 +57,6 @@ def printed_brute_force(Q, size):
         rises = thin[:, -1].max() > max(now * (1 + 1e-9), 1e-6)
         chosen.append(left[int(np.argmax(thin[:, -1] if rises else thin[:, 0]))])
     return chosen
-
-
-FEW = [((11, 12, columns), 8) for columns in (1, 2, 3, 4)]
 
 
 @pytest.mark.parametrize(("given", "size"), [*(((seed,), 25) for seed in range(4)), *FEW])
@@ -316,9 +316,6 @@ def test_random_selection_has_the_condition_number_of_its_rows():
         assert factor.condition_number == pytest.approx(kept_condition_number(Q, indices, 16), rel=1e-9)
     ((_, few),) = random_selections(Q, 3, 1, np.random.default_rng(0))
     assert (few.rank, few.full_rank, few.condition_number) == (9, False, np.inf)
-
-
-REGRESSOR = np.random.default_rng(0).standard_normal((20, 3, 10))
 
 
 def check_reducible(Q, settings):

@@ -31,6 +31,8 @@ from cpfls_cli.weak_form.windows import windows
 from tests.builders.autopilots import CROSS
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, planned, signals_of
 
+USUAL = VehicleSettings()
+
 
 def typical(name):
     """A twentieth of what is possible, to one side and the other in turn; of shapes, what lies in the middle."""
@@ -283,9 +285,6 @@ def test_parameters_of_no_autopilot_are_refused():
         ClosedLoopSettings(autopilot_parameters={"MC_ROLLRATE_P": 0.1})
     with pytest.raises(SettingError, match="did you mean MC_ROLLRATE_P"):
         ClosedLoopSettings(autopilot="px4", autopilot_parameters={"MC_ROLRATE_P": 0.1})
-
-
-USUAL = VehicleSettings()
 
 
 def of(vehicle=USUAL, *, tilt_max=None, **asked):
