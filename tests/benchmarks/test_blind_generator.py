@@ -234,8 +234,7 @@ def test_controller_speed_hides_only_the_voltage():
 
 @pytest.mark.parametrize("kind", measure.KINDS)
 def test_noise_has_its_stated_size(flown, kind):
-    flight = flown["none-sixkg"].flights[0]
-    long = np.tile(flight.table, (40, 1))
+    long = np.tile(flown["none-sixkg"].flights[0].table, (40, 1))
     noisy = generator.disturb(long, SIXKG, "mid", kind, np.random.default_rng(2))
     spread = (noisy - long)[:, [1, 4, 7, 10, 13, 16]].std(axis=0)
     stated = [np.radians(0.2), 0.005, 0.02, 0.05, 0.05, 1.0]

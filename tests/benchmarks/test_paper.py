@@ -46,6 +46,8 @@ from tests.builders.sweeps import setting_of, sweep_of
 
 NOISE = np.exp(np.random.default_rng(3).normal(0.0, 0.4, 10))
 """What a seed does to all settings alike."""
+FULL = replace(setting_of(NOISE, size=(20, 5)), uniform_condition_number=100.0, largest_torque=1.9)
+VALUES = [0.0012, 0.0009, 0.0031, 0.0010]
 
 
 def sources(*records, times=()):
@@ -306,9 +308,6 @@ def reading_sources(*flights):
     return SimpleNamespace(sweeps=made, by_hash=lambda _: flight)
 
 
-FULL = replace(setting_of(NOISE, size=(20, 5)), uniform_condition_number=100.0, largest_torque=1.9)
-
-
 def test_every_reading_is_judged_on_its_own_samples_and_errors():
     settings = [FULL, chosen("even", "training", 1.0, 101.0), chosen("D", "training", 9.0, 60.0)]
     found = readings(reading_sources((0.05, [*settings, chosen("D", "learned", 9.0, 60.0)]), (0.0, settings)))
@@ -382,9 +381,6 @@ def test_smaller_searches_take_the_columns_in_order_but_leave_exact_ones():
 
 def test_other_settings_have_none():
     assert printed_beside([setting(samples=80), setting("fls", 685)]) == [None, None]
-
-
-VALUES = [0.0012, 0.0009, 0.0031, 0.0010]
 
 
 def test_mean_and_variance():

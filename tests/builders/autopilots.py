@@ -1,5 +1,8 @@
 """A quadrotor of a common size, flown by the control laws of autopilots, and what their loops do in flight."""
 
+import json
+from dataclasses import asdict
+
 import numpy as np
 from control import FRD, stability_margins
 
@@ -14,18 +17,15 @@ from cpfls_cli.simulation.autopilot import GyroscopeNoise
 from cpfls_cli.simulation.closed_loop import ClosedLoop, Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.tuning.margins import StepAnswer
-from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.vehicle_models import vehicle_of
+from tests.builders.vehicles import alike
 
 
 def crossed(mass, arm, inertia, thrust, drag, speed_max):
     """An X quadrotor in the order of PX4: kg, m to each hub along x and y, kg m^2, N s^2, N m s^2, rad/s."""
-    places = ((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))
-    rotors = [
-        RotorSettings(position_m=(x * arm, y * arm, 0.0), spin=spin, thrust_factor_n_s2=thrust, drag_factor_n_m_s2=drag)
-        for x, y, spin in places
-    ]
-    return VehicleSettings(mass_kg=mass, inertia_kg_m2=inertia, rotors=tuple(rotors), rotor_speed_max_rad_s=speed_max)
+    rotors = alike(((1, -1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1)), thrust, drag, arm)
+    return VehicleSettings(mass_kg=mass, inertia_kg_m2=inertia, rotors=rotors, rotor_speed_max_rad_s=speed_max)
 
 
 CROSS = crossed(1.2, 0.16, (0.011, 0.012, 0.02), 1.0e-5, 1.6e-7, 900.0)
@@ -101,17 +101,7 @@ def _flown(autopilot, values, vehicle, lag, time, attitude, gusts, noise, seed, 
     return fly_setpoints(loop, time, setpoints, np.zeros(12), push, heard, injected=added)
 
 
-STUDY = """
-vehicle:
-  mass_kg: 1.2
-  inertia_kg_m2: [0.011, 0.012, 0.02]
-  rotor_speed_max_rad_s: 900.0
-  rotors:
-    - {position_m: [0.16, -0.16, 0.0], spin: 1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
-    - {position_m: [-0.16, 0.16, 0.0], spin: 1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
-    - {position_m: [0.16, 0.16, 0.0], spin: -1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
-    - {position_m: [-0.16, -0.16, 0.0], spin: -1, thrust_factor_n_s2: 1.0e-5, drag_factor_n_m_s2: 1.6e-7}
-"""
+STUDY = f"vehicle: {json.dumps(asdict(CROSS))}\n"
 """Config of `CROSS`."""
 
 

@@ -38,6 +38,7 @@ FACTS = {
     "motor_poles": "14",
 }
 MINIMUM, MOTOR, BATTERY = 1070, 158, 1600
+NOTHING = ((0,) * len(FIELDS),) * 2
 
 
 def unsigned(value):
@@ -123,9 +124,6 @@ def predicted(how, place, row, before):
         9: BATTERY,
         11: MOTOR,
     }[how]
-
-
-NOTHING = ((0,) * len(FIELDS),) * 2
 
 
 def frame(kind, row, before=NOTHING):

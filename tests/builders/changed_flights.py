@@ -11,9 +11,7 @@ from tests.builders.studies import VEHICLE
 
 HEADER = "t,wx,wy,wz,fx,fy,fz,c1,c2,c3,c4,volts"
 CONFIG = """
-seed: 1
 import:
-  time_column: t
   signals:
     body_rate: {columns: [wx, wy, wz], unit: rad/s}
     acceleration: {columns: [fx, fy, fz], unit: m/s^2, required: false}
@@ -22,9 +20,6 @@ import:
     voltage: {columns: [volts], unit: V, required: false}
   acceleration_frame: body-specific-force
   torque_source: null
-  rate_hz: null
-  lowpass_hz: null
-  spike_deviations: null
 """
 WEAK = (1.0, 1.0, 0.8, 1.0)
 """Thrust and drag of each rotor, M3 of which lost a fifth."""

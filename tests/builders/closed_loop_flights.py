@@ -16,6 +16,7 @@ VEHICLE = VehicleSettings(rotors=tuple(RotorSettings(position_m=hub, spin=spin, 
 PERIOD = 0.01
 COARSE = 200.0
 """Steps of the integration in a second, Hz, where a flight is not held against its own exact motion."""
+_FLOWN = {}
 
 
 def planned(duration=3.0, also=0.0):
@@ -46,9 +47,6 @@ def flown(duration=3.0, seed=1, vehicle=VEHICLE, noise=None, relative_noise=None
         time, plan = planned(duration, also)
         _FLOWN[known] = measure(time, plan, vehicle, settings, np.random.default_rng(seed))
     return deepcopy(_FLOWN[known])
-
-
-_FLOWN = {}
 
 
 def signals_of(flight):

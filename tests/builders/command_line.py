@@ -44,7 +44,13 @@ def summary(*words):
     return json.loads(done(*words, "--json").stdout)
 
 
-run.done, run.summary = done, summary
+def made(*words, at):
+    """Give what a command that ends well writes."""
+    done(*words, "-o", at)
+    return at
+
+
+run.done, run.summary, run.made = done, summary, made
 
 
 _FIGURES = {name: vars(canvas._Drawing)[name] for name in ("svg", "rows")} | {"_inline_svg": canvas._inline_svg}

@@ -4,6 +4,7 @@ import struct
 
 HEAD = b"\xa3\x95"
 _LENGTHS = {"n": "4s", "N": "16s", "Z": "64s", "c": "h", "C": "H", "e": "i", "E": "I", "L": "i", "M": "B", "g": "e"}
+_FACTORS = {"c": 0.01, "C": 0.01, "e": 0.01, "E": 0.01, "L": 1e-7}
 
 
 def packing(letters):
@@ -18,9 +19,6 @@ def definition(number, name, letters, columns):
     """Describe one kind of message, as such a log does before the first of them."""
     length = 3 + struct.calcsize(packing(letters))
     return message(0x80, "BBnNZ", (number, length, name.encode(), letters.encode(), columns.encode()))
-
-
-_FACTORS = {"c": 0.01, "C": 0.01, "e": 0.01, "E": 0.01, "L": 1e-7}
 
 
 def line(name, letters, values):

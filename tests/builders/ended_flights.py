@@ -9,6 +9,9 @@ SECONDS = 40.0
 """Of flight before what ends it."""
 
 _FIELDS = ("angles", "rate", "position", "velocity", "acceleration", "specific_force", "speed")
+UPSIDE_DOWN = (0.0, 0.0, -GRAVITY)
+ONE_AT_FULL = (1.6, 0.3, 0.3, 0.3)
+TWO_AT_FULL = (1.6, 0.3, 1.6, 0.3)
 
 
 def then(own, seconds, *, rate=0.0, felt=(0.0, 0.0, GRAVITY), rotors=0.0, roll=None, falls=0.0, seed=5):
@@ -48,11 +51,6 @@ def joined(first, second):
         setattr(longer, name, np.vstack([getattr(first, name), getattr(second, name)]))
     longer.rotation = Rotation.from_euler("ZYX", longer.angles[:, ::-1])
     return longer
-
-
-UPSIDE_DOWN = (0.0, 0.0, -GRAVITY)
-ONE_AT_FULL = (1.6, 0.3, 0.3, 0.3)
-TWO_AT_FULL = (1.6, 0.3, 1.6, 0.3)
 
 
 def hits(own):

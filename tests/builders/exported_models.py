@@ -26,6 +26,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")
 PAPER = {"consequents": "seesaw", "products": "additive", "membership_functions": 5, "input_map": "data-range"}
 RIGID = np.array([0.6, 0.5, 1.2, 0.02, -0.03, 0.01])
+VEHICLE = VehicleSettings()
 
 
 @dataclass(frozen=True)
@@ -103,9 +104,6 @@ def _special(model: InertiaFunctions, axis: int) -> np.ndarray:
             places += [*(2 * np.pi * peaks), *(2 * np.pi * (peaks - 0.5))]
             places += [*scaled, *(0.5 * np.pi * scaled), *(np.pi - 0.5 * np.pi * scaled)]
     return np.array(places)
-
-
-VEHICLE = VehicleSettings()
 
 
 @contextmanager

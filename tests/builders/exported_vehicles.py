@@ -82,11 +82,7 @@ ORIGIN = Origin(stage="vehicle", seed=1, config="seed: 1\n", version="0.1.0")
 
 def sheet_of_vehicle(model, name="vehicle", **changed):
     """Put a vehicle on a sheet."""
-    given = {
-        "usage": ("It is worth a test.",),
-        "origin": ORIGIN,
-        "file": "vehicle.h5",
-    }
+    given = {"usage": ("It is worth a test.",), "origin": ORIGIN, "file": "vehicle.h5"}
     return Sheet(name=name, model=model, sha256="a" * 64, **(given | changed))
 
 

@@ -13,7 +13,8 @@ from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.playback.flight import LoggedFlight, MeasuredMotion, PlaybackFlight
 from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.rotations import attitude_acceleration, attitude_rate, euler_angles, generalised_torque
-from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
+from tests.builders.vehicles import alike
 
 STEP_S, EVERY = 2e-3, 5
 GRAVITY = 9.81
@@ -57,15 +58,8 @@ class Truth(NamedTuple):
     @property
     def vehicle(self):
         """The same as a section `vehicle`."""
-        rotors = tuple(
-            RotorSettings(
-                position_m=(float(x), float(y), 0.0),
-                spin=int(spin),
-                thrust_factor_n_s2=self.thrust_factor,
-                drag_factor_n_m_s2=self.drag_factor,
-            )
-            for (x, y), spin in zip(self.places, SPINS, strict=True)
-        )
+        places = [(*place, spin) for place, spin in zip(self.places.tolist(), SPINS.tolist(), strict=True)]
+        rotors = alike(places, self.thrust_factor, self.drag_factor)
         inertia = (*self.inertia, 0.0, 0.0, 0.0)
         return VehicleSettings(mass_kg=self.mass, inertia_kg_m2=inertia, rotors=rotors, rotor_speed_max_rad_s=1e4)
 

@@ -25,7 +25,7 @@ from tests.builders import blackbox_logs, ulogs
 from tests.builders.artifacts import seal
 from tests.builders.command_line import invoked, run
 from tests.builders.dataflash_logs import dataflash
-from tests.builders.studies import TINY, VEHICLE, stages
+from tests.builders.studies import LOG_STUDY, TINY, VEHICLE, put_file, stages
 from tests.builders.usd_logs import usd
 
 FAULTS = ("traceback", "hang", "wrong exit code", "file left", "accepted nonsense", "terminal orders", "memory")
@@ -44,13 +44,6 @@ FIELDS = (
 NAMES = ("\x1b[2J", "\x1b]0;x\x07", "\x9b31m", "\u202e", "a\rb", "a\nb", 5000 * "a", "", "-o", "{x}", "$\\frac{$")
 PLACES = (0.0, 0.0, 0.3, -0.3, 1e-9, 1e3)
 COLUMNS = ("t", "roll", "pitch", "yaw", "mx", "my", "mz")
-LOG_STUDY = """\
-import:
-  time_column: t
-  signals:
-    attitude: {columns: [roll, pitch, yaw], unit: rad}
-    body_torque: {columns: [mx, my, mz], unit: N m}
-"""
 ULOG_STUDY = """\
 import:
   time_column: rates.timestamp
@@ -155,16 +148,14 @@ def yaml_case(rng, good):
         elif len(lines) > 2:
             del lines[place]
     content = "\n".join(lines).encode("utf-8", "replace") + b"\n"
-    path = good.folder / "hostile.yaml"
-    path.write_bytes(_bytes_changed(rng, content) if rng.random() < 0.2 else content)
+    path = put_file(good.folder / "hostile.yaml", _bytes_changed(rng, content) if rng.random() < 0.2 else content)
     return Case(path, (("config", path), ("trajectory", path, "-o", good.folder / "out.h5", "--dry-run")))
 
 
 def structure_case(rng, good):
     """Change datasets and attributes of an artifact, and seal it again, as only who means it does."""
     stage = str(rng.choice(list(good.artifacts)))
-    path = good.folder / "hostile.h5"
-    path.write_bytes(good.artifacts[stage].read_bytes())
+    path = put_file(good.folder / "hostile.h5", good.artifacts[stage].read_bytes())
     with h5py.File(path, "r+") as file:
         names: list[str] = []
         file.visit(names.append)
@@ -287,8 +278,7 @@ def csv_case(rng, good):
         table = [line for line in table if line] or [[""]]
     text = "\n".join(str(rng.choice([",", ",", ",", ";", "\t", " ", "\n# "])).join(line) for line in table) + "\n"
     content = text.encode("utf-8", "replace")
-    path = good.folder / "hostile.csv"
-    path.write_bytes(_bytes_changed(rng, content) if rng.random() < 0.2 else content)
+    path = put_file(good.folder / "hostile.csv", _bytes_changed(rng, content) if rng.random() < 0.2 else content)
     return _imported(path, good, LOG_STUDY, rng)
 
 
@@ -354,8 +344,7 @@ def nested_case(rng, good):
         for name in names
     }
     sent = [(20_000 * number, int(rng.integers(0, len(names))), rng.random(12)) for number in range(60)]
-    path = good.folder / "hostile.ulg"
-    path.write_bytes(ulogs.ulog(sent, formats))
+    path = put_file(good.folder / "hostile.ulg", ulogs.ulog(sent, formats))
     return _imported(path, good, ULOG_STUDY, rng)
 
 
@@ -475,8 +464,7 @@ BOMBS = ((_declared, ".h5"), (_inflated_matrix, ".mat"), (_inflated_text, ".csv.
 def damaged_case(rng, good, *, kind):
     """Damage a good log of a binary format."""
     ending, study = DAMAGED[kind]
-    path = good.folder / f"hostile{ending}"
-    path.write_bytes(_bytes_changed(rng, _good_log(kind)))
+    path = put_file(good.folder / f"hostile{ending}", _bytes_changed(rng, _good_log(kind)))
     return _imported(path, good, study, rng)
 
 
@@ -528,8 +516,7 @@ def _rows(rng):
 
 
 def _imported(path, good, section, rng):
-    config = good.folder / "log-study.yaml"
-    config.write_text(section + VEHICLE)
+    config = put_file(good.folder / "log-study.yaml", section + VEHICLE)
     proposed = (("init", path, "-o", good.folder / "out.yaml"),) if rng.random() < 0.1 else ()
     return Case(path, (("import", config, path, "-o", good.folder / "out.h5"), *proposed))
 

@@ -12,6 +12,7 @@ FULL = 1000.0
 
 FACTORS = {"px4": (np.sqrt(0.5), 1.0), "ardupilot": (0.5, 0.5), "betaflight": (1.0, 1.0), "": (1.0, 1.0)}
 """Share of a rotor for a full command of roll or pitch, and of yaw, of an X."""
+_XKF1 = ("PN", "PE", "PD", "VN", "VE", "VD")
 
 
 def shares(own):
@@ -81,9 +82,6 @@ def ardupilot(own, *, motors=1, more=None):
         topics["RCOU"] = topic(own, motors, named(pulses, "C1", "C2", "C3", "C4"))
     parameters = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0, "MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0}
     return LogContents({**topics, **(more or {})}, {}, parameters, "ArduCopter 4.5.7")
-
-
-_XKF1 = ("PN", "PE", "PD", "VN", "VE", "VD")
 
 
 def betaflight(own, *, version="4.5.1", reversed_spins=False, more=None):

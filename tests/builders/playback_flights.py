@@ -21,20 +21,19 @@ from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.vehicle.tracing import Graph, array_symbols, traced_in_two
 from tests.builders.recorded_flights import columns_of_log
+from tests.builders.vehicles import OPEN_FACTORS, alike
 
 KINDS = ("multisine", "steps", "figure")
 STATED = VehicleSettings(
     mass_kg=0.8,
     inertia_kg_m2=(0.0040, 0.0044, 0.0075),
     rotor_speed_max_rad_s=1500.0,
-    rotors=tuple(
-        RotorSettings(position_m=(x, y, 0.02), spin=spin, thrust_factor_n_s2=6e-6, drag_factor_n_m_s2=1.4e-7)
-        for x, y, spin in ((0.12, -0.11, 1), (-0.12, -0.11, -1), (-0.12, 0.11, 1), (0.12, 0.11, -1))
-    ),
+    rotors=alike(((0.12, -0.11, 1), (-0.12, -0.11, -1), (-0.12, 0.11, 1), (0.12, 0.11, -1)), 6e-6, 1.4e-7, height=0.02),
 )
 FINE_STEP_S = 0.01
 MOTOR_S = 0.03
 """Time in which rotors of a flight with measured speeds follow their commands, before the model's own lag."""
+_FLOWN = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,8 +115,7 @@ def loaded():
 
 def nothing_known(vehicle=STATED):
     """Keep mass and geometry of a vehicle, with guesses of the rest as a config that leaves it null has."""
-    open_ = {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
-    rotors = [{"position_m": rotor.position_m, "spin": rotor.spin, **open_} for rotor in vehicle.rotors]
+    rotors = [{"position_m": rotor.position_m, "spin": rotor.spin, **OPEN_FACTORS} for rotor in vehicle.rotors]
     known = {"mass_kg": vehicle.mass_kg, "rotor_speed_max_rad_s": vehicle.rotor_speed_max_rad_s}
     guessed = with_guesses({"vehicle": {**known, "inertia_kg_m2": [None] * 3, "rotors": rotors}})["vehicle"]
     return VehicleSettings(
@@ -167,9 +165,6 @@ def flown(model, kinds=KINDS, *, stated=STATED, duration_s=20.0, rate_hz=100.0, 
         logged(f"{kind}-{seed}-{number}", states[:, number], speeds[:, number], period, hold, noise or Noise(), rng)
         for number, kind in enumerate(kinds)
     ]
-
-
-_FLOWN = {}
 
 
 def _flown_once(model, stated, plan, period, hold):
@@ -299,15 +294,8 @@ class _Fleet:
         torque, force = (np.stack(np.broadcast_arrays(*each), axis=1) for each in wrench)
         angular = (torque - _cross(rate, rate @ body.inertia)) @ body.inverse
         acceleration = (rotation @ force[:, :, None])[:, :, 0] / body.mass - self.weight
-        parts = [
-            velocity,
-            acceleration,
-            _turning(quaternion, rate),
-            angular,
-            change,
-            (acting**2 - slow) / response.slow_s,
-        ]
-        return np.concatenate(parts, axis=1)
+        slowly, turning = (acting**2 - slow) / response.slow_s, _turning(quaternion, rate)
+        return np.concatenate([velocity, acceleration, turning, angular, change, slowly], axis=1)
 
     def command(self, sample, state):
         """Ask for rotor speeds."""
@@ -416,20 +404,11 @@ def logged(name, states, speed, period, hold, noise, rng):
     return PlaybackFlight(name=name, motion=motion, speed=measured, hold=hold, stretches=(slice(0, len(states)),))
 
 
-ROTORPY_ARM = 0.1202081528
 ROTORPY = VehicleSettings(
     mass_kg=0.5,
     inertia_kg_m2=(0.00365, 0.00368, 0.00703),
     rotor_speed_max_rad_s=1500.0,
-    rotors=tuple(
-        RotorSettings(
-            position_m=(x * ROTORPY_ARM, y * ROTORPY_ARM, 0.0),
-            spin=spin,
-            thrust_factor_n_s2=5.57e-6,
-            drag_factor_n_m_s2=1.36e-7,
-        )
-        for x, y, spin in ((1, 1, -1), (1, -1, 1), (-1, -1, -1), (-1, 1, 1))
-    ),
+    rotors=alike(((1, 1, -1), (1, -1, 1), (-1, -1, -1), (-1, 1, 1)), 5.57e-6, 1.36e-7, 0.1202081528),
 )
 ROTORPY_HIDDEN = {
     "none": (),

@@ -9,17 +9,12 @@ OFFSET = (0.008, -0.005)
 HEADER = "t,wx,wy,wz,om1,om2,om3,om4"
 
 CONFIG = """
-seed: 1
 import:
-  time_column: t
   signals:
     attitude: {columns: [phi, theta, psi], unit: rad, required: false}
     body_rate: {columns: [wx, wy, wz], unit: rad/s}
     rotor_speed: {columns: [om1, om2, om3, om4], unit: rad/s, required: false}
   torque_source: null
-  rate_hz: null
-  lowpass_hz: null
-  spike_deviations: null
 # No log here holds a velocity, without which a wind could not be ruled out.
 gap: {shifts: 39, horizon_s: 0.1, ignore: [wind]}
 """

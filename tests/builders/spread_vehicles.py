@@ -50,7 +50,10 @@ def found_record(model=None, *, together=0.9, loop=None, gusts=True, lack=None, 
     ):
         at = names.index(first), names.index(second)
         correlation[at] = correlation[at[::-1]] = alike
-    positive = [name.startswith("inertia") or name.endswith("factor") for name in names]
+    least = [
+        value / (1 + relative) if name.startswith("inertia") or name.endswith("factor") else value * (1 - relative)
+        for name, (value, _) in known.items()
+    ]
     size = inertia_and_mass(model.vehicle) * [3.4, 5.1, 2.0, 0.3, 0.3, 0.3]
     memory = np.array([0.3, 1.2, 0.5, 1.0, 1.0, 1.0])
     white = 0.1 * size * (lack is not None)
@@ -60,17 +63,8 @@ def found_record(model=None, *, together=0.9, loop=None, gusts=True, lack=None, 
         low, high = np.asarray(loop)
     given = {
         "numbers": tuple(
-            FoundNumber(
-                name,
-                unit,
-                value,
-                value / (1 + relative) if above else value * (1 - relative),
-                value * (1 + relative),
-                np.nan,
-                name != "inertia.Izz",
-                False,
-            )
-            for (name, (value, unit)), above in zip(known.items(), positive, strict=True)
+            FoundNumber(name, unit, value, below, value * (1 + relative), np.nan, name != "inertia.Izz", False)
+            for (name, (value, unit)), below in zip(known.items(), least, strict=True)
         ),
         "correlation": correlation,
         "blocks": BLOCKS,

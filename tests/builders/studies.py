@@ -1,37 +1,16 @@
 """The section of a config that has no defaults, for studies that need some vehicle, and a tiny study."""
 
 import json
+from dataclasses import asdict
 
 from cpfls_cli.config.study import parse_yaml, to_yaml
+from cpfls_cli.vehicle.settings import VehicleSettings
 
-VEHICLE = f"""\
-vehicle: {
-    json.dumps(
-        {
-            "mass_kg": 6.0,
-            "inertia_kg_m2": [0.6, 0.6, 1.2],
-            "rotor_speed_max_rad_s": 1000.0,
-            "rotors": [
-                {"position_m": hub, "spin": spin, "thrust_factor_n_s2": 121.5e-6, "drag_factor_n_m_s2": 2.7e-6}
-                for hub, spin in (
-                    ([0.3, 0.0, 0.0], 1),
-                    ([0.0, -0.3, 0.0], -1),
-                    ([-0.3, 0.0, 0.0], 1),
-                    ([0.0, 0.3, 0.0], -1),
-                )
-            ],
-        }
-    )
-}
-"""
+VEHICLE = f"vehicle: {json.dumps(asdict(VehicleSettings()))}\n"
 """The quadrotor of the paper, on one line, to be added to the text of a config."""
 
-TINY = """\
-seed: 1
-trajectory: {sample_time_s: 0.1}
-reduction: {size: 60}
+IDENTIFICATION = """\
 identification:
-  structure: cpfls
   input_map: data-range
   consequents: seesaw
   products: additive
@@ -40,8 +19,25 @@ identification:
   population: 10
   generations: 1
   local_search: {enabled: false}
-  validation: {draws: 20, windows: 20, horizon_samples: 6}
 """
+TINY = f"""\
+trajectory: {{sample_time_s: 0.1}}
+reduction: {{size: 60}}
+{IDENTIFICATION}\
+  validation: {{draws: 20, windows: 20, horizon_samples: 6}}
+"""
+LOG_STUDY = """\
+import:
+  signals:
+    attitude: {columns: [roll, pitch, yaw], unit: rad}
+    body_torque: {columns: [mx, my, mz], unit: N m}
+"""
+
+
+def put_file(path, content):
+    """Write a file; give its path."""
+    (path.write_bytes if isinstance(content, bytes) else path.write_text)(content)
+    return path
 
 
 def stages(study, folder):

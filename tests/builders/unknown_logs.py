@@ -73,9 +73,7 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0, angle=0.25,
 def mixer():
     hubs = np.array(HUBS, dtype=float)
     x, y = (hubs[:, axis] * ARM / np.sqrt(2) for axis in (0, 1))
-    return np.array(
-        [THRUST_FACTOR * np.ones(4), THRUST_FACTOR * y, -THRUST_FACTOR * x, -DRAG_FACTOR * hubs[:, 2]],
-    )
+    return np.array([THRUST_FACTOR * np.ones(4), THRUST_FACTOR * y, -THRUST_FACTOR * x, -DRAG_FACTOR * hubs[:, 2]])
 
 
 def _product(first, second):

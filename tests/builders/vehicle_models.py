@@ -18,6 +18,7 @@ from cpfls_cli.playback.vehicle import FoundNumber, Share
 from cpfls_cli.report.source import source_of_result
 from cpfls_cli.vehicle.motion import Acting
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from tests.builders.vehicles import alike
 
 QUAD = VehicleSettings(
     mass_kg=0.9,
@@ -37,18 +38,13 @@ QUAD = VehicleSettings(
 HEXA = VehicleSettings(
     mass_kg=2.0,
     inertia_kg_m2=(0.02, 0.021, 0.04),
-    rotors=tuple(
-        RotorSettings(
-            position_m=(0.3 * np.cos(k * np.pi / 3), 0.3 * np.sin(k * np.pi / 3), 0.0),
-            spin=1 - 2 * (k % 2),
-            thrust_factor_n_s2=8e-6,
-            drag_factor_n_m_s2=1.2e-7,
-        )
-        for k in range(6)
+    rotors=alike(
+        [(np.cos(k * np.pi / 3), np.sin(k * np.pi / 3), 1 - 2 * (k % 2)) for k in range(6)], 8e-6, 1.2e-7, arm=0.3
     ),
 )
 RESPONSE = RotorResponse(delay_s=0.013, lag_s=0.035, slow_roll_pitch=-0.4, slow_yaw=0.3, slow_s=0.45)
 SEVEN_RULES = (0.0, 0.1, 0.25, 0.4, 0.6, 0.7, 0.9, 1.0)
+ORIGIN = Origin(stage="vehicle", seed=1, config="seed: 1\n")
 
 
 @cache
@@ -95,9 +91,6 @@ def whole(vehicle=QUAD, *, order=2, **changed):
     return replace(model, **changed)
 
 
-ORIGIN = Origin(stage="vehicle", seed=1, config="seed: 1\n")
-
-
 def number_of(name, value=1.0, low=0.9, high=1.1, stated=np.nan, *, determined=True, at_bound=False, possible=True):
     """A number that was found."""
     return FoundNumber(name, "", value, low, high, stated, determined, at_bound, possible)
@@ -106,6 +99,7 @@ def number_of(name, value=1.0, low=0.9, high=1.1, stated=np.nan, *, determined=T
 def vehicle_of(model, **changed):
     """A vehicle, as if it had been found by a search over two structures."""
     names = ("chosen", "best", "added", "everything", "nothing", "front", "front")
+    two = ("inertia", "linear_damping")
     rows = zip(names, (0.0, 0.0, 0.0, 0.1, 0.4, 0.0, 0.4), (4, 4, 4, 9, 0, 4, 0), strict=True)
     given = {
         "model": model,
@@ -118,15 +112,7 @@ def vehicle_of(model, **changed):
         "trades": (),
         "correlation": np.eye(len(changed.get("numbers", "ab"))),
         "structures": tuple(
-            TriedStructure(
-                name,
-                () if name == "nothing" else ("inertia", "linear_damping"),
-                0.5 + worse,
-                worse,
-                0.01,
-                numbers,
-                30.0,
-            )
+            TriedStructure(name, () if name == "nothing" else two, 0.5 + worse, worse, 0.01, numbers, 30.0)
             for name, worse, numbers in rows
         ),
         "evaluated": 2,
@@ -138,8 +124,9 @@ def vehicle_of(model, **changed):
 
 
 def write_vehicle(path, vehicle, config=ORIGIN.config, **more):
-    """Write a vehicle, as its command would."""
+    """Write a vehicle, as its command would; give its path."""
     store.write(path, vehicle, replace(ORIGIN, config=config, **more))
+    return path
 
 
 def source_of_vehicle(vehicle, label="vehicle.h5"):

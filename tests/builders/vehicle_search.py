@@ -5,7 +5,6 @@ from cpfls_cli.playback.parameters import blocks_of
 
 TRIED = ("inertia", "linear_damping", "rotor_drag", "lag")
 CONFIG = """\
-seed: 1
 vehicle:
   mass_kg: 0.8
   inertia_kg_m2: [0.0040, 0.0044, 0.0075]

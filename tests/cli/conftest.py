@@ -8,15 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.builders import command_line
-from tests.builders.studies import TINY, VEHICLE, stages
-
-LOG_STUDY = """\
-import:
-  time_column: t
-  signals:
-    attitude: {columns: [roll, pitch, yaw], unit: rad}
-    body_torque: {columns: [mx, my, mz], unit: N m}
-"""
+from tests.builders.studies import LOG_STUDY, TINY, VEHICLE, put_file, stages
 
 
 @pytest.fixture(scope="session")
@@ -49,9 +41,7 @@ def refuse(cpfls, tmp_path):
 
 @pytest.fixture(scope="session")
 def study(tmp_path_factory):
-    path = tmp_path_factory.mktemp("study") / "tiny.yaml"
-    path.write_text(TINY + VEHICLE)
-    return path
+    return put_file(tmp_path_factory.mktemp("study") / "tiny.yaml", TINY + VEHICLE)
 
 
 @pytest.fixture(scope="session")
@@ -70,9 +60,7 @@ def pipeline(cpfls, study):
 @pytest.fixture
 def log_study(tmp_path):
     """A study that imports logs of attitude and torque."""
-    path = tmp_path / "study.yaml"
-    path.write_text(LOG_STUDY + VEHICLE)
-    return path
+    return put_file(tmp_path / "study.yaml", LOG_STUDY + VEHICLE)
 
 
 @pytest.fixture(scope="session")

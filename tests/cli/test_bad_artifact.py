@@ -13,6 +13,9 @@ import pytest
 
 from cpfls_cli import __version__
 from tests.builders.artifacts import circular, edited, seal
+from tests.builders.studies import put_file
+
+HEADER = "t,roll,pitch,yaw,mx,my,mz\n"
 
 
 @pytest.fixture
@@ -48,8 +51,7 @@ def drop(*paths):
 @pytest.mark.parametrize("share", [0.0001, 0.01, 0.1, 0.5, 0.9, 0.99, 0.9999])
 def test_truncated(refuse, pipeline, study, tmp_path, share):
     whole = pipeline.trajectory.read_bytes()
-    cut = tmp_path / "cut.h5"
-    cut.write_bytes(whole[: int(len(whole) * share)])
+    cut = put_file(tmp_path / "cut.h5", whole[: int(len(whole) * share)])
     (line,) = refuse("simulate", study, cut, "-o", tmp_path / "out.h5")
     assert line.startswith(f"{cut}: cannot be read as an artifact: ")
     assert refuse("info", cut) == refuse("check", cut) == [line]
@@ -60,8 +62,7 @@ def test_truncated(refuse, pipeline, study, tmp_path, share):
     [(b"", "is empty"), (b"t,roll\n0,1\n", "cannot be read as an artifact: not an HDF5 file, or damaged")],
 )
 def test_not_hdf5(refuse, study, tmp_path, content, message):
-    path = tmp_path / "flight.h5"
-    path.write_bytes(content)
+    path = put_file(tmp_path / "flight.h5", content)
     assert refuse("reduce", study, path, "-o", tmp_path / "out.h5") == [f"{path}: {message}"]
 
 
@@ -232,8 +233,7 @@ def test_selection_with_wrong_indices(refuse, changed, pipeline, study, tmp_path
         file["indices"] = values
 
     selection = changed("selection", change)
-    words = ("identify", study, pipeline.flight, "--selection", selection, "-o", tmp_path / "out.h5")
-    (line,) = refuse(*words)
+    (line,) = refuse("identify", study, pipeline.flight, "--selection", selection, "-o", tmp_path / "out.h5")
     assert line.startswith(f"{selection}: {message}")
 
 
@@ -337,9 +337,6 @@ def test_a_signal_ends_it_too(looping):
     assert said == f"cpfls: error: {looping}: interrupted while HDF5 was reading it\n"
 
 
-HEADER = "t,roll,pitch,yaw,mx,my,mz\n"
-
-
 @pytest.fixture
 def log(tmp_path):
     path = tmp_path / "log.csv"
@@ -392,8 +389,7 @@ def test_a_log_where_an_artifact_belongs(refuse, log, study, tmp_path, command):
 
 
 def test_a_name_with_spaces_can_be_pasted(refuse, log, tmp_path):
-    spaced = tmp_path / "my log.csv"
-    spaced.write_bytes(log.read_bytes())
+    spaced = put_file(tmp_path / "my log.csv", log.read_bytes())
     (line,) = refuse("info", spaced)
     assert line.endswith(f": cpfls import CONFIG '{spaced}' -o 'my log.h5'")
 

@@ -10,10 +10,11 @@ import pytest
 
 from cpfls_cli.flightlog.smoothing import low_pass
 from cpfls_cli.rotations import body_rate
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 
 NAMES = ["t", "roll", "pitch", "yaw", "mx", "my", "mz"]
 FIELDS = "each row needs one field for each column name; a field that holds a separator needs quotes"
+NOISE = np.random.default_rng(5).standard_normal((2000, 10))
 
 
 def rows():
@@ -31,9 +32,7 @@ def table():
 @pytest.fixture
 def write(tmp_path):
     def call(content, name="log.csv"):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return path
+        return put_file(tmp_path / name, content if isinstance(content, bytes) else content.encode())
 
     return call
 
@@ -119,7 +118,6 @@ def test_values_that_no_flight_has_are_refused(wrong, content, message):
 
 QUATERNIONS = """\
 import:
-  time_column: t
   signals:
     quaternion: {columns: [qw, qx, qy, qz], unit: "1"}
   torque_source: null
@@ -273,9 +271,6 @@ def test_measured_speeds_are_named_and_a_column_needs_no_words(imported):
     assert "body torque: of vehicle.rotors at their measured speeds" in lines
     lines, _, _ = imported("attitude", "body_torque", source="column")
     assert not any("body torque" in line for line in lines)
-
-
-NOISE = np.random.default_rng(5).standard_normal((2000, 10))
 
 
 @pytest.fixture

@@ -161,8 +161,7 @@ def test_artifact_report_and_info_say_the_same(cpfls, changed, folder):
     cpfls.done("check", made)
     assert first in cpfls("info", made).stdout
     assert first.partition(": ")[2].partition(";")[0] in (folder / "out" / "report.html").read_text()
-    page = folder / "page.md"
-    cpfls.done("report", folder / "study.yaml", made, "-o", page, "--force")
+    page = cpfls.made("report", folder / "study.yaml", made, "--force", at=folder / "page.md")
     assert all(name in page.read_text() for name in ("weak1.csv", "weak2.csv", "before1.csv", "before5.csv"))
 
 
@@ -234,8 +233,7 @@ def by_torque(tmp_path_factory):
 def test_a_ratio_that_is_reversed_today_is_a_change(cpfls, by_torque, today, number):
     result = compared(cpfls, by_torque, today)
     assert result.exit_code == 1, result.output
-    summary = json.loads((by_torque / "out" / "changed.json").read_text())
-    assert summary["reversed"] == [number]
+    assert json.loads((by_torque / "out" / "changed.json").read_text())["reversed"] == [number]
     assert "reversed, or nothing, and in no reference flight" in " ".join(result.stdout.split())
 
 

@@ -2,7 +2,7 @@
 
 import json
 import warnings
-from dataclasses import replace
+from dataclasses import asdict, replace
 from html import unescape
 from typing import NamedTuple
 
@@ -37,6 +37,7 @@ LEARNED = {
 }
 UPSIDE_DOWN = "the vehicle is upside down on average"
 TRIED = ("linear_damping",)
+ITS_CONFIG = {"the motion, the rotors are", "which lifts no vehicle"}
 
 
 class WrongLog(NamedTuple):
@@ -47,24 +48,10 @@ class WrongLog(NamedTuple):
     sign: tuple[float, ...] = (1.0, 1.0, 1.0)
 
 
-def _reversed_spins():
-    rotors = [_rotor(rotor, -rotor.spin) for rotor in VEHICLE.rotors]
-    return f"vehicle.rotors={json.dumps(rotors)}"
-
-
-def _rotor(rotor, spin):
-    return {
-        "position_m": list(rotor.position_m),
-        "spin": spin,
-        "thrust_factor_n_s2": rotor.thrust_factor_n_s2,
-        "drag_factor_n_m_s2": rotor.drag_factor_n_m_s2,
-        "radius_m": rotor.radius_m,
-    }
-
-
+REVERSED = [asdict(rotor) | {"spin": -rotor.spin} for rotor in VEHICLE.rotors]
 WRONG = {
     "gyroscope mirrored about x": WrongLog((), "opposite signs", (-1.0, 1.0, 1.0)),
-    "spins swapped": WrongLog((_reversed_spins(),), "the motion, the rotors are"),
+    "spins swapped": WrongLog((f"vehicle.rotors={json.dumps(REVERSED)}",), "the motion, the rotors are"),
     "FLU declared FRD": WrongLog(("import.body_frame=FRD",), UPSIDE_DOWN),
     "a mass 20 times too large": WrongLog((f"vehicle.mass_kg={20 * VEHICLE.mass_kg}",), "which lifts no vehicle"),
     "ENU declared NED": WrongLog(("import.world_frame=NED",), UPSIDE_DOWN),
@@ -81,16 +68,9 @@ def config_of(folder):
         "rotor_speed": (["w1", "w2", "w3", "w4"], "rad/s"),
     }
     signals = {name: {"columns": names, "unit": unit} for name, (names, unit) in columns.items()}
-    vehicle = {
-        "mass_kg": VEHICLE.mass_kg,
-        "inertia_kg_m2": list(VEHICLE.inertia_kg_m2),
-        "rotor_speed_max_rad_s": VEHICLE.rotor_speed_max_rad_s,
-        "rotors": [_rotor(rotor, rotor.spin) for rotor in VEHICLE.rotors],
-    }
     study = {
-        "seed": 1,
-        "vehicle": vehicle,
-        "import": {"time_column": "t", "signals": signals, "torque_source": "rotor-speed"},
+        "vehicle": asdict(VEHICLE),
+        "import": {"signals": signals, "torque_source": "rotor-speed"},
         "gap": {"horizon_s": 0.1},
         "identification": LEARNED,
         "playback": {**SEARCH, "leave_out": left_out(TRIED)},
@@ -111,9 +91,6 @@ def log_of(path, seed, sign=(1.0, 1.0, 1.0), duration=8.0):
     header = "t,qw,qx,qy,qz,p,q,r,vx,vy,vz,x,y,z,w1,w2,w3,w4"
     np.savetxt(path, values, delimiter=",", header=header, comments="", fmt="%.9g")
     return path
-
-
-ITS_CONFIG = {"the motion, the rotors are", "which lifts no vehicle"}
 
 
 def begins(wrong):
@@ -165,8 +142,7 @@ def test_a_vehicle_found_in_it_is_not_to_be_used(logs, name, tmp_path):
     wrong = WRONG[name]
     config, (first, second) = logs(wrong.sign)
     words = (first, "--held-out", second, "-o", tmp_path / "vehicle.h5", "--anyway", *asked(wrong))
-    result = run.done("vehicle", config, *words)
-    label, sentence = result.stdout.splitlines()[:2]
+    label, sentence = run.done("vehicle", config, *words).stdout.splitlines()[:2]
     assert label.startswith("DO NOT USE: ")
     assert sentence.startswith(f"  Do not use it. {begins(wrong)}{first.name}: ")
     assert wrong.words in sentence

@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.builders.hostile_files import COLUMNS, LOG_STUDY
-from tests.builders.studies import TINY, VEHICLE
+from tests.builders.hostile_files import COLUMNS
+from tests.builders.studies import LOG_STUDY, TINY, VEHICLE
 
 STAGES = ("trajectory", "flight", "selection", "model")
 

@@ -20,8 +20,10 @@ from cpfls_cli.playback.replay import Playback
 from cpfls_cli.result import plain
 from cpfls_cli.store import read
 from tests.builders.artifacts import edited, read_result, with_fields
+from tests.builders.studies import put_file
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
+from tests.builders.vehicles import OPEN_FACTORS
 
 ROOT = Path(__file__).parents[2]
 HEADLINE = (
@@ -33,6 +35,7 @@ ROTATION = ("--set", "trajectory.path=full-rotation")
 TRUE = (0.05, 0.0044, 0.0075)
 HEAVY_BODY = (0.05, 0.045, 0.0075)
 GUESSED = "guesses from mass and arms are used for what the config leaves open (--accept-guesses)"
+COMMANDS = ("simulate", "replay", "trajectory", "gap", "compare", "response", "identify")
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +49,7 @@ def config(folder):
     data, path = yaml.safe_load(CONFIG), folder / "found.yaml"
     data["vehicle"]["inertia_kg_m2"] = [None, None, None]
     for rotor in data["vehicle"]["rotors"]:
-        rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+        rotor |= OPEN_FACTORS
     path.write_text(yaml.safe_dump(data, sort_keys=False))
     return path
 
@@ -117,9 +120,6 @@ def test_an_error_says_what_it_came_about_with(cpfls, config, vehicle, tmp_path)
     assert result.stderr.splitlines()[-1] == f"cpfls: note: vehicle.h5: {HEADLINE}"
 
 
-COMMANDS = ("simulate", "replay", "trajectory", "gap", "compare", "response", "identify")
-
-
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_refusal_names_both_ways_and_each_of_them_works(cpfls, refuse, command, vehicle, heavy, name):
     (line,) = refuse(*command(name))
@@ -183,8 +183,7 @@ def test_a_file_made_with_it_carries_it_on(cpfls, config, flight, vehicle, tmp_p
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in made.stderr.splitlines()
     header = read(compared, Disagreement)[1]
     assert header.cautions[0] == f"vehicle.h5: {HEADLINE}"
-    answer = cpfls.summary("info", compared)
-    assert answer["cautions"] == list(header.cautions)
+    assert cpfls.summary("info", compared)["cautions"] == list(header.cautions)
     assert f"cpfls: note: vehicle.h5: {HEADLINE}" in cpfls("info", compared).stderr.splitlines()
     cpfls.done("report", config, compared, "-o", tmp_path / "page.md")
     summary = (tmp_path / "page.md").read_text().split("## ")[1]
@@ -254,15 +253,13 @@ def flights(cpfls, open_folder):
 def written(open_folder, name, change):
     data = yaml.safe_load(CONFIG) | {"playback": dict(SEARCH)}
     change(data)
-    path = open_folder / name
-    path.write_text(yaml.safe_dump(data, sort_keys=False))
-    return path
+    return put_file(open_folder / name, yaml.safe_dump(data, sort_keys=False))
 
 
 def open_constants(data):
     data["vehicle"]["inertia_kg_m2"] = None
     for rotor in data["vehicle"]["rotors"]:
-        rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+        rotor |= OPEN_FACTORS
 
 
 @pytest.fixture(scope="module")
@@ -295,8 +292,7 @@ def test_a_torque_of_unknown_rotors_is_refused(refuse, open_folder):
             "signals": {"rotor_speed": {"columns": ["a", "b", "c", "d"], "unit": "rad/s"}},
         }
 
-    log = open_folder / "log.csv"
-    log.write_text("t,a,b,c,d\n0,1,1,1,1\n")
+    log = put_file(open_folder / "log.csv", "t,a,b,c,d\n0,1,1,1,1\n")
     (message,) = refuse("import", written(open_folder, "torque.yaml", change), log, "-o", open_folder / "x.h5")
     assert message.startswith("import.torque_source = rotor-speed: needs vehicle.")
 

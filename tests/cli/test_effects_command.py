@@ -27,8 +27,7 @@ def test_one_effect_shows_its_range_and_its_rivals(cpfls):
 
 
 def test_what_takes_an_effects_place_once_it_is_named_is_listed(cpfls):
-    text = cpfls("effects", "com_offset").stdout
-    assert re.findall(r"\b(c_.) from", text) == ["c_x", "c_y", "c_z"]
+    assert re.findall(r"\b(c_.) from", cpfls("effects", "com_offset").stdout) == ["c_x", "c_y", "c_z"]
 
 
 def test_machines_get_the_same(cpfls):

@@ -31,15 +31,8 @@ SETTINGS = {
         },
     },
 }
-COMMON = {
-    "--json": "",
-    "--set": "seed=3",
-    "--seed": "4",
-    "--force": "",
-    "--verbose": "",
-    "--accept-guesses": "",
-    "--model": "vehicle.h5",
-}
+COMMON = dict.fromkeys(("--json", "--force", "--verbose", "--accept-guesses"), "")
+COMMON |= {"--set": "seed=3", "--seed": "4", "--model": "vehicle.h5"}
 """What is typed after the options of a line where the command takes it."""
 ALONE = ("--dry-run", "--quiet")
 """Common options that are typed in turn: the first writes nothing, the second prints nothing."""
@@ -108,8 +101,7 @@ def folder(cpfls, tmp_path_factory):
     (folder / "points.csv").write_text("x_m,y_m,z_m\n0,0,1\n1,0,1\n1,1,1\n")
     cpfls.done("trajectory", study, "-o", path)
     for number in ("", 2, 3):
-        flight = folder / f"flight{number}.h5"
-        cpfls.done("simulate", study, path, "-o", flight, "--seed", number or 1)
+        cpfls.made("simulate", study, path, "--seed", number or 1, at=folder / f"flight{number}.h5")
     return folder
 
 

@@ -107,8 +107,7 @@ def test_hostile_text_in_a_model_stays_text(cpfls, model, tmp_path, form):
     with edited(model) as file:
         file["inputs/flight"].attrs["name"] = HOSTILE
     model.rename(hostile)
-    output = tmp_path / f"m.{ENDINGS[form]}"
-    cpfls.done("export", hostile, "--format", form, "-o", output, "--force")
+    output = cpfls.made("export", hostile, "--format", form, "--force", at=tmp_path / f"m.{ENDINGS[form]}")
     if form == "json":
         document = json.loads(output.read_text())
         assert document["verdict"]["label"] == document["findings"][0] == HOSTILE
@@ -151,10 +150,7 @@ def test_not_a_good_model(refuse, pipeline, study, tmp_path):
             {"model__fuzzy__coefficients": np.full(113, np.inf)},
             "model/fuzzy/coefficients: 113 of 113 values are not finite",
         ),
-        (
-            {"model__fuzzy__rigid_body": None},
-            "the cpfls/identified lacks /model/fuzzy/rigid_body; make it again",
-        ),
+        ({"model__fuzzy__rigid_body": None}, "the cpfls/identified lacks /model/fuzzy/rigid_body; make it again"),
     ],
 )
 def test_a_model_of_wrong_content(refuse, model, tmp_path, values, message):
@@ -206,8 +202,7 @@ def test_a_name_goes_to_c_and_json_only(cpfls, refuse, pipeline, tmp_path):
 @pytest.mark.parametrize("form", ENDINGS)
 def test_the_suffix_shows_the_form(cpfls, pipeline, tmp_path, form):
     output = tmp_path / f"m.{ENDINGS[form]}"
-    result = cpfls("export", pipeline.model, "-o", output, "--json")
-    assert json.loads(result.stdout)["format"] == form
+    assert json.loads(cpfls("export", pipeline.model, "-o", output, "--json").stdout)["format"] == form
     answer = tmp_path / "told" / output.name
     answer.parent.mkdir()
     cpfls.done("export", pipeline.model, "--format", form, "-o", answer)
@@ -258,9 +253,7 @@ def test_a_model_without_verdict_is_said(cpfls, model, tmp_path, form):
 
 def test_a_model_that_was_judged_unfit_is_marked(cpfls, refuse, model, tmp_path):
     with_fields(
-        model,
-        model,
-        verdict=Verdict("do-not-use", "", (Reason("it is fast", 1), Reason("it explains nothing", -1))),
+        model, model, verdict=Verdict("do-not-use", "", (Reason("it is fast", 1), Reason("it explains nothing", -1)))
     )
     (line,) = refuse("export", model, "-o", tmp_path / "m.c")
     assert line == f"{model}: its verdict is do-not-use; --anyway exports it, marked as such"

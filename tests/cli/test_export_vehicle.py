@@ -28,13 +28,14 @@ from tests.builders.vehicle_models import HEXA, QUAD, is_held, polynomial_effect
 
 pytestmark = pytest.mark.usefixtures("brief")
 ENDINGS = {"json": "json", "c": "c"}
+LOAD = ModelEffect("payload", {"length_m": 0.3, "damping_1_s": 0.6, "depth_m": 0.05}, np.array([0.03, 0.0, 0.0, 0.3]))
+HOSTILE = '--> </sdf> <x a="\'&]]>--\n"""\nraise SystemExit(7)\n\u202e -'
+HEAVY = "Ixx 1.28 kg m^2"
 
 
 @pytest.fixture
 def vehicle(tmp_path):
-    path = tmp_path / "vehicle.h5"
-    write_vehicle(path, vehicle_of(whole(effects=polynomial_effects(QUAD)[:2])))
-    return path
+    return write_vehicle(tmp_path / "vehicle.h5", vehicle_of(whole(effects=polynomial_effects(QUAD)[:2])))
 
 
 def self_test(output):
@@ -172,15 +173,9 @@ def test_the_page_lists_what_an_export_cannot_hold():
     assert sorted(re.findall(r"`(\w+)`", said)) == sorted(refused)
 
 
-LOAD = ModelEffect("payload", {"length_m": 0.3, "damping_1_s": 0.6, "depth_m": 0.05}, np.array([0.03, 0.0, 0.0, 0.3]))
-HOSTILE = '--> </sdf> <x a="\'&]]>--\n"""\nraise SystemExit(7)\n\u202e -'
-
-
 @pytest.fixture
 def vehicle_file(tmp_path):
-    path = tmp_path / "vehicle.h5"
-    write_vehicle(path, vehicle_of(truth()))
-    return path
+    return write_vehicle(tmp_path / "vehicle.h5", vehicle_of(truth()))
 
 
 def read(form, output):
@@ -233,8 +228,7 @@ def test_a_vehicle_is_exported_and_hostile_names_stay_text(cpfls, tmp_path, form
 
 
 def test_links_of_gazebo_are_bodies_and_weigh_what_the_vehicle_does(cpfls, vehicle_file, tmp_path):
-    output = tmp_path / "uav.sdf"
-    cpfls.done("export", vehicle_file, "-o", output, "--name", "my_quad")
+    output = cpfls.made("export", vehicle_file, "--name", "my_quad", at=tmp_path / "uav.sdf")
     model = read("sdf", output).find("model")
     assert model.get("name") == "my_quad"
     links = model.findall("link")
@@ -249,15 +243,13 @@ def test_links_of_gazebo_are_bodies_and_weigh_what_the_vehicle_does(cpfls, vehic
 
 @pytest.mark.skipif(shutil.which("gz") is None, reason="no gz, which checks SDF, on this machine")
 def test_gazebo_takes_the_file(cpfls, vehicle_file, tmp_path):
-    output = tmp_path / "uav.sdf"
-    cpfls.done("export", vehicle_file, "-o", output)
+    output = cpfls.made("export", vehicle_file, at=tmp_path / "uav.sdf")
     done = subprocess.run(["gz", "sdf", "-k", output], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_px4_gets_its_sensors_and_an_airframe(cpfls, vehicle_file, tmp_path):
-    output = tmp_path / "uav.sdf"
-    cpfls.done("export", vehicle_file, "--format", "px4", "-o", output)
+    output = cpfls.made("export", vehicle_file, "--format", "px4", at=tmp_path / "uav.sdf")
     model = read("px4", output).find("model")
     names = [sensor.get("name") for sensor in model.findall("link[@name='base_link']/sensor")]
     assert names == ["imu_sensor", "air_pressure_sensor", "magnetometer_sensor", "navsat_sensor"]
@@ -281,8 +273,7 @@ def test_px4_gets_its_sensors_and_an_airframe(cpfls, vehicle_file, tmp_path):
 
 
 def test_a_section_of_toml_has_what_the_dynamics_take(cpfls, vehicle_file, tmp_path):
-    output = tmp_path / "uav.toml"
-    cpfls.done("export", vehicle_file, "-o", output)
+    output = cpfls.made("export", vehicle_file, at=tmp_path / "uav.toml")
     (name, section), *_ = read("crazyflow", output).items()
     assert name == "uav"
     assert section["mass"] == 0.8
@@ -296,8 +287,7 @@ def test_a_section_of_toml_has_what_the_dynamics_take(cpfls, vehicle_file, tmp_p
 
 def test_urdf_is_read_by_a_parser_of_others(cpfls, vehicle_file, tmp_path):
     yourdfpy = pytest.importorskip("yourdfpy", reason="needs the package yourdfpy, which reads URDF")
-    output = tmp_path / "uav.urdf"
-    cpfls.done("export", vehicle_file, "-o", output)
+    output = cpfls.made("export", vehicle_file, at=tmp_path / "uav.urdf")
     robot = yourdfpy.URDF.load(str(output), load_meshes=False, build_scene_graph=False).robot
     links = {link.name: link.inertial for link in robot.links}
     assert links["base_link"].mass == 0.8
@@ -309,8 +299,7 @@ def test_urdf_is_read_by_a_parser_of_others(cpfls, vehicle_file, tmp_path):
 
 
 def test_a_frame_of_ardupilot_has_its_keys_in_its_order(cpfls, vehicle_file, tmp_path):
-    output = tmp_path / "uav.json"
-    cpfls.done("export", vehicle_file, "--format", "ardupilot", "-o", output)
+    output = cpfls.made("export", vehicle_file, "--format", "ardupilot", at=tmp_path / "uav.json")
     keys, known = read("ardupilot", output), truth().vehicle
     assert (keys["mass"], keys["num_motors"], keys["propExpo"]) == (0.8, 4, 1.0)
     assert keys["moment_inertia"] == pytest.approx(known.inertia_kg_m2[:3])
@@ -345,8 +334,7 @@ def test_an_identified_model_is_exported_as_a_vehicle(cpfls, pipeline, tmp_path)
 
 
 def test_what_a_target_cannot_hold_at_all(refuse, tmp_path):
-    path = tmp_path / "hexa.h5"
-    write_vehicle(path, vehicle_of(replace(whole(HEXA), effects=(), remainder=None)))
+    path = write_vehicle(tmp_path / "hexa.h5", vehicle_of(replace(whole(HEXA), effects=(), remainder=None)))
     (line,) = refuse("export", path, "--format", "rotorpy", "-o", tmp_path / "uav.py")
     assert line == (
         f"{path.name}: RotorPy allocates thrust and torque to four rotors, but this vehicle has 6; --format mjcf, sdf, "
@@ -371,9 +359,6 @@ def test_a_vehicle_that_should_not_be_used(cpfls, refuse, vehicle_file, tmp_path
     mark = "DO NOT USE: this is the verdict on the model"
     assert mark in result.stdout
     assert mark in output.read_text()[:600]
-
-
-HEAVY = "Ixx 1.28 kg m^2"
 
 
 @pytest.fixture(scope="module")
@@ -401,8 +386,7 @@ def test_a_report_strikes_the_number_through_in_all_forms(cpfls, folder):
 
 @pytest.mark.parametrize(("command", "output"), [("export", "v.c"), ("export", "v.xml"), ("spread", "s.yaml")])
 def test_no_export_holds_it_unless_it_is_asked_for(cpfls, folder, tmp_path, command, output):
-    words = (command, folder / "vehicle.h5", "-o", tmp_path / output)
-    refused = cpfls(*words, "--force")
+    refused = cpfls(command, folder / "vehicle.h5", "-o", tmp_path / output, "--force")
     assert refused.exit_code == 2
     assert f"impossible numbers, which no such vehicle has: {HEAVY}" in refused.stderr
     assert "--anyway exports" in refused.stderr

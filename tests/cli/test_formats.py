@@ -13,6 +13,7 @@ from cpfls_cli.result import datasets
 from cpfls_cli.stages.info import formats
 
 PAGE = (Path(__file__).parents[2] / "docs" / "format.md").read_text()
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def test_page_names_the_schema_version_and_every_root_attribute():
@@ -36,8 +37,7 @@ def described(cpfls, *arguments):
 
 
 def test_one_format_is_described_without_a_file(cpfls):
-    every = described(cpfls, "--format", "flight")
-    (flight,) = every
+    (flight,) = described(cpfls, "--format", "flight")
     assert (flight["format"], flight["commands"]) == ("cpfls/flight", ["simulate", "import"])
     torque = flight["datasets"]["body_torque"]
     assert (torque["dimensions"], torque["units"], torque["frame"]) == (["time", "axis"], "N m", "body (FLU)")
@@ -83,12 +83,8 @@ def test_every_benchmark_starts(name):
     assert CliRunner().invoke(app, ["--help"]).exit_code == 0
 
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
-
-
 def test_control_with_a_model_follows_closer_than_feedback_alone(cpfls, study, pipeline, tmp_path, capsys):
-    path = tmp_path / "path.h5"
-    cpfls.done("trajectory", study, "-o", path, "--set", "trajectory.sample_time_s=0.05")
+    path = cpfls.made("trajectory", study, "--set", "trajectory.sample_time_s=0.05", at=tmp_path / "path.h5")
     runpy.run_path(str(EXAMPLES / "computed_torque.py"))["main"](study, path, pipeline.model)
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     errors = {name: [float(size) for size in sizes] for name, *sizes in lines}

@@ -44,6 +44,8 @@ COMMANDS = (
     "effects",
 )
 COMMON = ("--json", "--set", "--seed", "--force", "--quiet", "-q", "--verbose", "-v", "--dry-run", "--help", "-h")
+ROOT = Path(__file__).parents[2]
+LISTED = [command for _, commands in WORKFLOWS for command in commands]
 
 
 def test_commands_are_those_documented():
@@ -90,10 +92,6 @@ def test_wrong_usage(cpfls, words, message):
     assert result.exit_code == 2
     assert result.stdout == ""
     assert message in result.stderr
-
-
-ROOT = Path(__file__).parents[2]
-LISTED = [command for _, commands in WORKFLOWS for command in commands]
 
 
 def test_the_help_begins_with_it_on_one_screen(cpfls):

@@ -8,6 +8,7 @@ import pytest
 import scipy.io
 import yaml
 
+from tests.builders.studies import put_file
 from tests.builders.unknown_logs import FLIP, HUBS, flat_log, flight, named, ulog_of_flight, with_ground, write_csv
 
 MASS, ARM = "0.8", "0.16"
@@ -287,8 +288,7 @@ def test_rotors_that_nothing_shows_are_asked_for(proposed, tmp_path, own):
 
 
 def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
-    path = tmp_path / "log.ulg"
-    path.write_bytes(ulog_of_flight(own))
+    path = put_file(tmp_path / "log.ulg", ulog_of_flight(own))
     result, text, data = proposed(path, "--mass", MASS)
     assert "vehicle_attitude.q[{0,1,2,3}] " in result.stdout
     signals = data["import"]["signals"]
@@ -317,8 +317,7 @@ def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
     ],
 )
 def test_parameters_that_contradict_a_multirotor_are_refused(refuse, tmp_path, own, parameters, message):
-    path = tmp_path / "log.ulg"
-    path.write_bytes(ulog_of_flight(own, **parameters))
+    path = put_file(tmp_path / "log.ulg", ulog_of_flight(own, **parameters))
     assert refuse("init", path, "-o", tmp_path / "study.yaml") == [f"{path}: {message}"]
 
 
@@ -378,10 +377,7 @@ def test_masses_and_arms_that_nothing_flies_with_are_refused(cpfls, log, tmp_pat
         (("--mass", MASS, "--arm", ARM, "--inertia", "40,44,75"), ("--inertia = 75: ", "75 is an inertia in kg cm^2")),
         (("--inertia", "0.004,0.004,0.02"), ("--inertia = 0.004,0.004,0.02: no body has this inertia",)),
         (("--inertia", "0.004,0.004"), ("is not three moments of inertia above 0; write IXX,IYY,IZZ in kg m^2",)),
-        (
-            ("--mass", MASS, "--arm", ARM, "--thrust-factor", "6.5e-8"),
-            ("6.5e-08: ", "6.5e-08 is a factor in N/rpm^2"),
-        ),
+        (("--mass", MASS, "--arm", ARM, "--thrust-factor", "6.5e-8"), ("6.5e-08: ", "6.5e-08 is a factor in N/rpm^2")),
     ],
 )
 def test_a_mass_and_an_arm_that_no_vehicle_has_are_refused_with_the_likely_unit(cpfls, log, tmp_path, words, said):
@@ -495,16 +491,14 @@ def test_what_a_log_does_not_state_is_marked_a_guess_in_the_config(proposed, tmp
 
 
 def test_an_arm_next_to_places_that_a_log_states_is_asked_for(cpfls, refuse, tmp_path, own):
-    log = tmp_path / "log.ulg"
-    log.write_bytes(ulog_of_flight(own))
+    log = put_file(tmp_path / "log.ulg", ulog_of_flight(own))
     (line,) = refuse("init", log, "-o", tmp_path / "study.yaml", "--arm", "0.3")
     assert "leave --arm out to take these, or add --scale-to-arm" in line
     cpfls.done("init", log, "-o", tmp_path / "study.yaml", "--arm", "0.3", "--scale-to-arm")
 
 
 def test_a_log_of_a_moment_says_how_short_it_is(refuse, tmp_path):
-    short = tmp_path / "log.ulg"
-    short.write_bytes(ulog_of_flight(flight(seconds=0.4)))
+    short = put_file(tmp_path / "log.ulg", ulog_of_flight(flight(seconds=0.4)))
     assert refuse("init", short, "-o", tmp_path / "study.yaml") == [
         f"{short}: holds only 0.39 s; a flight to learn from has at least ten"
     ]

@@ -144,8 +144,7 @@ def test_several_logs_are_a_table_and_a_page_each(cpfls, logs, tmp_path, monkeyp
     assert result.stdout.startswith("3 flights\n")
     index = (tmp_path / "out" / "index.html").read_text()
     assert '<a href="px4%20log.html">px4 log.ulg</a>' in index
-    own = re.search("<h1>(.*?)</h1>", (tmp_path / "out" / "bf.html").read_text())[1]
-    assert own in index
+    assert re.search("<h1>(.*?)</h1>", (tmp_path / "out" / "bf.html").read_text())[1] in index
     assert "without a gyroscope" in index
     assert result.stdout.count("Nothing to look at") == result.stdout.count("blind.csv") == 1
     assert "- blind.csv: " in result.stdout

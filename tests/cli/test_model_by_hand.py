@@ -19,6 +19,7 @@ FUNCTIONS = {
     "D33": ((2, 2), "rp"),
 }
 NAMES = {"r": ("roll", 0), "p": ("pitch", 1)}
+PARTITIONS = ("D13(pitch)", "D22(roll)", "D23(roll)", "D23(pitch)", "D33(roll)", "D33(pitch)")
 
 
 def wrapped(angle):
@@ -45,9 +46,6 @@ def membership(x, peaks):
         right = falling(peak, peaks[k + 1]) if k + 1 < len(peaks) else 1.0
         degrees.append(left * right)
     return np.column_stack(degrees)
-
-
-PARTITIONS = ("D13(pitch)", "D22(roll)", "D23(roll)", "D23(pitch)", "D33(roll)", "D33(pitch)")
 
 
 class Stored:
@@ -217,8 +215,7 @@ def flights(fly):
 def test_the_model_of_one_flight_is_exact_on_another(cpfls, flights, tmp_path):
     first, _, other = flights
     words = ("identify", CONFIG, first, "--validate", other, "-o", tmp_path / "model.h5", "--json")
-    result = cpfls.done(*words)
-    summary = json.loads(result.stdout)
+    summary = json.loads(cpfls.done(*words).stdout)
     assert (summary["rank"], summary["parameters"]) == (61, 61)
     assert summary["held_out"][other.name]["relative_error"] < 1e-8
 
@@ -227,8 +224,7 @@ def test_attitudes_not_visited_are_trusted_to_one_rule_with_known_coefficients(c
     """One flight of 12 s leaves the condition number at 3000; three of them bring it to 40."""
     other = fly(4)
     for name, training, said in (("a", flights[:1], "do not trust"), ("b", flights, "the same coefficients hold")):
-        model = tmp_path / f"{name}.h5"
-        cpfls.done("identify", CONFIG, *training, "-o", model)
+        model = cpfls.made("identify", CONFIG, *training, at=tmp_path / f"{name}.h5")
         with pytest.warns(UserWarning, match=f"samples lie outside the attitudes that training visited: {said}"):
             cpfls_cli.load_model(model).predict(other)
 

@@ -7,11 +7,11 @@ import sys
 import pytest
 
 from cpfls_cli.artifacts.output import locked
+from tests.builders.studies import put_file
 
 
 def test_existing_output_needs_force(cpfls, refuse, study, tmp_path):
-    output = tmp_path / "trajectory.h5"
-    output.write_text("precious")
+    output = put_file(tmp_path / "trajectory.h5", "precious")
     assert refuse("trajectory", study, "-o", output) == [f"{output}: exists already; --force replaces it"]
     assert refuse("trajectory", study, "-o", output, "--dry-run") == [f"{output}: exists already; --force replaces it"]
     cpfls.done("trajectory", study, "-o", output, "--force")
@@ -64,8 +64,7 @@ def test_devices_and_pipes_are_not_replaced(refuse, study, tmp_path):
 
 
 def test_failure_while_computing_leaves_the_old_output(refuse, pipeline, study, tmp_path):
-    output = tmp_path / "flight.h5"
-    output.write_text("precious")
+    output = put_file(tmp_path / "flight.h5", "precious")
     # A rotor this slow cannot carry the vehicle, which only the computation finds out.
     weak = ("--set", "vehicle.rotor_speed_max_rad_s=150")
     lines = refuse("simulate", study, pipeline.trajectory, "-o", output, "--force", *weak, code=1)
@@ -73,8 +72,7 @@ def test_failure_while_computing_leaves_the_old_output(refuse, pipeline, study, 
 
 
 def test_full_disk_leaves_the_old_output(refuse, study, tmp_path, monkeypatch):
-    output = tmp_path / "trajectory.h5"
-    output.write_text("precious")
+    output = put_file(tmp_path / "trajectory.h5", "precious")
 
     def fail(*_):
         raise OSError(28, "No space left on device")
@@ -100,11 +98,9 @@ def test_output_larger_than_the_system_allows(pipeline, study, tmp_path, command
 
 def test_no_file_that_a_command_reads_is_its_output(refuse, pipeline, study, tmp_path):
     message = "is an input of this command; -o must name another file"
-    own = tmp_path / "own.yaml"
-    own.write_bytes(study.read_bytes())
+    own = put_file(tmp_path / "own.yaml", study.read_bytes())
     assert refuse("trajectory", own, "-o", own, "--force") == [f"{own}: {message}"]
-    header = tmp_path / "model.h"
-    header.write_bytes(pipeline.model.read_bytes())
+    header = put_file(tmp_path / "model.h", pipeline.model.read_bytes())
     assert refuse("export", header, "-o", tmp_path / "model.c", "--force") == [f"{header}: {message}"]
 
 
@@ -112,8 +108,7 @@ def test_two_commands_on_one_output(refuse, study, tmp_path):
     output = tmp_path / "trajectory.h5"
     with locked(output, "trajectory"):
         said = f"{output}: is being written by cpfls trajectory, process {os.getpid()}; "
-        (line,) = refuse("trajectory", study, "-o", output, "--force")
-        assert line == f"{said}wait for it, or name another output"
+        assert refuse("trajectory", study, "-o", output, "--force") == [f"{said}wait for it, or name another output"]
     assert list(tmp_path.iterdir()) == []
 
 
@@ -149,17 +144,14 @@ def test_links_are_no_outputs(refuse, study, tmp_path):
 
 
 def test_a_replaced_file_keeps_its_permissions(cpfls, study, tmp_path):
-    output = tmp_path / "trajectory.h5"
-    output.write_text("private")
+    output = put_file(tmp_path / "trajectory.h5", "private")
     output.chmod(0o600)
     cpfls.done("trajectory", study, "-o", output, "--force")
     assert output.stat().st_mode & 0o777 == 0o600
 
 
 def test_names_that_are_not_text(cpfls, pipeline, study, tmp_path):
-    flight = tmp_path / os.fsdecode(b"fl\xffight.h5")
-    flight.write_bytes(pipeline.flight.read_bytes())
-    output = tmp_path / os.fsdecode(b"selec\xfetion.h5")
-    cpfls.done("reduce", study, flight, "-o", output)
+    flight = put_file(tmp_path / os.fsdecode(b"fl\xffight.h5"), pipeline.flight.read_bytes())
+    output = cpfls.made("reduce", study, flight, at=tmp_path / os.fsdecode(b"selec\xfetion.h5"))
     assert cpfls.summary("info", output)["inputs"]["flight"]["name"] == "fl\ufffdight.h5"
     cpfls.done("report", study, output, "-o", tmp_path / os.fsdecode(b"\xfd.html"))

@@ -13,15 +13,12 @@ from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.response.flown import Responses
 from tests.builders import vehicle_models
-from tests.builders.studies import VEHICLE
+from tests.builders.shifted_flights import ALLOCATION, INERTIA
+from tests.builders.studies import VEHICLE, put_file
 
 CONFIG = """\
 import:
-  time_column: t
   torque_source: null
-  rate_hz: null
-  lowpass_hz: null
-  spike_deviations: null
   acceleration_frame: body-specific-force
   signals:
     body_rate: {columns: [p, q, r], unit: rad/s}
@@ -30,17 +27,7 @@ import:
     acceleration: {columns: [fx, fy, fz], unit: m/s^2, required: false}
     setpoint_body_rate: {columns: [ps, qs, rs], unit: rad/s, required: false}
 """
-MASS, INERTIA = 6.0, np.array([0.6, 0.6, 1.2])
-ARM, THRUST, DRAG = 0.3, 121.5e-6, 2.7e-6
-ALLOCATION = np.array(
-    [
-        [THRUST] * 4,
-        [0, -ARM * THRUST, 0, ARM * THRUST],
-        [-ARM * THRUST, 0, ARM * THRUST, 0],
-        [-DRAG, DRAG, -DRAG, DRAG],
-    ]
-)
-LAG_S = 0.04
+MASS, LAG_S = 6.0, 0.04
 
 
 def flight_table(seed, scale=1.0, samples=3000):
@@ -163,8 +150,7 @@ def test_the_answer_begins_with_what_the_flights_tell(cpfls, folder, tmp_path):
 @pytest.mark.usefixtures("sketched")
 def test_a_report_shows_bode_plots(cpfls, summary, folder, tmp_path):
     _, output, _ = summary(folder / "light.csv")
-    page = tmp_path / "page.html"
-    cpfls.done("report", folder / "study.yaml", output, "-o", page)
+    page = cpfls.made("report", folder / "study.yaml", output, at=tmp_path / "page.html")
     html = page.read_text()
     assert "How a vehicle answers its rotors" in html
     assert "Frequency responses" in html
@@ -193,16 +179,14 @@ def test_what_is_refused(refuse, folder, tmp_path):
 
 
 def test_a_vehicle_of_unknown_numbers_needs_a_model(refuse, folder, tmp_path):
-    config = tmp_path / "open.yaml"
-    config.write_text(CONFIG + VEHICLE.replace("[0.6, 0.6, 1.2]", "null"))
+    config = put_file(tmp_path / "open.yaml", CONFIG + VEHICLE.replace("[0.6, 0.6, 1.2]", "null"))
     (message,) = refuse("response", config, folder / "light.csv", "-o", tmp_path / "r.h5")
     assert "vehicle.inertia_kg_m2: not known in this config, but `cpfls response` needs" in message
 
 
 def test_an_identified_model_is_judged_with_its_inertia(cpfls, pipeline, study, tmp_path):
     words = ("response", study, pipeline.flight, "--model", pipeline.model, "-o", tmp_path / "r.h5", "--json")
-    result = cpfls.done(*words)
-    summary = json.loads(result.stdout)
+    summary = json.loads(cpfls.done(*words).stdout)
     assert summary["model"] == "model.h5"
     assert list(summary["responses"])[:3] == ["roll", "pitch", "yaw"]
     assert any("model.h5" in warning and "learned" in warning for warning in summary["warnings"])
@@ -210,8 +194,7 @@ def test_an_identified_model_is_judged_with_its_inertia(cpfls, pipeline, study, 
 
 def test_air_that_a_flight_does_not_know_is_still(cpfls, folder, tmp_path):
     """A vehicle with drag along flights without velocity."""
-    config = tmp_path / "study.yaml"
-    config.write_text(CONFIG + VEHICLE)
+    config = put_file(tmp_path / "study.yaml", CONFIG + VEHICLE)
     model = tmp_path / "vehicle.h5"
     drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
     whole = VehicleModel(vehicle=load_study(config).vehicle, effects=(drag,))
@@ -227,8 +210,7 @@ def test_repeats_of_a_path_show_the_vehicle(cpfls, folder, tmp_path):
     words = ("response", folder / "study.yaml", "-o", tmp_path / "r.h5", "--json", "--force")
     alone = json.loads(cpfls(*words, logs[0]).stdout)
     assert alone["instruments"] == "none"
-    together = cpfls.done(*words, *logs, folder / "heavy.csv")
-    summary = json.loads(together.stdout)
+    summary = json.loads(cpfls.done(*words, *logs, folder / "heavy.csv").stdout)
     assert summary["instruments"] == "repeats"
     assert any(warning.startswith("heavy.csv: no other of these flights") for warning in summary["warnings"])
     for name in ("roll", "pitch"):

@@ -22,9 +22,10 @@ from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import write_flights
 from tests.builders.shifted_flights import CONFIG, OFFSET, flight_table, save
 from tests.builders.spread_vehicles import found_record
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 from tests.builders.vehicle_models import vehicle_of, write_vehicle
+from tests.builders.vehicles import OPEN_FACTORS
 
 COLUMNS, LINES, ANSWER, WIDEST = 80, 24, 15, 100
 COARSE = ("--set", "simulation.closed_loop.integration_rate_hz=100")
@@ -96,8 +97,7 @@ def _of_torque(show):
 
 
 def _of_gaps(show, folder):
-    config = folder / "gap.yaml"
-    config.write_text(CONFIG + VEHICLE)
+    put_file(folder / "gap.yaml", CONFIG + VEHICLE)
     flights = [save(folder / f"flight_{number}.csv", flight_table(number, OFFSET)) for number in (1, 2, 3)]
     exact = save(folder / "exact.csv", flight_table(4))
     show("compare", "compare", "gap.yaml", *(each.name for each in flights), output="disagreement.h5")
@@ -145,7 +145,7 @@ def _of_open_numbers(show, folder):
     write_vehicle(folder / "own" / "wide.h5", vehicle_of(wide), resolved_yaml(study))
     data["vehicle"]["inertia_kg_m2"] = None
     for rotor in data["vehicle"]["rotors"]:
-        rotor |= {"thrust_factor_n_s2": None, "drag_factor_n_m_s2": None}
+        rotor |= OPEN_FACTORS
     config.write_text(yaml.safe_dump(data))
     show("open: trajectory", "trajectory", "open.yaml", output="open-path.h5")
     guesses, model = ("--accept-guesses",), ("--model", "own/vehicle.h5")

@@ -12,7 +12,10 @@ from cpfls_cli.flights import training
 from cpfls_cli.flights.recordings import imported
 from tests.builders.artifacts import edited
 from tests.builders.command_line import run
+from tests.builders.studies import put_file
 from tests.builders.thinned_logs import Flown, write_px4
+
+SWAPPED = {"CA_ROTOR0_PX": -0.16, "CA_ROTOR0_PY": -0.16, "CA_ROTOR1_PX": 0.16, "CA_ROTOR1_PY": 0.16}
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +37,7 @@ def stored(path, *names):
 
 
 def test_two_flights_train_one_model(cpfls, study, pipeline, second, tmp_path):
-    model = tmp_path / "model.h5"
-    cpfls.done("identify", study, pipeline.flight, second, "-o", model, "--seed", "3")
+    model = cpfls.made("identify", study, pipeline.flight, second, "--seed", "3", at=tmp_path / "model.h5")
     lengths = [len(stored(path, "time")[0]) for path in (pipeline.flight, second)]
     (indices, samples) = stored(model, "training_indices", "judged/samples")
     np.testing.assert_array_equal(indices, np.arange(sum(lengths)))
@@ -68,8 +70,7 @@ def test_a_selection_of_two_flights_counts_them_one_after_the_other(cpfls, study
 
 
 def test_a_selection_must_be_of_the_same_flights(cpfls, refuse, study, pipeline, second, tmp_path):
-    selection = tmp_path / "selection.h5"
-    cpfls.done("reduce", study, pipeline.flight, second, "-o", selection)
+    selection = cpfls.made("reduce", study, pipeline.flight, second, at=tmp_path / "selection.h5")
     output = ("-o", tmp_path / "model.h5")
     (message,) = refuse("identify", study, pipeline.flight, "--selection", selection, *output)
     assert "was made from 2 flights, and 1 is given; " in message
@@ -95,8 +96,7 @@ def test_each_file_is_hashed_once(cpfls, study, pipeline, second, tmp_path, monk
 
 
 def test_a_flight_trains_once(refuse, study, pipeline, tmp_path):
-    copy = tmp_path / "copy.h5"
-    copy.write_bytes(pipeline.flight.read_bytes())
+    copy = put_file(tmp_path / "copy.h5", pipeline.flight.read_bytes())
     (message,) = refuse("identify", study, pipeline.flight, copy, "-o", tmp_path / "model.h5")
     assert "holds the same flight as" in message
 
@@ -114,15 +114,11 @@ def test_a_flight_read_chunk_by_chunk_gives_the_same_bytes(cpfls, study, pipelin
 
 @pytest.mark.parametrize(
     ("dataset", "value", "said"),
-    [
-        ("torque", np.nan, "torque: 3 of 1647 values are not finite"),
-        ("time", 0.0, "time: does not ascend at index 7"),
-    ],
+    [("torque", np.nan, "torque: 3 of 1647 values are not finite"), ("time", 0.0, "time: does not ascend at index 7")],
 )
 def test_a_long_flight_is_checked_too(refuse, study, pipeline, tmp_path, monkeypatch, dataset, value, said):
     monkeypatch.setattr(training, "IN_MEMORY", 100)
-    broken = tmp_path / "broken.h5"
-    broken.write_bytes(pipeline.flight.read_bytes())
+    broken = put_file(tmp_path / "broken.h5", pipeline.flight.read_bytes())
     with edited(broken) as file:
         file[dataset][7] = value
     (message,) = refuse("identify", study, broken, "-o", tmp_path / "model.h5")
@@ -133,16 +129,12 @@ def test_a_long_flight_without_torque_is_refused_where_it_is_needed(
     cpfls, refuse, study, pipeline, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(training, "IN_MEMORY", 100)
-    lacking = tmp_path / "lacking.h5"
-    lacking.write_bytes(pipeline.flight.read_bytes())
+    lacking = put_file(tmp_path / "lacking.h5", pipeline.flight.read_bytes())
     with edited(lacking) as file:
         del file["torque"]
     cpfls.done("reduce", study, lacking, "-o", tmp_path / "selection.h5")
     (message,) = refuse("identify", study, lacking, "-o", tmp_path / "model.h5")
     assert "lacks torque" in message
-
-
-SWAPPED = {"CA_ROTOR0_PX": -0.16, "CA_ROTOR0_PY": -0.16, "CA_ROTOR1_PX": 0.16, "CA_ROTOR1_PY": 0.16}
 
 
 @pytest.fixture(scope="module")
@@ -185,10 +177,8 @@ def test_who_names_the_logged_columns_gets_them(log, config):
     for motor in range(4):
         own = own.replace(f'"rebuilt.rotor[{motor}]"', f'"actuator_motors.control[{motor}]"')
     assert own != text
-    named = config.with_name("logged.yaml")
-    named.write_text(own)
-    flight = commands(log, named)
-    assert flight.updated_hz["rotor_command"] == pytest.approx(10, rel=0.02)
+    named = put_file(config.with_name("logged.yaml"), own)
+    assert commands(log, named).updated_hz["rotor_command"] == pytest.approx(10, rel=0.02)
 
 
 def test_a_log_of_which_nothing_can_be_rebuilt_is_refused(flown, config, tmp_path):

@@ -45,8 +45,7 @@ def short(tmp_path_factory, cpfls):
 @pytest.fixture
 def fly(short, cpfls, tmp_path):
     def call(*options, name="flight.h5"):
-        result = cpfls.done("simulate", *short, *options, "-o", tmp_path / name)
-        return tmp_path / name, result.stdout
+        return tmp_path / name, cpfls.done("simulate", *short, *options, "-o", tmp_path / name).stdout
 
     return call
 
@@ -182,7 +181,6 @@ def test_lost_flight_is_refused_with_a_remedy(short, refuse, tmp_path):
 
 CONFIG = """\
 import:
-  time_column: t
   torque_source: null
   signals:
     attitude: {columns: [roll, pitch, yaw], unit: rad}
@@ -215,8 +213,7 @@ def flown(tmp_path):
 def test_setpoints_go_into_the_flight_and_are_said(cpfls, flown, tmp_path):
     config, log, columns = flown
     flight = tmp_path / "flight.h5"
-    result = cpfls.done("import", config, log, "-o", flight)
-    words = " ".join(result.stdout.split())
+    words = " ".join(cpfls.done("import", config, log, "-o", flight).stdout.split())
     assert "Setpoints attitude, thrust (at 160 of 300 samples)" in words
     with h5py.File(flight) as file:
         np.testing.assert_allclose(file["setpoint_attitude"][:, 1], columns["pitch_sp"], atol=1e-12)
@@ -232,8 +229,7 @@ def test_readers_of_flights_give_what_is_known_throughout(cpfls, flown, tmp_path
     config, log, columns = flown
     path = log
     if imported:
-        path = tmp_path / "flight.h5"
-        cpfls.done("import", config, log, "-o", path)
+        path = cpfls.made("import", config, log, at=tmp_path / "flight.h5")
     study = load_study(config)
     (played,) = flights_to_play([path], study)
     flight = read_flights([path], study).flights[0]

@@ -2,17 +2,26 @@
 
 import json
 import re
+import runpy
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from cpfls_cli.config.load import load_study
+from cpfls_cli.config.study import resolved_yaml
 from cpfls_cli.errors import ComputationError
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.stages import extend
 from tests.builders.gusty_flights import CALM, SMALL, Flight, gusty_flights
 from tests.builders.simulator_files import sdf_of, write_log
+from tests.builders.studies import put_file
+from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
+ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / "configs" / "simulators.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +58,7 @@ def test_init_takes_the_log_too(cpfls, folder, tmp_path):
 
 
 def test_rotors_that_turn_the_other_way_in_the_log_are_named(cpfls, folder, tmp_path):
-    mine = tmp_path / "turned.sdf"
-    mine.write_text(sdf_of(TRUE, spins=(-1, 1, -1, -1)))
+    mine = put_file(tmp_path / "turned.sdf", sdf_of(TRUE, spins=(-1, 1, -1, -1)))
     result = cpfls.done("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
     assert "rotor_3 turns clockwise in the file and counter-clockwise by the log" in result.stderr
     assert [rotor.spin for rotor in load_study(tmp_path / "study.yaml").vehicle.rotors] == [-1, 1, -1, 1]
@@ -80,8 +88,7 @@ def test_gap_writes_the_corrected_file_and_leaves_mine(cpfls, folder, tmp_path):
     assert not output.exists()
     result = cpfls.done(*words)
     assert mine.read_bytes() == before
-    said = json.loads((output / "gap.json").read_text())["corrected"]
-    (change,) = said["changes"]
+    (change,) = json.loads((output / "gap.json").read_text())["corrected"]["changes"]
     assert (change["file"], change["element"]) == ("mine.sdf", "motorConstant")
     assert change["low"] < TRUE.thrust_factor < change["high"]
     assert "mine.sdf motorConstant 2.4e-08 → " in " ".join(result.stdout.split())
@@ -106,14 +113,12 @@ def test_a_second_fit_that_is_refused_leaves_the_first(cpfls, folder, tmp_path, 
     words = ("gap", folder / "mine.sdf", folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", tmp_path / "gap")
     cpfls.done(*words)
     assert len(asked) == 2
-    model = cpfls.summary("info", tmp_path / "gap" / "extended.h5")
-    assert "parameter_error" in json.dumps(model)
+    assert "parameter_error" in json.dumps(cpfls.summary("info", tmp_path / "gap" / "extended.h5"))
 
 
 def test_the_file_itself_is_no_output(cpfls, folder, tmp_path):
     """Its own folder as the output would put the corrected file in its place."""
-    mine = tmp_path / "mine.sdf"
-    mine.write_bytes((folder / "mine.sdf").read_bytes())
+    mine = put_file(tmp_path / "mine.sdf", (folder / "mine.sdf").read_bytes())
     before = mine.read_bytes()
     words = ("gap", mine, folder / "log0.csv", "--held-out", folder / "log1.csv", "-o", tmp_path, "--force")
     result = cpfls(*words)
@@ -188,8 +193,7 @@ ROUND = """<mujoco><worldbody><body name="b"><freejoint/>
 
 def test_a_direction_that_nobody_states_is_asked_for(cpfls, refuse, folder, tmp_path):
     """The first actuator turns nothing: its spin is that of a log that is sure of it, and else asked for."""
-    mine = tmp_path / "mine.xml"
-    mine.write_text(ROUND)
+    mine = put_file(tmp_path / "mine.xml", ROUND)
     result = cpfls.done("init", "--from", mine, folder / "log0.csv", "-o", tmp_path / "study.yaml")
     assert [rotor.spin for rotor in load_study(tmp_path / "study.yaml").vehicle.rotors] == [-1, 1, -1, 1]
     # Rotors of another time say nothing of the motion.
@@ -204,3 +208,25 @@ def test_a_direction_that_nobody_states_is_asked_for(cpfls, refuse, folder, tmp_
     (message,) = refuse("gap", mine, tmp_path / "mixed.csv", "-o", tmp_path / "gap")
     assert "does not state all that a gap needs; `cpfls init --from" in message
     assert "write spin of M1 in place of ASK" in message
+
+
+def test_a_flight_in_mujoco_comes_back(cpfls, tmp_path):
+    pytest.importorskip("mujoco", reason="needs the package mujoco, of the extra simulators")
+    study = load_study(CONFIG)
+    offset = ModelEffect("com_offset", {}, np.array([0.01, -0.006]))
+    vehicle = vehicle_of(VehicleModel(vehicle=study.vehicle, effects=(offset,)))
+    model, uav, log, flight = (tmp_path / name for name in ("model.h5", "uav.xml", "log.h5", "flight.h5"))
+    write_vehicle(model, vehicle, resolved_yaml(study))
+    cpfls.done("export", model, "-o", uav)
+    script = runpy.run_path(str(ROOT / "examples" / "fly_mujoco.py"))
+    script["main"].__globals__.update(BEGIN_S=2.0, END_S=4.0)
+    script["main"](str(uav), str(CONFIG), str(log))
+    with h5py.File(log) as file:
+        assert len(file["time"]) == 200
+        assert np.abs(file["x"][:]).max() < 5.0
+    cpfls.done("import", CONFIG, log, "-o", flight)
+    sums = {
+        name: each["body_rate"]["sum"]
+        for name, each in cpfls.summary("replay", CONFIG, model, flight, "-o", tmp_path / "replay.h5")["models"].items()
+    }
+    assert sums["model"] < 0.1 * sums["stated"]

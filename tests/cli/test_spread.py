@@ -16,15 +16,12 @@ COUNT = 20
 
 @pytest.fixture
 def vehicle(tmp_path):
-    path = tmp_path / "vehicle.h5"
-    write_vehicle(path, found_record())
-    return path
+    return write_vehicle(tmp_path / "vehicle.h5", found_record())
 
 
 def written(cpfls, vehicle, ending, *words):
     output = vehicle.with_name(f"spread.{ending}")
-    result = cpfls.done("spread", vehicle, "-n", str(COUNT), "-o", output, "--force", *words)
-    return result, output
+    return cpfls.done("spread", vehicle, "-n", str(COUNT), "-o", output, "--force", *words), output
 
 
 def test_all_forms_hold_the_same(cpfls, vehicle):
@@ -104,8 +101,7 @@ def test_what_the_model_lacks_is_in_the_file_with_the_parameters_of_its_parts(cp
 
 
 def test_guesses_are_held_and_named(cpfls, tmp_path):
-    path = tmp_path / "vehicle.h5"
-    write_vehicle(path, found_record(guessed=("drag_factor",), disturbance=None, gusts=False))
+    path = write_vehicle(tmp_path / "vehicle.h5", found_record(guessed=("drag_factor",), disturbance=None, gusts=False))
     result, output = written(cpfls, path, "json")
     assert "Not drawn, because it is a guess and no flight identifies it: drag factor." in result.stderr
     assert (

@@ -19,7 +19,7 @@ from cpfls_cli.report.content import Box, Text
 from cpfls_cli.result import about, part, result
 from cpfls_cli.stage import Filled, Run, stage, unique_names
 from cpfls_cli.store import read, stage_of
-from tests.builders.studies import TINY, VEHICLE
+from tests.builders.studies import TINY, VEHICLE, put_file
 from tests.builders.unknown_logs import flat_log, flight, write_csv
 
 STAGE = '''\
@@ -229,8 +229,7 @@ def test_names_of_files_that_are_no_text_are_written_and_linked(tmp_path):
 
 @pytest.mark.usefixtures("at_home")
 def test_one_result_is_the_answer_and_without_output_nothing_is_written(tmp_path):
-    outcome = several.run(run_to(), names=["a"])
-    assert outcome.summary == {"name": "a", "system": ""}
+    assert several.run(run_to(), names=["a"]).summary == {"name": "a", "system": ""}
     several.run(run_to(tmp_path / "out"), names=["a"])
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.h5", "a.html"]
 
@@ -260,8 +259,7 @@ def looked(cpfls, tmp_path, monkeypatch):
 def test_info_check_and_report_know_results(cpfls, looked):
     answer = cpfls.summary("info", looked)
     assert (answer["format"], answer["result"]["name"]) == ("cpfls/look", "log.csv")
-    said = cpfls("info", looked, "-v").stdout
-    assert "log.csv (sha256 " in said
+    assert "log.csv (sha256 " in cpfls("info", looked, "-v").stdout
     assert cpfls("check", looked).stdout.startswith(f"{looked}: good (cpfls/look)\n")
     for name in ("r.html", "r.md", "r.json"):
         cpfls.done("report", "study.yaml", looked, "-o", name)
@@ -333,12 +331,8 @@ def filled(tmp_path, monkeypatch):
         "# ALL GOOD: of {{ r.first.name }} {good}\n\nAnd more.\n\n- one\n"
     )
     monkeypatch.setattr(sys.modules[__name__], "__file__", str(tmp_path / "stages" / "look.py"))
-    monkeypatch.setattr(
-        "cpfls_cli.stages.report.page_about",
-        lambda _, paths: " ".join(path.name for path in paths),
-    )
-    log = tmp_path / "log.csv"
-    log.write_text("1")
+    monkeypatch.setattr("cpfls_cli.stages.report.page_about", lambda _, paths: " ".join(path.name for path in paths))
+    log = put_file(tmp_path / "log.csv", "1")
 
     def fill(output=tmp_path / "out", log=log, **given):
         run = Run(validate({}, "default"), output, False, False, lambda *_: None, lambda _: None)
@@ -357,8 +351,7 @@ def test_each_part_has_a_file_that_names_the_one_before(filled, tmp_path):
     assert list(read(out / "first.h5", Thing)[1].inputs) == ["log"]
     assert (out / "report.html").read_text() == "first.h5 second.h5"
     assert (out / "names.txt").read_text() == "a"
-    answer = json.loads((out / "look.json").read_text())
-    assert outcome.summary == {**answer, "new": 1}
+    assert outcome.summary == {**json.loads((out / "look.json").read_text()), "new": 1}
     assert outcome.blocks == (
         Box("ALL GOOD", "of a", ("And more.", "- one"), "good"),
         Text(f"{out / 'report.html'}: all of it, with figures; one is new"),

@@ -19,7 +19,9 @@ from cpfls_cli.page import said
 from cpfls_cli.report.content import Folded, Outcome, Text
 from cpfls_cli.report.terminal import terminal_lines
 from tests.builders.forked import Forked
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
+
+COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "report")
 
 
 @pytest.fixture
@@ -134,8 +136,7 @@ def test_an_answer_says_what_shows_more_of_it_without_computing_it_again(answer,
     *_, more, last = answer(Outcome({}, blocks, written=pipeline.model))[0]
     assert (more, last) == ("more with -v: why", f"or with cpfls info {pipeline.model} -v")
     # What is no file of results does not hold what was answered.
-    page = tmp_path / "page.html"
-    page.write_text("<!DOCTYPE html>")
+    page = put_file(tmp_path / "page.html", "<!DOCTYPE html>")
     assert answer(Outcome({}, blocks, written=page))[0][-1] == "more with -v: why"
     assert answer(Outcome({}, (Text("all"),), written=pipeline.model))[0] == ["all"]
 
@@ -271,8 +272,7 @@ SIGNALS = "{body_rate: {columns: [p, q, r], unit: rad/s}, body_torque: {columns:
 @pytest.fixture
 def words(pipeline, tmp_path):
     """Arguments of each stage command, inputs first."""
-    log = tmp_path / "log.csv"
-    log.write_text(LOG)
+    log = put_file(tmp_path / "log.csv", LOG)
     return {
         "trajectory": ([], []),
         "simulate": ([pipeline.trajectory], []),
@@ -281,9 +281,6 @@ def words(pipeline, tmp_path):
         "identify": ([pipeline.flight], []),
         "report": ([pipeline.trajectory, pipeline.selection], []),
     }
-
-
-COMMANDS = ("trajectory", "simulate", "import", "reduce", "identify", "report")
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -360,8 +357,7 @@ def test_held_out_part_and_other_flights_are_judged_by_name(cpfls, pipeline, stu
     cpfls("trajectory", study, "-o", path, "--set", "trajectory.sample_time_s=0.2")
     cpfls("simulate", study, path, "-o", other)
     words = ("identify", study, pipeline.flight, "--validate", other, "-o", tmp_path / "m.h5", "--json")
-    result = cpfls(*words, "--set", "identification.training_share=0.6")
-    held_out = json.loads(result.stdout)["held_out"]
+    held_out = json.loads(cpfls(*words, "--set", "identification.training_share=0.6").stdout)["held_out"]
     assert set(held_out) == {"held-out rest", "other.h5"}
     assert held_out["other.h5"]["samples"] == 275
     assert {"mse", "relative_error", "baselines"} <= set(held_out["held-out rest"])

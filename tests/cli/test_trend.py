@@ -18,9 +18,7 @@ from cpfls_cli.workers.workforce import Serial
 from tests.builders.studies import VEHICLE
 
 CONFIG = """
-seed: 1
 import:
-  time_column: t
   signals:
     acceleration: {columns: [fx, fy, fz], unit: m/s^2}
     rotor_command: {columns: [c1, c2, c3, c4], unit: rad/s}

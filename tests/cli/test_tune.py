@@ -73,8 +73,7 @@ def test_the_file_of_a_ground_station_holds_what_the_artifact_proposes(name, gai
     ranges = {each.name: each for each in AUTOPILOTS[name].parameters}
     assert all(ranges[each].low <= row.proposed <= ranges[each].high for each, row in rows.items())
     # A comment says of each what it is, and what the documentation allows.
-    text = (folder / f"{name}{ENDINGS[name]}").read_text()
-    assert text.count("documented range") == len(rows)
+    assert (folder / f"{name}{ENDINGS[name]}").read_text().count("documented range") == len(rows)
 
 
 def test_gains_are_those_of_the_least_favourable_vehicle(gains, folder):
@@ -119,8 +118,7 @@ def test_a_vehicle_that_flights_do_not_tell_is_refused_with_the_flight_that_is_m
         ("playback", vehicle, "not judged", "one that is kept aside"),
         ("wide", replace(found_vehicle(), numbers=wide), "not identified: ", "cpfls trajectory"),
     ):
-        path = tmp_path / f"{name}.h5"
-        write_vehicle(path, own, STUDY)
+        path = write_vehicle(tmp_path / f"{name}.h5", own, STUDY)
         message = refuse("tune", folder / "study.yaml", path, "--autopilot", "px4", "-o", tmp_path / "g.h5")
         assert words in " ".join(message)
         assert f"The flight that is missing: {missing}" in " ".join(message)
@@ -264,9 +262,7 @@ def looked(monkeypatch, folder):
         monkeypatch.setattr("cpfls_cli.stages.tune.read_flight", lambda *_: own)
         monkeypatch.setattr("cpfls_cli.stages.tune.effectiveness", lambda _: plants)
         monkeypatch.setattr("cpfls_cli.stages.tune.vibration_of", lambda _: SimpleNamespace(changes=changes))
-        log = folder / "log.csv"
-        save(log, np.zeros((9, 2)), "t,p")
-        return log
+        return save(folder / "log.csv", np.zeros((9, 2)), "t,p")
 
     return of
 

@@ -1,6 +1,7 @@
 """`cpfls simulate` along a flight: its own setpoints, an autopilot's law, and where simulator and flight part."""
 
 import json
+from dataclasses import asdict
 
 import h5py
 import numpy as np
@@ -18,20 +19,6 @@ from tests.builders.spread_vehicles import found_record
 from tests.builders.twins import LOOP, PERIOD, flown
 from tests.builders.vehicle_models import write_vehicle
 
-STATED = {
-    "mass_kg": CROSS.mass_kg,
-    "inertia_kg_m2": list(CROSS.inertia_kg_m2),
-    "rotor_speed_max_rad_s": CROSS.rotor_speed_max_rad_s,
-    "rotors": [
-        {
-            "position_m": list(rotor.position_m),
-            "spin": rotor.spin,
-            "thrust_factor_n_s2": rotor.thrust_factor_n_s2,
-            "drag_factor_n_m_s2": rotor.drag_factor_n_m_s2,
-        }
-        for rotor in CROSS.rotors
-    ],
-}
 FIELDS = {"attitude": 3, "body_rate": 3, "rotor_speed": 4, "setpoint_attitude": 3, "setpoint_thrust": 1}
 UNITS = {"attitude": "rad", "body_rate": "rad/s", "rotor_speed": "rad/s", "setpoint_attitude": "rad"}
 GAINS = {"MC_ROLLRATE_P": 0.15, "MC_PITCHRATE_P": 0.15, "UNRELATED": 7.0}
@@ -54,7 +41,7 @@ def logged(tmp_path_factory):
     }
     loop = {"rotor_time_constant_s": LOOP.rotor_time_constant_s, "integration_rate_hz": LOOP.integration_rate_hz}
     study = {
-        "vehicle": STATED,
+        "vehicle": asdict(CROSS),
         "simulation": {"closed_loop": loop},
         "import": {"time_column": None, "torque_source": None, "signals": signals},
     }
@@ -101,8 +88,7 @@ def test_other_gains_part_and_the_answer_says_where(cpfls, logged):
 
 
 def test_an_imported_flight_is_flown_with_the_gains_of_its_log_and_by_another_law_with_usual_ones(cpfls, logged):
-    flight = logged / "flight.h5"
-    cpfls.done("import", logged / "study.yaml", logged / "log.ulg", "-o", flight)
+    flight = cpfls.made("import", logged / "study.yaml", logged / "log.ulg", at=logged / "flight.h5")
     words = ("simulate", logged / "study.yaml", flight, "--json", "--force", "-o", logged / "usual.h5")
     said = json.loads(cpfls(*words, "--autopilot", "px4").stdout)
     assert said["gains"]["source"] == "log"
@@ -133,8 +119,7 @@ def test_in_gusts_of_a_model_the_answer_says_what_they_explain(cpfls, logged, mo
     def flown(name, *options):
         words = ("simulate", logged / "study.yaml", logged / "log.ulg", "--autopilot", "px4", "-o", logged / name)
         short = ("--set", "import.crop_s=[0.0, 2.0]")
-        result = cpfls.done(*words, "--model", logged / "vehicle.h5", *short, *options)
-        return result.stdout
+        return cpfls.done(*words, "--model", logged / "vehicle.h5", *short, *options).stdout
 
     calm = flown("calm.h5")
     assert "--gusts plays them" in calm
@@ -181,7 +166,7 @@ def test_the_gains_of_a_blackbox_are_read_out_of_its_lines(tmp_path):
 def test_a_flight_that_was_simulated_knows_its_autopilot(cpfls, tmp_path):
     loop = {"integration_rate_hz": 400.0, "rotor_time_constant_s": 0.03, "autopilot_parameters": {}}
     study = {
-        "vehicle": STATED,
+        "vehicle": asdict(CROSS),
         "trajectory": {"sample_time_s": 0.01},
         "simulation": {"mode": "closed-loop", "closed_loop": loop, "noise": {"body_rate": 0.01}},
     }

@@ -10,7 +10,7 @@ import pytest
 
 from cpfls_cli.rotations import rotation_matrix
 from tests.builders import ulogs
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 from tests.builders.ulogs import data, definitions, header, message
 
 EXAMPLE = Path(__file__).parents[2] / "configs" / "px4.yaml"
@@ -64,17 +64,13 @@ def ulog(sent=None, fields=FIELDS):
 
 @pytest.fixture
 def config(tmp_path):
-    path = tmp_path / "study.yaml"
-    path.write_text(CONFIG + VEHICLE)
-    return path
+    return put_file(tmp_path / "study.yaml", CONFIG + VEHICLE)
 
 
 @pytest.fixture
 def write(tmp_path):
     def call(content):
-        path = tmp_path / "log.ulg"
-        path.write_bytes(content)
-        return path
+        return put_file(tmp_path / "log.ulg", content)
 
     return call
 
@@ -119,8 +115,7 @@ def test_dropouts_of_the_logger_are_warned_of(flown):
     begin, end = (b"".join(data(*row) for row in part) for part in (sent[:cut], sent[cut:]))
     dropouts = message("O", struct.pack("<H", 40)) + message("O", struct.pack("<H", 120))
     _, _, stderr = flown(header() + definitions(FIELDS) + begin + dropouts + end)
-    words = " ".join(stderr.split())
-    assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 1.000 s" in words
+    assert "2 dropouts of the logger, 0.16 s in all, the longest 0.12 s at 1.000 s" in " ".join(stderr.split())
 
 
 def test_an_end_that_is_cut_off_is_read_up_to_it(flown):
@@ -163,11 +158,7 @@ def test_a_topic_that_is_not_there_is_named_with_those_that_are(refuse, config, 
 
 def test_the_example_gives_torques_in_the_directions_of_px4(cpfls, write, tmp_path):
     """Roll to the right takes the left motors, nose up the front ones, nose to the right the counter-clockwise ones."""
-    fields = {
-        ATTITUDE: FIELDS[ATTITUDE],
-        RATE: FIELDS[RATE],
-        "actuator_motors": "uint64_t timestamp;float[12] control",
-    }
+    fields = {ATTITUDE: FIELDS[ATTITUDE], RATE: FIELDS[RATE], "actuator_motors": "uint64_t timestamp;float[12] control"}
     push = {"roll": (-1, 1, 1, -1), "pitch": (1, -1, 1, -1), "yaw": (1, 1, -1, -1)}
     moves = [0.6 + 0.1 * np.array(motors) for motors in push.values()]
     sent = [row for row in rows() if row[1] != 2]

@@ -17,6 +17,7 @@ from tests.builders.artifacts import edited
 from tests.builders.vehicle_search import CONFIG, TRIED, left_out
 
 DAMPING = 0.012
+RESUME = "the same command with --resume goes on"
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +107,7 @@ def test_people_read_verdict_and_numbers(cpfls, config, flights, found, tmp_path
 
 def test_without_a_held_out_flight_it_is_not_judged(cpfls, config, flights, tmp_path):
     words = ("--set", f"playback.leave_out={json.dumps(left_out(TRIED[:2]))}", "--json")
-    result = cpfls.done("vehicle", config, flights[0], "-o", tmp_path / "v.h5", *words)
-    summary = json.loads(result.stdout)
+    summary = json.loads(cpfls.done("vehicle", config, flights[0], "-o", tmp_path / "v.h5", *words).stdout)
     assert (summary["verdict"], summary["held_out"]) == ("not-judged", None)
 
 
@@ -128,8 +128,7 @@ def test_other_commands_take_it(cpfls, config, flights, found, tmp_path):
     alone = ("--model", found.output, "--set", "simulation.closed_loop.effects={}")
     cpfls.done("simulate", config, flights[1].parent / "path-2.h5", *alone, "-o", tmp_path / "f.h5")
     cpfls.done("export", found.output, "-o", tmp_path / "vehicle.json")
-    page = cpfls("report", config, found.output, "-o", tmp_path / "page.html", "--json")
-    summary = json.loads(page.stdout)
+    summary = json.loads(cpfls("report", config, found.output, "-o", tmp_path / "page.html", "--json").stdout)
     assert summary["sections"] == ["summary", "vehicle", "stated-vehicle", "provenance"]
     text = (tmp_path / "page.html").read_text()
     assert "A vehicle found in flights" in text
@@ -193,9 +192,6 @@ def interrupt_at(monkeypatch):
 
 def names(folder):
     return sorted(path.name for path in folder.iterdir())
-
-
-RESUME = "the same command with --resume goes on"
 
 
 def test_an_interrupt_keeps_what_was_found(cpfls, config, flights, tmp_path, interrupt_at):
@@ -367,8 +363,7 @@ def test_a_log_of_stated_torque_is_refused(refused, tmp_path):
         "body_torque": {"columns": ["mx", "my", "mz"], "unit": "N m"},
     }
     options = ("--set", f"import.signals={json.dumps(signals)}", "--set", "import.torque_source=column")
-    message = refused(log, options=options)
-    assert message.startswith("stated.csv: holds torque instead of rotor speeds")
+    assert refused(log, options=options).startswith("stated.csv: holds torque instead of rotor speeds")
 
 
 def test_the_copy_of_the_config_has_what_the_command_line_changes(cpfls, config, flights, tmp_path):
@@ -387,8 +382,7 @@ def test_the_copy_of_the_config_is_no_other_output(refused, flights, tmp_path, n
 
 @pytest.mark.parametrize(("name", "also"), [("flight-1.h5", ""), ("copy.h5", " (as flight-1.h5)")])
 def test_a_flight_that_is_learned_from_is_not_held_out(refused, flights, tmp_path, name, also):
-    same = shutil.copy(flights[0], tmp_path / name)
-    line = refused(flights[0], options=("--held-out", same))
+    line = refused(flights[0], options=("--held-out", shutil.copy(flights[0], tmp_path / name)))
     said = f"{name}: is both learned from{also} and held out, so nothing would be judged; leave it out of one of them"
     assert line == f"{said}, or hold out another flight"
 

@@ -38,16 +38,8 @@ def logged(cpfls, tmp_path_factory):
     signals = {name: {"columns": columns, "unit": unit} for name, (columns, unit) in SIGNALS.items()} | {
         "setpoint_attitude": {"columns": NAMES[:3], "unit": "rad"}
     }
-    section = {
-        "import": {
-            "time_column": "stamp",
-            "time_unit": "us",
-            "crop_s": [1.0, 3.0],
-            "torque_source": None,
-            "signals": signals,
-        }
-    }
-    (folder / "study.yaml").write_text(VEHICLE + yaml.safe_dump(section))
+    read = {"time_column": "stamp", "time_unit": "us", "crop_s": [1.0, 3.0], "torque_source": None, "signals": signals}
+    (folder / "study.yaml").write_text(VEHICLE + yaml.safe_dump({"import": read}))
     for words in (
         ("import", "study.yaml", "log.csv", "-o", "flight.h5"),
         ("replay", "study.yaml", "vehicle", "flight.h5", "log.csv", "-o", "replay.h5", "--every", "9"),
@@ -57,8 +49,7 @@ def logged(cpfls, tmp_path_factory):
 
 
 def exported(cpfls, artifact, output, *options):
-    result = cpfls.done("export", artifact, "-o", output, "--force", *options)
-    return result.stdout
+    return cpfls.done("export", artifact, "-o", output, "--force", *options).stdout
 
 
 def columns_of(path):
@@ -107,11 +98,7 @@ def test_mcap_is_read_back_at_the_stamps_of_the_log(cpfls, logged, tmp_path):
     assert np.abs(stamps - 1000 * TIME_US[own]).max() < 1000
     read = [said["y"]["measured"] for _, said in found["/body_rate"]]
     np.testing.assert_allclose(read, RATE[own, 1], atol=1e-8)
-    assert about["/body_rate"][1] == {
-        "unit": "rad/s",
-        "frame": "body (FLU)",
-        "description": "body rates p, q, r",
-    }
+    assert about["/body_rate"][1] == {"unit": "rad/s", "frame": "body (FLU)", "description": "body rates p, q, r"}
     assert about["/pose"][0] == "foxglove.PoseInFrame"
     assert about["/tf/body"][0] == "foxglove.FrameTransform"
     stamp, pose = found["/pose"][7]

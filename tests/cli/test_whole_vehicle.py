@@ -24,6 +24,7 @@ from tests.builders.artifacts import edited
 from tests.builders.exported_vehicles import on_numpy
 from tests.builders.playback_flights import STATED, truth
 from tests.builders.vehicle_models import remainder, vehicle_of, write_vehicle
+from tests.builders.vehicles import OPEN_FACTORS
 
 CONFIG = f"""\
 seed: 1
@@ -113,8 +114,7 @@ def sums(cpfls, config, folder):
 
     def call(model, flown, *options):
         words = ("replay", config, model, flown, "-o", folder / "r.h5", *BRIEF, "--force", "--json", *options)
-        result = cpfls.done(*words)
-        models = json.loads(result.stdout)["models"]
+        models = json.loads(cpfls.done(*words).stdout)["models"]
         return {name: np.array([models[name][signal]["sum"] for signal in SIGNALS]) for name in models}
 
     return call
@@ -167,8 +167,7 @@ def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
 
 def test_people_read_what_was_flown(cpfls, config, path, vehicle, tmp_path):
     top = ("--mode", "closed-loop", "--effect", "torque_bias.M_z=0.01")
-    words = ("simulate", config, path, "--model", vehicle, *top, "-o", tmp_path / "f.h5")
-    result = cpfls.done(*words)
+    result = cpfls.done("simulate", config, path, "--model", vehicle, *top, "-o", tmp_path / "f.h5")
     assert "effects, those of the model among them: linear_damping.d_x = " in result.stdout
     assert "torque_bias.M_x = 0, torque_bias.M_y = 0, torque_bias.M_z = 0.01" in result.stdout
     assert "with vehicle.h5" in result.stdout
@@ -231,8 +230,7 @@ def without(flown, target, *names):
 )
 def test_a_flight_that_lacks_what_the_model_needs_is_refused(refuse, config, vehicle, flight, tmp_path, names, lacks):
     flown = without(flight, tmp_path / "x.h5", *names)
-    (line,) = refuse("compare", config, flown, "--model", vehicle, "-o", tmp_path / "out.h5")
-    assert line == lacks
+    assert refuse("compare", config, flown, "--model", vehicle, "-o", tmp_path / "out.h5") == [lacks]
     with pytest.raises(InputError, match=lacks):
         cpfls_cli.load_model(vehicle).predict(flown)
 
@@ -296,7 +294,7 @@ def open_config(tmp_path, written_log):
     """Leave inertia and the factors of the rotors open; give the config and a log."""
     log, settings = written_log()
     settings["torque_source"] = None
-    rotors = [{**asdict(rotor), "thrust_factor_n_s2": None, "drag_factor_n_m_s2": None} for rotor in STATED.rotors]
+    rotors = [asdict(rotor) | OPEN_FACTORS for rotor in STATED.rotors]
     stated = {**asdict(STATED), "inertia_kg_m2": None, "rotors": rotors}
     (tmp_path / "open.yaml").write_text(json.dumps({"seed": 1, "vehicle": stated, "import": settings}))
     return tmp_path / "open.yaml", log
@@ -304,8 +302,7 @@ def open_config(tmp_path, written_log):
 
 def test_a_config_may_leave_open_what_the_model_knows(cpfls, config, path, open_config, tmp_path):
     left_open, log = open_config
-    vehicle = tmp_path / "vehicle.h5"
-    write_vehicle(vehicle, vehicle_of(WHOLE), resolved_yaml(load_study(left_open)))
+    vehicle = write_vehicle(tmp_path / "vehicle.h5", vehicle_of(WHOLE), resolved_yaml(load_study(left_open)))
     cpfls.done("import", left_open, log, "-o", tmp_path / "f.h5")
     with warnings.catch_warnings(action="ignore"):
         assert cpfls_cli.load_model(vehicle, left_open).predict(tmp_path / "f.h5").score.r2_body.min() > 0.999

@@ -14,8 +14,7 @@ CONFIG = Path(__file__).parents[2] / "configs" / "crazyflie.yaml"
 
 
 def summary_of(*words):
-    result = run.done(*words)
-    return json.loads(result.stdout)
+    return json.loads(run.done(*words).stdout)
 
 
 @pytest.fixture(scope="module")

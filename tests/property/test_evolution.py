@@ -9,6 +9,8 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from cpfls_cli.evolution.archive import pareto_front, rank
 from cpfls_cli.evolution.engine import gray_decode, gray_encode, linear_ranking_fitness, stochastic_universal_sampling
 
+RANKS = arrays(np.int64, st.integers(2, 40), elements=st.integers(-5, 5))
+
 
 @given(st.data(), st.integers(1, 20))
 def test_decoding_undoes_encoding(data, bits_per_gene):
@@ -23,9 +25,6 @@ def test_decoding_undoes_encoding(data, bits_per_gene):
 def test_encoding_undoes_decoding(data, bits_per_gene):
     bits = data.draw(arrays(np.bool_, (3, 2 * bits_per_gene)))
     np.testing.assert_array_equal(gray_encode(gray_decode(bits, bits_per_gene), bits_per_gene), bits)
-
-
-RANKS = arrays(np.int64, st.integers(2, 40), elements=st.integers(-5, 5))
 
 
 @given(RANKS, st.floats(1, 2))
@@ -96,32 +95,6 @@ BRUTE = {
 @given(objectives=OBJECTIVES)
 def test_ranks_are_those_of_the_definition(method, objectives):
     assert rank(objectives, method).tolist() == BRUTE[method](costs_of(objectives))
-
-
-@pytest.mark.parametrize("method", BRUTE)
-@given(objectives=OBJECTIVES)
-def test_the_dominating_individual_ranks_first(method, objectives):
-    costs, ranks = costs_of(objectives), rank(objectives, method)
-    for i, one in enumerate(costs):
-        for j, other in enumerate(costs):
-            if dominates(one, other):
-                assert ranks[i] < ranks[j]
-
-
-@pytest.mark.parametrize("method", BRUTE)
-@given(objectives=OBJECTIVES, data=st.data())
-def test_ranks_follow_the_individuals_when_they_are_reordered(method, objectives, data):
-    order = np.array(data.draw(st.permutations(range(len(objectives)))))
-    np.testing.assert_array_equal(rank(objectives[order], method), rank(objectives, method)[order])
-
-
-@given(OBJECTIVES)
-def test_dominance_behind_the_count_is_transitive(objectives):
-    costs, ranks = costs_of(objectives), rank(objectives, "pareto-count")
-    for i, one in enumerate(costs):
-        above = [j for j, other in enumerate(costs) if dominates(other, one)]
-        # All who dominate a dominator dominate too, so the count exceeds that of each dominator.
-        assert all(ranks[i] >= ranks[j] + 1 for j in above)
 
 
 @given(OBJECTIVES)

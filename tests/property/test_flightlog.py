@@ -14,6 +14,7 @@ from cpfls_cli.rotations import rotation_matrix
 ANGLE = st.floats(-3.1, 3.1)
 ATTITUDE = st.tuples(ANGLE, st.floats(-1.5, 1.5), ANGLE).map(lambda angles: np.array([angles]))
 VECTOR = st.tuples(*[st.floats(-10, 10)] * 3).map(lambda entries: np.array([entries]))
+STAMPS = hnp.arrays(float, st.integers(2, 40), elements=st.one_of(st.integers(0, 20).map(float), st.just(np.nan)))
 
 
 @pytest.mark.parametrize("body", ["FLU", "FRD"])
@@ -39,9 +40,6 @@ def test_a_quaternion_of_any_length_and_sign_gives_its_attitude(attitude, length
     quaternion = sign * length * Rotation.from_euler("ZYX", attitude[:, ::-1]).as_quat()
     for order, entries in (("xyzw", quaternion), ("wxyz", quaternion[:, [3, 0, 1, 2]])):
         np.testing.assert_allclose(attitude_from_quaternion(entries, order), attitude, atol=1e-6)
-
-
-STAMPS = hnp.arrays(float, st.integers(2, 40), elements=st.one_of(st.integers(0, 20).map(float), st.just(np.nan)))
 
 
 @given(STAMPS)

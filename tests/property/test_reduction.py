@@ -12,6 +12,10 @@ from tests.builders.reductions import reduce
 seeds = st.integers(0, 2**32 - 1)
 columns = st.integers(1, 7)
 scales = st.floats(1e-3, 1e3)
+criteria = st.sampled_from(["KD-exchange", "K-exchange", "sigma_min", "A", "D", "paper-literal"])
+column_counts = st.integers(1, 6)
+powers = st.sampled_from([1.0, 2.0, 4.0, 16.0])
+weights = st.sampled_from([0.0, 2.0])
 
 
 def updates(seed, columns, scale, samples=6):
@@ -56,9 +60,6 @@ def test_fewer_eigenvectors_never_exclude_a_sample(seed, columns, scale, data):
     assert np.all(partial[exact[:, 0] > level + 1e-12 * exact.max()])
 
 
-criteria = st.sampled_from(["KD-exchange", "K-exchange", "sigma_min", "A", "D", "paper-literal"])
-
-
 def regressor(seed):
     rng = np.random.default_rng(seed)
     return rng.standard_normal((20, 3, 5)) * rng.uniform(0.2, 2.0, (20, 1, 1))
@@ -90,11 +91,6 @@ def test_order_of_samples_does_not_matter(seed, criterion):
     chosen = reduce(Q, ReductionSettings(criterion=criterion, size=12)).indices
     shuffled = reduce(Q[order], ReductionSettings(criterion=criterion, size=12)).indices
     assert order[shuffled].tolist() == chosen.tolist()
-
-
-column_counts = st.integers(1, 6)
-powers = st.sampled_from([1.0, 2.0, 4.0, 16.0])
-weights = st.sampled_from([0.0, 2.0])
 
 
 def gram(seed, column_counts):

@@ -26,6 +26,12 @@ profiles = st.builds(
     period=st.floats(0.2, 3.0),
     holds=st.builds(Holds, snap=hold, jerk=hold, acceleration=hold, velocity=hold),
 )
+INERTIA = (0.6, 0.7, 1.2, 0.02, -0.01, 0.03)
+TORQUE = (5.0, 5.0, 3.0)
+_TURN = 2 * Decimal("3.14159265358979323846264338327950288419716939937510582097494459230781640629")
+# Sine and cosine after a quarter, a half, three quarters and the whole of a wave.
+_QUARTERS = {"0.25": (1, 0), "0.5": (0, -1), "0.75": (-1, 0), "1": (0, 1)}
+CASES = 50_000
 
 
 def pulse_sequence(profile):
@@ -46,10 +52,6 @@ def test_peaks_bound_the_samples_and_are_reached(profile):
     np.testing.assert_allclose(reached, astuple(profile.peaks), rtol=1e-9)
     everywhere = np.abs(profile.sample(np.linspace(0, profile.duration, 2000))).max(axis=0)
     assert (everywhere <= np.array(astuple(profile.peaks)) * (1 + 1e-9)).all()
-
-
-INERTIA = (0.6, 0.7, 1.2, 0.02, -0.01, 0.03)
-TORQUE = (5.0, 5.0, 3.0)
 
 
 @settings(max_examples=25, deadline=None)
@@ -90,11 +92,6 @@ def test_torque_shares_are_those_of_newton_and_euler(seed):
     expected = newton_euler_torque(*motions, inertia)
     shares = RotationLimits(chosen, INERTIA).loads(motion)[:, 12:]
     np.testing.assert_allclose(rotations.generalised_torque(motion.attitude, shares * TORQUE), expected, atol=1e-12)
-
-
-_TURN = 2 * Decimal("3.14159265358979323846264338327950288419716939937510582097494459230781640629")
-# Sine and cosine after a quarter, a half, three quarters and the whole of a wave.
-_QUARTERS = {"0.25": (1, 0), "0.5": (0, -1), "0.75": (-1, 0), "1": (0, 1)}
 
 
 def integrated(profile: BaseProfile) -> tuple[Array, Array]:
@@ -179,9 +176,6 @@ def test_samples_are_the_integral_of_the_pop():
         assert (np.abs(move.profile.sample(times[inside]) - states[inside]) <= tolerance).all()
         assert abs(states[-1, 0] - move.profile.displacement) <= 1e-12 * peaks[0]
         assert (np.abs(states[-1, 1:]) <= 1e-12 * peaks[1:]).all()
-
-
-CASES = 50_000
 
 
 class Batch:

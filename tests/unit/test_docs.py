@@ -12,6 +12,8 @@ from cpfls_cli.config.load import parse_config, validate
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+DEFAULT = parse_config(commented_default(), "the default config")
+EXAMPLES = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "import.md").read_text(encoding="utf-8"), re.DOTALL)
 
 
 def anchors(page):
@@ -86,9 +88,6 @@ def test_commands_and_their_options_exist(page):
         assert set(options) <= OPTIONS[name], f"{page.name}: cpfls {name} {set(options) - OPTIONS[name]}"
 
 
-DEFAULT = parse_config(commented_default(), "the default config")
-
-
 def is_key(name):
     """Whether a config has a key; what stands below one that is empty by default is free."""
     node = DEFAULT
@@ -105,9 +104,6 @@ def is_key(name):
 def test_keys_that_are_set_exist(page):
     keys = re.findall(r"--set\s+[\"']?([\w.]+)=", page.read_text(encoding="utf-8"))
     assert [key for key in keys if key not in ("section.key", "KEY") and not is_key(key)] == []
-
-
-EXAMPLES = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "import.md").read_text(encoding="utf-8"), re.DOTALL)
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=range(len(EXAMPLES)))

@@ -17,6 +17,7 @@ PACKAGE = Path(cpfls_cli.__file__).parent
 TESTS = Path(__file__).parents[1]
 MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST, LONGEST_CLASS = 60, 250
+PATHS = {path for stage in formats() for path, _ in datasets(stage.kind) if "/" in path and "*" not in path}
 
 
 def functions(path):
@@ -105,9 +106,6 @@ def test_docstrings_do_not_repeat_signatures():
 def test_package_files_only_re_export(path):
     allowed = (ast.Expr, ast.Import, ast.ImportFrom, ast.Assign)
     assert all(isinstance(node, allowed) for node in syntax(path).body)
-
-
-PATHS = {path for stage in formats() for path, _ in datasets(stage.kind) if "/" in path and "*" not in path}
 
 
 def looked_up(node):

@@ -20,6 +20,8 @@ from cpfls_cli.regressor.regressor import Motion, data_ranges, uniform_breakpoin
 from cpfls_cli.regressor.structure import StructureSettings, model_structure
 
 RNG_SEED = 12
+PARAMETERS = 40
+DEGREE = np.pi / 180
 
 
 def low_rank(rows, columns, rank):
@@ -84,9 +86,6 @@ def test_penalty_below_is_that_of_the_ridge_problem():
 def test_no_rows_at_all_are_an_error():
     with pytest.raises(ValueError, match="no rows"):
         Triangle.of([])
-
-
-PARAMETERS = 40
 
 
 @pytest.fixture(params=["all eigenvectors", "tridiagonal form", "Lanczos"])
@@ -239,9 +238,6 @@ def test_quick_solution_of_dependent_columns_is_finite():
     assert np.isfinite(parameters).all()
     best = np.linalg.lstsq(A, y, rcond=None)[0]
     np.testing.assert_allclose(A @ parameters, A @ best, atol=1e-5 * np.abs(y).max())
-
-
-DEGREE = np.pi / 180
 
 
 def at(roll, pitch):

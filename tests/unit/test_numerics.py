@@ -16,6 +16,7 @@ from cpfls_cli.lag import best_delay, delayed, fit_delay, lagged
 from cpfls_cli.units import KNOWN_UNITS, UnitName, to_si
 
 WAVES = np.random.default_rng(1).standard_normal((400, 3)) + np.array([0.0, 5.0, -80.0])
+BETWEEN = pytest.mark.parametrize("between", ["cubic", "linear", "previous"])
 
 
 @pytest.mark.parametrize("upper", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.5, 1.0, 2.0)])
@@ -66,12 +67,8 @@ def test_an_unknown_unit_is_refused_with_the_nearest_names():
         to_si(np.zeros(1), "degs")
 
 
-@pytest.fixture
-def values():
-    return np.random.default_rng(2).standard_normal((12, 3)) @ np.triu(np.ones((3, 3)))
-
-
-def test_of_a_mean_the_jackknife_says_what_its_standard_error_says(values):
+def test_of_a_mean_the_jackknife_says_what_its_standard_error_says():
+    values = np.random.default_rng(2).standard_normal((12, 3)) @ np.triu(np.ones((3, 3)))
     left_out = (values.sum(axis=0) - values) / (len(values) - 1)
     np.testing.assert_allclose(jackknife_error(left_out), mean_error(values), rtol=1e-12)
     np.testing.assert_allclose(jackknife_covariance(left_out), np.cov(values.T) / len(values), rtol=1e-12)
@@ -137,9 +134,6 @@ def test_a_number_on_its_bound_stays_there_and_the_others_move_as_without_it():
     hessian, gradient = np.array([[2.0, 0.5], [0.5, 1.0]]), np.array([-1.0, -1.0])
     found = damped_step(hessian, gradient, 0.0, np.full(2, -5.0), np.array([0.0, 5.0]))
     np.testing.assert_allclose(found, [0.0, 1.0])
-
-
-BETWEEN = pytest.mark.parametrize("between", ["cubic", "linear", "previous"])
 
 
 @pytest.fixture

@@ -15,6 +15,9 @@ from cpfls_cli.inertia import (
     symmetric_columns,
 )
 
+PARAMETERS = np.array([1.0, 2.0, 3.0, 0.4, 0.5, 0.6])
+MATRIX = np.array([[1.0, 0.4, 0.5], [0.4, 2.0, 0.6], [0.5, 0.6, 3.0]])
+
 
 def states(count=100):
     """Attitudes away from the pitch of +-90 degrees, where the Euler rates are not defined."""
@@ -93,10 +96,6 @@ def test_cross_product_is_numpys_to_the_bit(shapes):
     rng = np.random.default_rng(0)
     first, second = (rng.normal(size=shape) for shape in shapes)
     np.testing.assert_array_equal(rotations.cross(first, second), np.cross(first, second))
-
-
-PARAMETERS = np.array([1.0, 2.0, 3.0, 0.4, 0.5, 0.6])
-MATRIX = np.array([[1.0, 0.4, 0.5], [0.4, 2.0, 0.6], [0.5, 0.6, 3.0]])
 
 
 def vectors(seed, count=50):

@@ -40,8 +40,7 @@ def decoded(shown):
 
 @pytest.mark.parametrize("most", [10, 100, 998, 5000])
 def test_thinned_signals_keep_each_peak_and_each_gap(most):
-    rng = np.random.default_rng(1)
-    values = rng.standard_normal((2000, 2)).astype(np.float32)
+    values = np.random.default_rng(1).standard_normal((2000, 2)).astype(np.float32)
     values[777, 0], values[1999, 1] = 50.0, -50.0
     values[1200:1300] = np.nan
     time, kept = thinned(np.arange(2000.0), values, most)

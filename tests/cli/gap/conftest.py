@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from tests.builders.shifted_flights import CONFIG, HEADER, OFFSET, attitude_of, flight_table, motion, save
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 
 
 @pytest.fixture(scope="session")
 def gap_config(tmp_path_factory):
-    path = tmp_path_factory.mktemp("gap-config") / "study.yaml"
-    path.write_text(CONFIG + VEHICLE)
-    return path
+    return put_file(tmp_path_factory.mktemp("gap-config") / "study.yaml", CONFIG + VEHICLE)
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,8 @@ import re
 import numpy as np
 import pytest
 
+from tests.builders.shifted_flights import save
+
 
 def column(path, *names):
     """Copy a log without some of its columns."""
@@ -13,11 +15,6 @@ def column(path, *names):
     data = np.loadtxt(path, delimiter=",", skiprows=1)
     kept = [place for place, name in enumerate(header) if name not in names]
     return data[:, kept], ",".join(header[place] for place in kept)
-
-
-def write(path, data, header):
-    np.savetxt(path, data, delimiter=",", header=header, comments="", fmt="%.9g")
-    return path
 
 
 def test_output_that_is_a_file(refuse, gap_config, shifted, tmp_path):
@@ -52,7 +49,7 @@ def test_unknown_effect_to_ignore(refuse, gap_config, shifted, tmp_path):
 
 def test_flight_too_short_to_split(refuse, gap_config, shifted, tmp_path):
     data, header = column(shifted[0])
-    short = write(tmp_path / "short.csv", data[:900], header)
+    short = save(tmp_path / "short.csv", data[:900], header)
     (message,) = refuse("gap", gap_config, short, "-o", tmp_path / "x")
     assert message.startswith("short.csv: the only flight is too short to hold out a third of it")
     assert "--held-out" in message
@@ -61,7 +58,7 @@ def test_flight_too_short_to_split(refuse, gap_config, shifted, tmp_path):
 
 def test_log_without_actuation(refuse, gap_config, shifted, tmp_path):
     data, header = column(shifted[0], "om1", "om2", "om3", "om4")
-    still = write(tmp_path / "still.csv", data, header)
+    still = save(tmp_path / "still.csv", data, header)
     (message,) = refuse("compare", gap_config, still, "-o", tmp_path / "x.h5")
     assert "has no rotor_speed, rotor_command or body_torque" in message
 
@@ -74,15 +71,13 @@ def other_config(gap_config, tmp_path_factory):
 
 
 def test_flight_of_another_vehicle(cpfls, refuse, gap_config, other_config, shifted, tmp_path):
-    flight = tmp_path / "flight.h5"
-    cpfls.done("import", other_config, shifted[0], "-o", flight)
+    flight = cpfls.made("import", other_config, shifted[0], at=tmp_path / "flight.h5")
     (message,) = refuse("compare", gap_config, flight, "-o", tmp_path / "x.h5")
     assert "was made with another vehicle; these differ: vehicle.mass_kg (7.0 there, 6.0 in the config)" in message
 
 
 def test_disagreement_of_another_vehicle(cpfls, refuse, gap_config, other_config, shifted, tmp_path):
-    source = tmp_path / "disagreement.h5"
-    cpfls.done("compare", other_config, *shifted[:2], "-o", source)
+    source = cpfls.made("compare", other_config, *shifted[:2], at=tmp_path / "disagreement.h5")
     (message,) = refuse("diagnose", gap_config, source, "-o", tmp_path / "x.h5")
     assert "vehicle.mass_kg" in message
 
@@ -95,7 +90,7 @@ def test_model_of_another_vehicle(refuse, pipeline, gap_config, shifted, tmp_pat
 
 def test_commands_stand_in_where_speeds_are_missing(cpfls, gap_config, shifted, tmp_path):
     data, header = column(shifted[0])
-    commanded = write(tmp_path / "commanded.csv", data, header.replace("om", "cmd"))
+    commanded = save(tmp_path / "commanded.csv", data, header.replace("om", "cmd"))
     words = "import.signals.rotor_command={columns: [cmd1, cmd2, cmd3, cmd4], unit: rad/s}"
     result = cpfls.done("compare", gap_config, commanded, "-o", tmp_path / "x.h5", "--set", words, "-v")
     unseen = result.stdout[result.stdout.index("what these flights cannot show") :]

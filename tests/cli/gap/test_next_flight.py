@@ -5,7 +5,6 @@ import pytest
 from tests.builders.studies import VEHICLE
 
 CONFIG = """
-seed: 1
 trajectory: {path: straight, displacement_m: 4.0, legs: 2, period_s: 0.4, yaw_turn_rad: 0.5, duration_s: 16.0}
 simulation:
   mode: closed-loop

@@ -1,6 +1,7 @@
 """`cpfls gap` on flights that repeat a path in gusts: the repeatable part leads page, terminal and JSON."""
 
 import json
+from dataclasses import asdict
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,22 +23,10 @@ COLUMNS = {
 
 def config():
     """The vehicle without its drag, and without its damping."""
-    rotors = [
-        {
-            "position_m": list(rotor.position_m),
-            "spin": rotor.spin,
-            "thrust_factor_n_s2": rotor.thrust_factor_n_s2,
-            "drag_factor_n_m_s2": rotor.drag_factor_n_m_s2,
-        }
-        for rotor in SMALL.vehicle.rotors
-    ]
-    vehicle = {"mass_kg": SMALL.mass, "inertia_kg_m2": list(SMALL.inertia), "rotors": rotors}
     signals = {name: {"columns": columns, "unit": unit} for name, (columns, unit) in COLUMNS.items()}
-    read = {"time_column": "t", "signals": signals, "torque_source": None, "rate_hz": None, "lowpass_hz": None}
     return {
-        "seed": 1,
-        "vehicle": vehicle | {"rotor_speed_max_rad_s": 1e4},
-        "import": read | {"spike_deviations": None},
+        "vehicle": asdict(SMALL.vehicle),
+        "import": {"signals": signals, "torque_source": None},
         "gap": {"shifts": 39, "horizon_s": 0.1, "effects_max": 1},
     }
 

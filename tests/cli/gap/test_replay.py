@@ -12,7 +12,7 @@ from cpfls_cli.flightlog.results import Flight
 from cpfls_cli.playback.replay import Playback
 from cpfls_cli.result import plain
 from tests.builders.artifacts import edited, with_fields
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 
 NAMES = ["model", "nothing-moves", "rate-stays", "stated"]
 FAST = ("--every", "7")
@@ -105,8 +105,7 @@ def test_options_change_what_they_say(replayed, with_attitude):
 
 
 def test_commands_stay_between_samples(replayed, shifted, tmp_path):
-    log = tmp_path / "commanded.csv"
-    log.write_text(shifted[0].read_text().replace("om", "cmd"))
+    log = put_file(tmp_path / "commanded.csv", shifted[0].read_text().replace("om", "cmd"))
     named = "import.signals.rotor_command={columns: [cmd1, cmd2, cmd3, cmd4], unit: rad/s}"
     answer, _ = replayed("vehicle", log, options=(*FAST, "--set", named))
     (flight,) = answer["flights"]
@@ -178,8 +177,7 @@ def test_a_log_is_played_back_on_both_sides_of_its_gaps(replayed, with_attitude,
 
 
 def test_unknown_samples_part_a_flight_too(replayed, eight_seconds, tmp_path):
-    flight = tmp_path / "flight.h5"
-    flight.write_bytes(eight_seconds.read_bytes())
+    flight = put_file(tmp_path / "flight.h5", eight_seconds.read_bytes())
     with edited(flight) as file:
         file["rotor_speed"][500:510] = math.nan
     answer, _ = replayed("vehicle", flight, options=("--every", "1"))
@@ -219,8 +217,7 @@ def test_report_shows_it(cpfls, gap_config, of_vehicle, tmp_path):
 
 
 def test_a_report_of_it_alone_has_a_title_of_its_own(cpfls, gap_config, of_vehicle, tmp_path):
-    page = tmp_path / "page.md"
-    cpfls.done("report", gap_config, of_vehicle[1], "-o", page)
+    page = cpfls.made("report", gap_config, of_vehicle[1], at=tmp_path / "page.md")
     assert page.read_text().startswith("# What a model predicts of flights\n")
 
 

@@ -2,10 +2,9 @@
 
 import pytest
 
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 
 SEARCH = """\
-seed: 1
 trajectory: {sample_time_s: 0.1}
 identification:
   consequents: seesaw
@@ -22,9 +21,7 @@ identification:
 
 @pytest.fixture(scope="session")
 def search(tmp_path_factory):
-    path = tmp_path_factory.mktemp("search") / "search.yaml"
-    path.write_text(SEARCH + VEHICLE)
-    return path
+    return put_file(tmp_path_factory.mktemp("search") / "search.yaml", SEARCH + VEHICLE)
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ from cpfls_cli.report.content import sentence
 from cpfls_cli.result import datasets
 from cpfls_cli.validation import validate
 from tests.builders.identified_models import write_changed
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import IDENTIFICATION, LOG_STUDY, VEHICLE
 
 EVIDENCE = ("structures", "residuals", "uncertainty", "curves", "round_trip", "steps", "physics", "verdict")
 VALIDATION = [path for path, _ in datasets(IdentifiedModel) if path.split("/")[0] in EVIDENCE]
@@ -36,6 +36,11 @@ SHORT = {
     "do-not-use": "do not use",
 }
 SIGNS = {1: "For it", -1: "Against it", 0: "To know"}
+HELD_OUT = ("--set", "identification.choice=held-out")
+SEARCH = ("--set", "identification.generations=2")
+BODY_RATE = "    body_rate: {columns: [p, q, r], unit: rad/s}\n"
+STUDY = f"{LOG_STUDY}{BODY_RATE}{IDENTIFICATION}  validation: {{enabled: false}}\n"
+INERTIA = np.array([0.6, 0.6, 1.2])
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +77,7 @@ def unfolded(blocks):
 
 def test_the_report_shows_the_same_scores_and_the_same_verdict(validated, cpfls, study, tmp_path):
     model, text, _ = validated
-    page = tmp_path / "report.json"
-    cpfls.done("report", study, model, "-o", page)
+    page = cpfls.made("report", study, model, at=tmp_path / "report.json")
     sections = json.loads(page.read_text(encoding="utf-8"))["sections"]
     blocks = [block for section in sections for block in unfolded(section["blocks"])]
     lines = [" ".join(line.split()) for line in text.splitlines()]
@@ -139,10 +143,6 @@ def test_use_of_a_model_that_was_judged_unfit_is_said(validated, cpfls, study, p
         write_changed(validated[0], model, verdict__label=label)
         stderr = cpfls("replay", study, model, pipeline.flight, "--every", "50", "-o", output).stderr
         assert (answer in stderr) if answer else ("verdict" not in stderr)
-
-
-HELD_OUT = ("--set", "identification.choice=held-out")
-SEARCH = ("--set", "identification.generations=2")
 
 
 @pytest.fixture(scope="module")
@@ -223,28 +223,6 @@ def test_a_model_of_another_vehicle_is_named(cpfls, study, pipeline, tmp_path):
         warnings.simplefilter("always")
         load_model(pipeline.model, other).predict(pipeline.flight)
     assert any(said in str(each.message) for each in noted)
-
-
-STUDY = """\
-seed: 1
-import:
-  signals:
-    attitude: {columns: [roll, pitch, yaw], unit: rad}
-    body_rate: {columns: [p, q, r], unit: rad/s}
-    body_torque: {columns: [mx, my, mz], unit: N m}
-identification:
-  structure: cpfls
-  base: none
-  input_map: data-range
-  consequents: seesaw
-  products: additive
-  membership_functions: 5
-  population: 10
-  generations: 1
-  local_search: {enabled: false}
-  validation: {enabled: false}
-"""
-INERTIA = np.array([0.6, 0.6, 1.2])
 
 
 @pytest.fixture

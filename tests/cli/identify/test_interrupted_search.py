@@ -299,6 +299,5 @@ def test_killed_between_the_model_and_the_removal_of_its_checkpoint(cpfls, words
 
 
 def test_workers_and_scheduler_exclude_each_other(refuse, words, tmp_path):
-    several = ("--workers", 2, "--scheduler", "tcp://127.0.0.1:1")
-    (line,) = refuse(*words, "-o", tmp_path / "model.h5", *several)
+    (line,) = refuse(*words, "-o", tmp_path / "model.h5", "--workers", 2, "--scheduler", "tcp://127.0.0.1:1")
     assert line == "--scheduler: brings its own workers; leave out --workers"

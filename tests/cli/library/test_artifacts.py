@@ -3,6 +3,7 @@
 import json
 import shutil
 import sys
+from dataclasses import asdict
 from itertools import pairwise
 
 import matplotlib
@@ -23,6 +24,9 @@ from tests.builders.exported_vehicles import flat, on_numpy
 from tests.builders.identified_models import write_changed
 from tests.builders.playback_flights import STATED
 from tests.builders.results import craft, drawn
+
+PERIOD = 0.01
+HOVER = np.sqrt(vehicle_models.QUAD.mass_kg * 9.81 / sum(r.thrust_factor_n_s2 for r in vehicle_models.QUAD.rotors))
 
 
 @pytest.mark.parametrize("stage", formats(), ids=lambda stage: stage.name)
@@ -119,8 +123,7 @@ def test_a_package_that_is_missing_is_named_with_the_command(pipeline, monkeypat
 
 def test_figures_are_those_of_the_report(cpfls, pipeline, study, tmp_path):
     flight, model = (cpfls_cli.read(path) for path in (pipeline.flight, pipeline.model))
-    given = (pipeline.flight, pipeline.model)
-    report = cpfls("report", study, *given, "-o", tmp_path / "r.md", "--json")
+    report = cpfls("report", study, pipeline.flight, pipeline.model, "-o", tmp_path / "r.md", "--json")
     figures = flight.figures(model)
     assert list(figures) == json.loads(report.stdout)["figures"]
     with matplotlib.rc_context({"font.size": 30}):
@@ -129,10 +132,6 @@ def test_figures_are_those_of_the_report(cpfls, pipeline, study, tmp_path):
     assert [axes.get_title(loc) for axes in drawn.axes for loc in ("left", "right") if axes.get_title(loc)]
     assert drawn.axes[0].yaxis.label.get_size() == 9.5
     assert len(drawn.axes[0].lines[0].get_xdata()) == len(flight["time"])
-
-
-PERIOD = 0.01
-HOVER = np.sqrt(vehicle_models.QUAD.mass_kg * 9.81 / sum(r.thrust_factor_n_s2 for r in vehicle_models.QUAD.rotors))
 
 
 @pytest.fixture(scope="module")
@@ -164,8 +163,7 @@ def test_a_replay_is_what_the_command_writes(cpfls, pipeline, study, tmp_path):
     model, flight = cpfls_cli.load_model(pipeline.model), cpfls_cli.read(pipeline.flight)
     options = ("--horizon", "0.3", "--every", "40", "--hold", "previous")
     cpfls("replay", study, pipeline.model, pipeline.flight, "-o", tmp_path / "command.h5", *options)
-    replay = model.replay(flight, horizon_s=0.3, every=40, hold="previous")
-    replay.write(tmp_path / "replay.h5")
+    model.replay(flight, horizon_s=0.3, every=40, hold="previous").write(tmp_path / "replay.h5")
     assert (tmp_path / "replay.h5").read_bytes() == (tmp_path / "command.h5").read_bytes()
 
 
@@ -219,16 +217,8 @@ def test_an_identified_model_flies_as_it_is_played_back(pipeline):
 
 
 def test_a_stated_vehicle_falls_and_hovers(tmp_path):
-    rotors = "".join(
-        f"    - {{position_m: {list(r.position_m)}, spin: {r.spin}, thrust_factor_n_s2: {r.thrust_factor_n_s2},"
-        f" drag_factor_n_m_s2: {r.drag_factor_n_m_s2}}}\n"
-        for r in STATED.rotors
-    )
     config = tmp_path / "study.yaml"
-    config.write_text(
-        f"vehicle:\n  mass_kg: {STATED.mass_kg}\n  gravity_m_s2: 9.81\n  inertia_kg_m2: {list(STATED.inertia_kg_m2)}\n"
-        f"  rotor_speed_max_rad_s: {STATED.rotor_speed_max_rad_s}\n  rotors:\n{rotors}"
-    )
+    config.write_text(json.dumps({"vehicle": asdict(STATED)}))
     vehicle = cpfls_cli.stated_vehicle(config)
     fallen = vehicle.fly(vehicle.state(), np.zeros((11, 4)), 0.1)
     np.testing.assert_allclose(fallen.position[-1], [0, 0, -9.81 / 2], atol=1e-12)

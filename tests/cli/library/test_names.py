@@ -14,6 +14,7 @@ NAMES = {
     "Artifact": "about config figures format get items keys path summary to_pandas to_xarray values write",
     "Model": "export fly formats predict replay state step",
 }
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def test_names_are_kept():
@@ -27,9 +28,6 @@ def test_names_are_kept():
 def test_the_page_is_what_the_docstrings_say(capsys):
     runpy.run_path(str(ROOT / "docs" / "api_page.py"), run_name="__main__")
     assert capsys.readouterr().out == (ROOT / "docs" / "api.md").read_text(encoding="utf-8"), "make docs/api.md"
-
-
-DOCS = Path(__file__).parents[3] / "docs"
 
 
 def summary(notebook):

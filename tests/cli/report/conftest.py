@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 from tests.builders.sweeps import searched
 
 STUDY = """\
@@ -26,8 +26,7 @@ identification:
 def swept(cpfls, tmp_path_factory):
     """The folder of a study, its trajectory, its flight and its searches."""
     folder = tmp_path_factory.mktemp("swept")
-    config = folder / "study.yaml"
-    config.write_text(STUDY + VEHICLE)
+    config = put_file(folder / "study.yaml", STUDY + VEHICLE)
     made = [
         cpfls("trajectory", config, "-o", folder / "trajectory.h5"),
         cpfls("simulate", config, folder / "trajectory.h5", "-o", folder / "flight.h5"),

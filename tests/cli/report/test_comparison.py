@@ -50,8 +50,7 @@ def write(bare, tmp_path):
 @pytest.fixture
 def compared(cpfls, study, tmp_path):
     def call(*models):
-        output = tmp_path / "report.json"
-        cpfls.done("report", study, *models, "-o", output, "--force")
+        output = cpfls.made("report", study, *models, "--force", at=tmp_path / "report.json")
         page = json.loads(output.read_text(encoding="utf-8"))
         names = [section["name"] for section in page["sections"]]
         return names, next((part["blocks"] for part in page["sections"] if part["name"] == "comparison"), [])
@@ -143,8 +142,7 @@ def test_another_split_of_one_flight_is_other_data(compared, write):
     other = ("training_share: 1.0", "training_share: 0.9")
     _, blocks = compared(write("one.h5"), write("two.h5", config=other))
     assert any("cannot be ranked" in block.get("text", "") for block in blocks)
-    keys = table(blocks, "Key")
-    assert keys["rows"] == [["identification.training_share", "1.0", "0.9"]]
+    assert table(blocks, "Key")["rows"] == [["identification.training_share", "1.0", "0.9"]]
 
 
 def test_rigid_bodies_that_differ_are_distinguished_by_their_models(compared, write, bare):
@@ -231,8 +229,7 @@ def test_predictors_that_are_equal_are_both_the_least(cpfls, study, write, tmp_p
 def test_a_model_that_is_the_rigid_body_hides_its_line_and_the_caption_says_so(cpfls, study, write, tmp_path, same):
     own = {path: values for path, values in curves().items() if path.startswith("curves/")}
     own["curves/inertia"] = own["curves/rigid_body"] * (1.0 + 1e-12) if same else own["curves/inertia"]
-    output = tmp_path / "curves.json"
-    cpfls.done("report", study, write("one.h5", **own), "-o", output)
+    output = cpfls.made("report", study, write("one.h5", **own), at=tmp_path / "curves.json")
     page = json.loads(output.read_text(encoding="utf-8"))
     blocks = unfolded(next(part["blocks"] for part in page["sections"] if part["name"] == "identify"))
     caption = named(blocks, "identify-1-inertia-curves-1")["caption"]
@@ -252,8 +249,7 @@ def test_vehicles_of_equal_file_names_are_called_by_their_folders(cpfls, study, 
         )
         write_vehicle(path, replace(vehicle, numbers=tuple(numbers)))
     output = tmp_path / "report.html"
-    result = cpfls.done("report", study, *paths, "-o", output)
-    *_, one, two, differ = result.stdout.splitlines()
+    *_, one, two, differ = cpfls.done("report", study, *paths, "-o", output).stdout.splitlines()
     assert [line.split()[0] for line in (one, two)] == ["still/vehicle.h5", "gusty/vehicle.h5"]
     assert differ == "differ beyond both intervals: Ixx"
     page = output.read_text(encoding="utf-8")

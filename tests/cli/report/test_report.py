@@ -14,26 +14,17 @@ from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.store import read
 from tests.builders.artifacts import read_result, with_fields
 from tests.builders.command_line import drawn, run
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import IDENTIFICATION, VEHICLE, put_file
 
-CONFIG = """
+CONFIG = f"""
 seed: 3
-trajectory: {sample_time_s: 0.2}
-reduction: {size: 60}
-identification:
-  structure: cpfls
-  input_map: data-range
-  consequents: seesaw
-  products: additive
-  membership_functions: 3
-  base: none
-  population: 10
-  generations: 1
+trajectory: {{sample_time_s: 0.2}}
+reduction: {{size: 60}}
+{IDENTIFICATION.replace("functions: 5", "functions: 3")}\
   subpopulations: 2
   training_share: 0.7
-  local_search: {enabled: false}
-  validation: {enabled: false}
-report: {title: "<script>alert(1)</script> & a study"}
+  validation: {{enabled: false}}
+report: {{title: "<script>alert(1)</script> & a study"}}
 """
 HOSTILE = "<img src=x onerror=alert(1)>&'$a$\x07.h5"
 SECTIONS = [
@@ -79,8 +70,7 @@ def cpfls(*arguments, code=0):
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
-    config = folder / "study.yaml"
-    config.write_text(CONFIG + VEHICLE)
+    config = put_file(folder / "study.yaml", CONFIG + VEHICLE)
     names = ("trajectory", "flight", "selection", "model", "ridge", "noisy")
     files = SimpleNamespace(folder=folder, config=config, **{name: folder / f"{name}.h5" for name in names})
     cpfls("trajectory", config, "-o", files.trajectory)
@@ -95,14 +85,7 @@ def study(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def full(study):
-    given = (
-        study.trajectory,
-        study.flight,
-        study.noisy,
-        study.selection,
-        study.model,
-        study.ridge,
-    )
+    given = (study.trajectory, study.flight, study.noisy, study.selection, study.model, study.ridge)
     output = study.folder / "report.html"
     with drawn():
         summary = json.loads(cpfls("report", study.config, *given, "-o", output, "--json").stdout)

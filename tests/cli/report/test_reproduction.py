@@ -24,6 +24,7 @@ identification: {consequents: seesaw, products: additive, membership_functions: 
   local_search: {enabled: false}, validation: {enabled: false}}
 """
 SIZE = ("--set", "identification.population=8", "--set", "identification.generations=2")
+TIMES = [EvaluationTime(samples=n, svd_s=n / 10, evaluation_s=n / 5, compiled_s=1.0) for n in (10, 20, 40)]
 
 
 @pytest.fixture(scope="module")
@@ -88,9 +89,6 @@ def table_cells(html, name):
     ]
 
 
-TIMES = [EvaluationTime(samples=n, svd_s=n / 10, evaluation_s=n / 5, compiled_s=1.0) for n in (10, 20, 40)]
-
-
 @pytest.fixture(scope="module")
 def parted(swept):
     """Searches whole, and in two parts."""
@@ -136,8 +134,7 @@ def test_every_claim_and_every_figure_has_its_line(parted):
 
 def test_a_report_of_the_package_holds_nothing_against_the_paper(cpfls, parted):
     output = parted / "r.html"
-    given = [parted / "trajectory.h5"]
-    result = cpfls("report", parted / "study.yaml", *given, "-o", output, "--json")
+    result = cpfls("report", parted / "study.yaml", parted / "trajectory.h5", "-o", output, "--json")
     html = output.read_text(encoding="utf-8")
     assert "reproduction" not in json.loads(result.stdout)["sections"]
     assert "figures-of-the-paper" not in html

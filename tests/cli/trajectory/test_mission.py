@@ -15,6 +15,9 @@ from cpfls_cli.store import read
 from tests.builders.studies import VEHICLE
 
 HOVER = ("--hover", "8", "--excite", "roll,pitch", "--band", "0.7,3", "--size", "2", "--repeat", "4")
+SMALL = ("--duration", "10", "--box", "5,4,3", "--height", "3")
+FEW = ("--set", "trajectory.next_flight.starts=2", "--set", "trajectory.next_flight.iterations=3")
+PAIR = ("--separate", "com_offset,torque_bias")
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +48,7 @@ def test_the_summary_shows_runs_and_excitation(mission):
 
 
 def test_runs_flown_in_closed_loop_are_found_equal(cpfls, config, mission, tmp_path):
-    flight = tmp_path / "flight.h5"
-    cpfls.done("simulate", config, mission[0], "--mode", "closed-loop", "-o", flight)
+    flight = cpfls.made("simulate", config, mission[0], "--mode", "closed-loop", at=tmp_path / "flight.h5")
     planned, flown = read(mission[0], PlannedPath)[0], read(flight, Flight)[0]
     firsts = [round(run.begin / planned.time[1]) for run in planned.runs]
     length = round(planned.runs[0].end / planned.time[1]) + 1
@@ -147,11 +149,6 @@ def test_guesses_choose_no_path(refuse, tmp_path, words):
     (tmp_path / "study.yaml").write_text(to_yaml(vehicle))
     (line,) = refuse("trajectory", tmp_path / "study.yaml", *words, "-o", tmp_path / "x.h5")
     assert "not known in this config, but `cpfls trajectory` needs what is null there" in line
-
-
-SMALL = ("--duration", "10", "--box", "5,4,3", "--height", "3")
-FEW = ("--set", "trajectory.next_flight.starts=2", "--set", "trajectory.next_flight.iterations=3")
-PAIR = ("--separate", "com_offset,torque_bias")
 
 
 @pytest.fixture(scope="module")

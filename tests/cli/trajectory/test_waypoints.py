@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
 
 LIMITED = ("--set", "trajectory.limits={velocity_m_s: 4, acceleration_m_s2: 3, jerk_m_s3: 6, pop_m_s6: 300}")
 FREE = ("--set", "trajectory.duration_s=null")
@@ -15,16 +15,12 @@ FREE = ("--set", "trajectory.duration_s=null")
 
 @pytest.fixture
 def config(tmp_path):
-    path = tmp_path / "study.yaml"
-    path.write_text("trajectory: {sample_time_s: 0.05, yaw_turn_rad: 1.0}\n" + VEHICLE)
-    return path
+    return put_file(tmp_path / "study.yaml", "trajectory: {sample_time_s: 0.05, yaw_turn_rad: 1.0}\n" + VEHICLE)
 
 
 @pytest.fixture
 def points(tmp_path):
-    path = tmp_path / "points.csv"
-    path.write_text("x_m,y_m,z_m,yaw_rad,pause_s\n1,2,3,0,9\n11,2,3,1.5,2\n11,12,8,-0.5,1\n")
-    return path
+    return put_file(tmp_path / "points.csv", "x_m,y_m,z_m,yaw_rad,pause_s\n1,2,3,0,9\n11,2,3,1.5,2\n11,12,8,-0.5,1\n")
 
 
 def position(path):
@@ -111,8 +107,7 @@ def test_each_axis_goes_where_it_is_to_go_forwards_or_backwards(cpfls, tmp_path,
     ],
 )
 def test_bad_files_are_refused(refuse, tmp_path, config, text, complaint):
-    path = tmp_path / "bad.csv"
-    path.write_text(text)
+    path = put_file(tmp_path / "bad.csv", text)
     (message,) = refuse("trajectory", config, "--waypoints", path, "-o", tmp_path / "t.h5")
     assert message.startswith(str(path))
     assert complaint in message
@@ -124,8 +119,7 @@ def test_waypoints_without_points_are_refused(refuse, tmp_path, config):
 
 
 def test_a_duration_too_short_for_the_file_is_refused(refuse, tmp_path, config):
-    path = tmp_path / "far.csv"
-    path.write_text("x_m,y_m,z_m\n0,0,0\n30,0,0\n0,0,0\n30,0,0\n0,0,0\n")
+    path = put_file(tmp_path / "far.csv", "x_m,y_m,z_m\n0,0,0\n30,0,0\n0,0,0\n30,0,0\n0,0,0\n")
     (message,) = refuse("trajectory", config, "--waypoints", path, "-o", tmp_path / "t.h5")
     assert (
         message
@@ -162,15 +156,12 @@ def test_more_than_the_rotors_give_is_refused_with_time_and_place(refuse, tmp_pa
 
 def test_tilt_beyond_its_limit_is_refused_or_reported(cpfls, refuse, tmp_path, config):
     steep = ("trajectory", config, "-o", tmp_path / "t.h5", "--set", "trajectory.tilt_max_rad=0.1")
-    messages = refuse(*steep, code=1)
-    assert messages[0].startswith("tilt of up to 0.18")
-    summary = cpfls.done(*steep, "--set", "trajectory.infeasible=report")
-    assert "tilt of up to 0.18" in summary.stderr
+    assert refuse(*steep, code=1)[0].startswith("tilt of up to 0.18")
+    assert "tilt of up to 0.18" in cpfls.done(*steep, "--set", "trajectory.infeasible=report").stderr
 
 
 def test_a_turn_in_yaw_that_is_too_fast_is_named(refuse, tmp_path, config):
-    near = tmp_path / "near.csv"
-    near.write_text("x_m,y_m,z_m\n0,0,0\n3,0,0\n")
+    near = put_file(tmp_path / "near.csv", "x_m,y_m,z_m\n0,0,0\n3,0,0\n")
     turn = ("--set", "trajectory.yaw_turn_rad=6.28")
     messages = refuse(
         "trajectory", config, "--waypoints", near, "-o", tmp_path / "t.h5", *LIMITED, *FREE, *turn, code=1
@@ -206,8 +197,7 @@ def test_a_file_replaces_a_path_that_could_not_be_planned(cpfls, tmp_path, confi
 
 
 def test_a_dry_run_finds_what_the_plan_would(refuse, tmp_path, config):
-    far = tmp_path / "far.csv"
-    far.write_text("x_m,y_m,z_m\n0,0,0\n30,0,0\n0,0,0\n30,0,0\n0,0,0\n")
+    far = put_file(tmp_path / "far.csv", "x_m,y_m,z_m\n0,0,0\n30,0,0\n0,0,0\n30,0,0\n0,0,0\n")
     (message,) = refuse("trajectory", config, "--waypoints", far, "-o", tmp_path / "t.h5", "--dry-run")
     assert "4 moves take 64 s" in message
     weak = ("--set", "vehicle.rotor_speed_max_rad_s=350")

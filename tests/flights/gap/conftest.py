@@ -23,8 +23,7 @@ def answer_of(tmp_path_factory):
         held = [word for path in paths[len(names) :] for word in ("--held-out", path)]
         out = tmp_path_factory.mktemp("gap") / "out"
         words = ("gap", CONFIGS / f"{config}.yaml", *paths[: len(names)], *held, "-o", out, "--json", *BRIEF, *options)
-        result = run.done(*words)
-        return json.loads(result.stdout)
+        return json.loads(run.done(*words).stdout)
 
     return call
 

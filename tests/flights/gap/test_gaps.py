@@ -10,6 +10,8 @@ import pytest
 from tests.builders.command_line import run
 from tests.builders.recorded_flights import path_of_log
 
+ARPL, CRAZYPAD, CRAZYSWARM = (f"real/{name}" for name in ("arpl_crazyflie_1khz", "crazypad_com", "crazyswarm2_lee"))
+
 
 def test_nothing_hidden_is_no_gap(answer_of):
     answer = answer_of("rotorpy", "rotorpy", "none")
@@ -63,8 +65,7 @@ def changed(tmp_path_factory):
     def call(today, since):
         flown, before = ([path_of_log("real/crazypad_usd", name) for name in side] for side in (today, since))
         words = ("changed", CONFIGS / "crazypad_usd.yaml", *flown, "--since", *before, "-o", out, "--json", "--force")
-        result = run.done(*words)
-        return json.loads(result.stdout)
+        return json.loads(run.done(*words).stdout)
 
     return call
 
@@ -82,18 +83,10 @@ def test_a_cut_propeller_is_named_and_pulls_the_less_the_more_is_cut(changed):
     assert all(0 < less < more for less, more in pairwise(losses))
 
 
-ARPL, CRAZYPAD, CRAZYSWARM = (f"real/{name}" for name in ("arpl_crazyflie_1khz", "crazypad_com", "crazyswarm2_lee"))
-
-
 @pytest.fixture(scope="module")
 def heavy(answer_of):
     held = ("add_weight_W3_near_M3__E9_log02",)
     return answer_of("crazypad", CRAZYPAD, "add_weight_W3_near_M3__E9_log00", held_out=held)
-
-
-@pytest.fixture(scope="module")
-def light(answer_of):
-    return answer_of("crazypad", CRAZYPAD, "add_weight_W1_near_M3__E9_log04")
 
 
 def names_of(answer):
@@ -130,12 +123,12 @@ def test_a_filter_of_the_import_changes_no_floor(answer_of):
 
 def test_flights_without_weight_have_no_offset(answer_of):
     normal = tuple(f"normal_flight__E9_log0{number}" for number in range(3))
-    answer = answer_of("crazypad", CRAZYPAD, *normal[:2], held_out=normal[2:])
-    assert names_of(answer) == set()
+    assert names_of(answer_of("crazypad", CRAZYPAD, *normal[:2], held_out=normal[2:])) == set()
 
 
-def test_weights_move_the_centre_of_mass_towards_the_motor_they_hang_at(light, heavy, coefficients_of):
+def test_weights_move_the_centre_of_mass_towards_the_motor_they_hang_at(answer_of, heavy, coefficients_of):
     """M3 is back left; the heavier weight moves it further."""
+    light = answer_of("crazypad", CRAZYPAD, "add_weight_W1_near_M3__E9_log04")
     offsets = [coefficients_of(answer, "com_offset") for answer in (light, heavy)]
     back = [-found["c_x"]["value"] for found in offsets]
     left = [found["c_y"]["value"] for found in offsets]

@@ -18,6 +18,7 @@ from tests.builders.vehicle_models import vehicle_of, write_vehicle
 
 CONFIGS = Path(__file__).parents[3] / "configs" / "gap"
 SIGNALS = ("body_rate", "attitude", "velocity", "position")
+ROTORPY = Path(__file__).parents[3] / "configs" / "gap" / "rotorpy.yaml"
 
 
 def replayed(config, folder, name, output):
@@ -120,9 +121,6 @@ def test_columns_of_rotors_in_another_order_are_said_with_the_right_one(config, 
         (rotor.position_m[0] > 0, rotor.position_m[1] > 0) for rotor in right
     ]
     assert [place.endswith("counter-clockwise") for place in places] == [rotor.spin > 0 for rotor in right]
-
-
-ROTORPY = Path(__file__).parents[3] / "configs" / "gap" / "rotorpy.yaml"
 
 
 @pytest.mark.parametrize("name", ROTORPY_HIDDEN)

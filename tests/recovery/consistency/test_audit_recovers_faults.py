@@ -71,8 +71,7 @@ def test_all_faults_at_once_come_back_within_a_few_standard_errors():
 
 
 def test_without_noise_the_faults_are_exact_at_any_tilt():
-    made = faulty_flights(np.random.default_rng(3), ALL, amplitude=(1.0, 0.4, 2.0))
-    value = fit_of(made).value
+    value = fit_of(faulty_flights(np.random.default_rng(3), ALL, amplitude=(1.0, 0.4, 2.0))).value
     np.testing.assert_allclose(value, truth(ALL), atol=2e-5)
 
 
@@ -113,8 +112,7 @@ def test_a_repaired_flight_passes_the_audit_and_has_the_true_rate():
 
 def test_faults_that_are_not_named_are_left_alone():
     made = faulty_flights(np.random.default_rng(7), Faults(bias=np.array([0.0005, 0, 0])), level=LEVELS["mid"])
-    found = audit(made, WINDOWS)
-    assert found.repaired(made[0]) is made[0]
+    assert audit(made, WINDOWS).repaired(made[0]) is made[0]
 
 
 def test_biases_that_differ_between_flights_are_mentioned():
@@ -128,8 +126,7 @@ def test_biases_that_differ_between_flights_are_mentioned():
 @pytest.mark.parametrize("period", [0.02, 0.004])
 def test_other_sampling_rates(period):
     made = faulty_flights(np.random.default_rng(9), Faults(delay=0.012), level=LEVELS["mid"], period=period)
-    found = audit(made, windows(period, 0.4, 0.5))
-    assert names(found) == {"channel_delay"}
+    assert names(audit(made, windows(period, 0.4, 0.5))) == {"channel_delay"}
     assert fit_of(made, windows(period, 0.4, 0.5)).value[12] == pytest.approx(0.012, abs=0.0005)
 
 

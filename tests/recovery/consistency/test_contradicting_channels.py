@@ -190,9 +190,7 @@ NO_OFFSET = {
     "attitude leans above an accelerometer": lambda s: leaning(s, felt=True),
     "scales": lambda s: replace(s, velocity=1.01 * s.velocity, acceleration=1.01 * (s.acceleration + UP) - UP),
     "a little rotated in steady flight": lambda s: replace(
-        s,
-        position=s.position + 4.0 * np.outer(s.time, EAST),
-        velocity=(s.velocity + 4.0 * EAST) @ turned(2.0).T,
+        s, position=s.position + 4.0 * np.outer(s.time, EAST), velocity=(s.velocity + 4.0 * EAST) @ turned(2.0).T
     ),
     "slow errors": lambda s: replace(
         s, velocity=s.velocity + 0.2 * slow_error(s, 1), acceleration=s.acceleration + 0.3 * slow_error(s, 2)
@@ -567,8 +565,7 @@ def test_a_low_passed_log_has_the_floors_of_the_raw_one_and_says_so_first(flight
 
 
 def test_a_log_without_noise_has_no_floor_that_is_known():
-    found = audit([signals_of(flown(8.0))], WINDOWS)
-    assert "noise floor is not known" in found.filtered[0]
+    assert "noise floor is not known" in audit([signals_of(flown(8.0))], WINDOWS).filtered[0]
 
 
 def read_with_repeats(flight, updates_hz, channels, late_s):

@@ -64,8 +64,7 @@ def relative_errors(training_torque, base="none"):
     """Largest error over largest torque of the true vehicle: on the training path and on an independent one."""
     time, motion = full_rotations(**TRAINING)
     data = TorqueData(time, motion, training_torque(motion))
-    settings = IdentificationSettings(base=base)
-    found = identify(data, data, {}, settings, np.random.default_rng(0))
+    found = identify(data, data, {}, IdentificationSettings(base=base), np.random.default_rng(0))
     motions = motion, full_rotations(**INDEPENDENT)[1]
     errors = [np.abs(found.model.torque(m) - exact(m)).max() / np.abs(exact(m)).max() for m in motions]
     return (*errors, found.system)

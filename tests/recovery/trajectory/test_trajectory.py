@@ -20,6 +20,7 @@ from tests.builders import gusty_flights
 from tests.builders.gusty_flights import EVERY, GRAVITY, GUSTS, LARGE, MEMORY_S, SMALL, STEP_S, Flight
 
 _DOUBLING = np.log([1.0, 1.0, 2.0, 4.0, 8.0])
+BAND_HZ = (0.5, 5.0)
 
 
 def shortest_duration(displacement: float, limits: Array, period: float | None, rng: np.random.Generator) -> float:
@@ -116,9 +117,6 @@ def test_brute_force_finds_the_same_duration(chosen):
         given = None if period is None else float(period[index])
         shortest = shortest_duration(float(displacement[index]), limits[:, index], given, rng)
         assert moves.duration[index] == pytest.approx(shortest, rel=1e-6), index
-
-
-BAND_HZ = (0.5, 5.0)
 
 
 def mission_of(truth, seconds=30.0, runs=4):

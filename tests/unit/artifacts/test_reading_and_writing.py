@@ -40,6 +40,7 @@ from tests.builders.vehicle_models import HEXA, QUAD, remainder, vehicle_of, who
 ORIGIN = store.Origin(
     stage="reduce", seed=4, config="seed: 4\n", inputs={"flight": InputFile("f.h5", "ab" * 32, "cpfls/flight")}
 )
+ALL_ROUND = np.eye(72, dtype=bool)
 
 
 def write(path, seed=1, **changes):
@@ -204,9 +205,6 @@ def test_hdf5_meets_a_full_disk(tmp_path, room):
             file.require_written()
 
 
-ALL_ROUND = np.eye(72, dtype=bool)
-
-
 def made(**values):
     return IdentifiedModel(**{**dict.fromkeys(own.name for own in fields(IdentifiedModel)), **values})
 
@@ -265,8 +263,7 @@ MODELS = {
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
 def test_the_round_trip_is_exact(model, tmp_path):
-    path = tmp_path / "vehicle.h5"
-    write_vehicle(path, vehicle_of(model))
+    path = write_vehicle(tmp_path / "vehicle.h5", vehicle_of(model))
     assert store.examine(path, Vehicle)[2] == []
     assert is_model(path)
     assert is_found(path)

@@ -14,17 +14,15 @@ from cpfls_cli.changes.numbers import UnsureRatio
 from cpfls_cli.changes.reference import Reference, kinds_of, thrust_directions, usual_covariance
 from cpfls_cli.stages.changed import flown_unlike
 from cpfls_cli.vehicle.rotors import allocation_matrix
-from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.drawn_numbers import flight_of, having
+from tests.builders.vehicles import alike
 
 ARM = 0.2
 QUAD = VehicleSettings(
     mass_kg=1.2,
     inertia_kg_m2=(0.01, 0.012, 0.02),
-    rotors=tuple(
-        RotorSettings(position_m=(x * ARM, y * ARM, 0.0), spin=spin, thrust_factor_n_s2=1e-5, drag_factor_n_m_s2=2e-7)
-        for x, y, spin in ((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1))
-    ),
+    rotors=alike(((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1)), 1e-5, 2e-7, ARM),
 )
 LOADS = [f"thrust M{index}" for index in range(1, 5)]
 NAMES = [*LOADS, *(f"vibration gyroscope {axis}" for axis in "xyz"), "delay roll", "delay pitch", "delay yaw"]
@@ -199,8 +197,7 @@ def test_a_mass_and_weak_rotors_look_alike(more, what):
     before = flights(6, rng)
     mean = {name: float(np.mean([flight.values[name] for flight in before])) for name in NAMES}
     today = [having(before[0], {**mean, **{name: mean[name] + x for name, x in zip(LOADS, more, strict=True)}})]
-    found = changed(today, before, QUAD, rng)
-    (first,) = found.causes
+    (first,) = changed(today, before, QUAD, rng).causes
     assert {what, "mass"} <= {first.name, *(each.name for each in first.alike)}
     assert first.belief < NAMED if what != "mass" else first.name == "mass"
 
@@ -250,8 +247,7 @@ def test_a_change_since_a_flight_of_today_is_not_hidden_by_those_before():
     rng = np.random.default_rng(11)
     before = flights(8, rng)
     weak = -np.log(0.75) * (np.arange(10) == 2)
-    today = [*flights(4, rng), *flights(2, rng, weak)]
-    found = changed(today, before, QUAD, rng)
+    found = changed([*flights(4, rng), *flights(2, rng, weak)], before, QUAD, rng)
     assert found.p <= FALSE_ALARM
     assert found.since_flight == 4
     assert found.causes[0].name == "rotor M3"
@@ -307,8 +303,7 @@ def test_a_lag_that_makes_the_loop_answer_gusts_otherwise_is_no_second_change():
     answered = np.array([-0.02 * name.startswith("delay") for name in names])
     rng = np.random.default_rng(21)
     before = flights(6, rng, names=names)
-    today = flights(3, rng, slower + answered, names)
-    found = changed(today, before, QUAD, rng)
+    found = changed(flights(3, rng, slower + answered, names), before, QUAD, rng)
     assert [each.name for each in found.causes if each.named] == ["lag"]
     assert found.causes[0].sizes[0].low < 0.02 < found.causes[0].sizes[0].high
     for change, name in ((answered, "delay"), (slower, "lag")):

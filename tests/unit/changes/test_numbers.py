@@ -80,8 +80,7 @@ def test_a_load_on_a_cable():
         return recorded(replace(VEHICLE, rotors=tuple(trim)), seed, **closed_loop)
 
     before = [flight_numbers(of_a_day(seed)) for seed in range(10, 13)]
-    flight = of_a_day(20, effects={"payload": LOAD})
-    today = flight_numbers(flight)
+    today = flight_numbers(of_a_day(20, effects={"payload": LOAD}))
     found = changed([today], before, VEHICLE, rng)
     assert found.p <= FALSE_ALARM
     (load,) = found.causes

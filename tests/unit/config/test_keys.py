@@ -20,7 +20,11 @@ from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.identification.settings import PRESETS
 from cpfls_cli.units import KNOWN_UNITS
 from cpfls_cli.vehicle.rotors import body_wrench
-from tests.builders.studies import VEHICLE
+from tests.builders.studies import VEHICLE, put_file
+
+FOLDER = Path(__file__).parents[3] / "configs" / "gap"
+SPEED = np.array([[300.0, 350.0, 400.0, 470.0]])
+O1, O2, O3, O4 = SPEED[0] ** 2
 
 
 def all_keys(settings, prefix=""):
@@ -99,8 +103,7 @@ def test_signals_come_with_their_names_units_and_an_example_that_is_a_study():
 
 
 def test_a_config_file_with_keys_that_are_gone_is_refused_with_what_to_do(tmp_path):
-    path = tmp_path / "study.yaml"
-    path.write_text("report: {paper: true, evaluation_times: []}\n" + VEHICLE)
+    path = put_file(tmp_path / "study.yaml", "report: {paper: true, evaluation_times: []}\n" + VEHICLE)
     with pytest.raises(ConfigError) as refused:
         load_study(path)
     lines = str(refused.value).splitlines()
@@ -122,8 +125,7 @@ def test_keys_that_are_gone_are_left_out_of_the_configs_of_artifacts():
 
 
 def test_a_key_that_has_no_effect_any_more_is_read_with_a_warning(tmp_path, caplog):
-    config = tmp_path / "study.yaml"
-    config.write_text(f"{VEHICLE}playback: {{generations: 0, folds: 4}}\n")
+    config = put_file(tmp_path / "study.yaml", f"{VEHICLE}playback: {{generations: 0, folds: 4}}\n")
     with caplog.at_level("WARNING"):
         assert load_study(config).playback.folds == 4
     assert f"{config}: playback.generations has no effect any more; remove it" in caplog.text
@@ -202,11 +204,6 @@ def test_merge_keys_and_anchors_are_plain_yaml():
 def test_messages_name_line_and_column():
     with pytest.raises(ConfigError, match=r"^file:2:1: not valid YAML: key 'a' appears twice$"):
         parse_yaml("a: 1\na: 2\n", "file")
-
-
-FOLDER = Path(__file__).parents[3] / "configs" / "gap"
-SPEED = np.array([[300.0, 350.0, 400.0, 470.0]])
-O1, O2, O3, O4 = SPEED[0] ** 2
 
 
 def study(name):

@@ -27,6 +27,8 @@ from tests.builders.faulty_gyroscopes import LEVELS, Faults, faulty_flight
 WINDOWS = windows(0.01, 0.4, 0.5)
 UP = np.array([0, 0, 9.81])
 FAULTS = {"gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay"}
+TIME = np.arange(2000) / 250
+NAMES = ("gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay")
 
 
 @pytest.fixture(scope="module")
@@ -177,8 +179,7 @@ def test_the_motion_follows_the_torque(turning, commanded, whom):
     momentum = clean.body_rate @ inertia
     torque = np.gradient(momentum, clean.time, axis=0) + np.cross(clean.body_rate, momentum)
     early = np.roll(torque, -5, axis=0)
-    found = audit([replace(clean, stated_torque=early, commanded=commanded)], WINDOWS)
-    (note,) = found.notes
+    (note,) = audit([replace(clean, stated_torque=early, commanded=commanded)], WINDOWS).notes
     # Of an interval that is narrower than a millisecond the digits are shown.
     says = re.fullmatch(rf"The motion follows the {whom} by (\d+\.\d+) ms \[(\d+\.\d+), (\d+\.\d+)\]\.", note)
     delay, low, high = map(float, says.groups())
@@ -222,9 +223,6 @@ def test_a_delay_that_runs_away_is_no_repair():
     ]
     found = audit([replace(signals, position=1e3 * signals.position) for signals in flights], WINDOWS)
     assert any("is the position in mm" in sentence for sentence in found.contradictions)
-
-
-TIME = np.arange(2000) / 250
 
 
 def log(sizes=(0.4, 0.35, 0.8), noise=0.0, held=1):
@@ -337,9 +335,6 @@ def test_what_does_not_follow_the_attitude_shows_no_unit():
     seen, _ = gentle(0.0)
     other = 0.04 * np.random.default_rng(5).standard_normal(seen.shape)
     assert gyroscope_apart(seen, other * np.pi / 180) == ((), ())
-
-
-NAMES = ("gyro_bias", "gyro_scale", "imu_misalignment", "channel_delay")
 
 
 def fit(place=0, value=0.0, error=1e-4, pull=0.0, blocks=21):

@@ -29,6 +29,7 @@ from tests.builders.christoffel import torque
 PARAMETERS = np.array([0.6, 0.7, 1.2, 0.02, -0.01, 0.03])
 INERTIA = symmetric(PARAMETERS)
 angles = st.lists(st.floats(-1.2, 1.2), min_size=3, max_size=3).map(np.array)
+MOMENTS = 0.6, 0.7, 1.2
 
 
 class Rigid:
@@ -65,9 +66,6 @@ def test_kinetic_energy_grows_by_the_work_of_the_torque(attitude, body_rate):
         return 0.5 * qd @ Warped().inertia(q).value[0] @ qd
 
     assert (energy(1e-5) - energy(-1e-5)) / 2e-5 == pytest.approx(0.0, abs=1e-5)
-
-
-MOMENTS = 0.6, 0.7, 1.2
 
 
 def random_attitudes(count):

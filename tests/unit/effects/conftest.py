@@ -7,7 +7,8 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
+from cpfls_cli.vehicle.settings import VehicleSettings
+from tests.builders.vehicles import alike
 
 SIX_KILOGRAMS = VehicleSettings(
     rotors=tuple(
@@ -17,13 +18,9 @@ SIX_KILOGRAMS = VehicleSettings(
 CRAZYFLIE = VehicleSettings(
     mass_kg=0.03,
     inertia_kg_m2=(1.43e-5, 1.43e-5, 2.89e-5),
-    rotors=tuple(
-        RotorSettings(
-            position_m=(0.0304 * x, 0.0304 * y, 0.0), spin=spin, thrust_factor_n_s2=2.3e-8, drag_factor_n_m_s2=7.8e-10
-        )
-        for x, y, spin in ((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1))
-    ),
+    rotors=alike(((1, -1, 1), (-1, -1, -1), (-1, 1, 1), (1, 1, -1)), 2.3e-8, 7.8e-10, 0.0304),
 )
+VEHICLES = {"6 kg": SIX_KILOGRAMS, "Crazyflie": CRAZYFLIE}
 
 
 def waves(time, channels, amplitude, offset=0.0):
@@ -62,9 +59,6 @@ def columns():
         return CATALOGUE[name].columns(signals, shape)
 
     return of
-
-
-VEHICLES = {"6 kg": SIX_KILOGRAMS, "Crazyflie": CRAZYFLIE}
 
 
 @pytest.fixture

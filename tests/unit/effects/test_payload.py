@@ -15,6 +15,8 @@ from cpfls_cli.effects.signals import Signals
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
 HANGING = np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+TIME = np.arange(0.0, 8.0, 0.01)
+LEVEL = {"length_m": 1.0, "damping_1_s": 0.2, "depth_m": 0.0}
 
 
 def direction(angles):
@@ -38,9 +40,6 @@ def lagrange(felt, length, damping):
 def hanging(felt, time, length, damping, start=(0.0, 0.0, 0.0, 0.0)):
     solved = solve_ivp(lagrange(felt, length, damping), time[[0, -1]], start, t_eval=time, rtol=1e-9, atol=1e-10)
     return direction(solved.y[:2]).T
-
-
-TIME = np.arange(0.0, 8.0, 0.01)
 
 
 def push(t):
@@ -102,8 +101,7 @@ def test_swing_under_a_hook_that_tumbles_with_the_vehicle(flight, depth, acceler
     signals = signals if accelerometer else replace(signals, acceleration=None)
     way = hook_way(signals, depth)
     expected = hanging(lambda t: way(t, 2) + GRAVITY, TIME, 1.5, 0.2)
-    found = swing(signals, 1.5, 0.2, depth)
-    np.testing.assert_allclose(found[:, :3], expected, atol=0.01)
+    np.testing.assert_allclose(swing(signals, 1.5, 0.2, depth)[:, :3], expected, atol=0.01)
     assert np.abs(expected[:, :2]).max() > 0.3
 
 
@@ -233,9 +231,6 @@ def test_what_rings_late_in_a_flight_is_no_swing_at_its_start(flight):
     gust = np.where(natural * TIME > 2.1 * 2 * np.pi, 0.02 * np.sin(natural * TIME), 0.0)
     blown = replace(level, attitude=level.attitude + gust[:, None] * [1.0, 1.0, 0.0])
     assert off(settled_swing(blown, 1.5, 0.1)[:, :2], cable) < 0.01
-
-
-LEVEL = {"length_m": 1.0, "damping_1_s": 0.2, "depth_m": 0.0}
 
 
 def test_cable_pulls_along_gravity_where_the_velocity_is_constant(columns, flight, with_velocity):

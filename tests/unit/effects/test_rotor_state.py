@@ -7,10 +7,7 @@ import pytest
 from scipy.interpolate import interp1d
 
 from cpfls_cli.effects.catalogue.rotor_mismatch import gains
-from cpfls_cli.effects.catalogue.vertical_descent import (
-    descent_state,
-    induced_velocity,
-)
+from cpfls_cli.effects.catalogue.vertical_descent import descent_state, induced_velocity
 from cpfls_cli.effects.hooks import second_order
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.lag import delayed, lagged
@@ -18,6 +15,7 @@ from cpfls_cli.vehicle.rotors import body_wrench, gain_modes, opposite_pairs
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.vehicle.stepping import Machine, RotorMotion
 from cpfls_cli.vehicle.values import Each
+from tests.builders.vehicles import alike
 
 
 def level(flight, height, roll=0.0):
@@ -41,8 +39,7 @@ def test_ground_levels_a_tilted_vehicle(columns, flight):
 @pytest.mark.parametrize("height", [0.0, -0.2])
 def test_ground_effect_at_most_doubles_the_thrust(columns, flight, height):
     on_ground = level(flight, height)
-    found = columns("ground_effect", on_ground, G=16.0).direct[:, 5, 0]
-    np.testing.assert_allclose(found, on_ground.thrust)
+    np.testing.assert_allclose(columns("ground_effect", on_ground, G=16.0).direct[:, 5, 0], on_ground.thrust)
 
 
 def sinking(flight, speed, sideways=0.0):
@@ -140,12 +137,8 @@ def with_gains(vehicle, thrust, drag=(0.0,) * 4):
 
 def circle(number):
     angles = 2 * np.pi * np.arange(number) / number
-    return VehicleSettings(
-        rotors=tuple(
-            RotorSettings(position_m=(0.3 * np.cos(angle), 0.3 * np.sin(angle), 0.0), spin=1 - 2 * (index % 2))
-            for index, angle in enumerate(angles)
-        )
-    )
+    places = zip(np.cos(angles), np.sin(angles), ([1, -1] * number)[:number], strict=True)
+    return VehicleSettings(rotors=alike(places, arm=0.3))
 
 
 def test_columns_are_what_other_factors_do(columns, flight):

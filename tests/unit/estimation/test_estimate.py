@@ -141,8 +141,7 @@ def test_each_part_is_predicted_by_the_others():
 
 
 def test_neighbours_are_left_out_too():
-    rng = np.random.default_rng(2)
-    z, x = rng.standard_normal((2, 8, 50, 2))
+    z, x = np.random.default_rng(2).standard_normal((2, 8, 50, 2))
     ztz, ztx = z.swapaxes(1, 2) @ z, z.swapaxes(1, 2) @ x
     found = fits_of_others(ztz, ztx, 0.0, neighbours=1)
     far = [0, 1, 5, 6, 7]
@@ -166,8 +165,7 @@ def test_derivatives_by_parts_are_those_of_the_signal():
 def test_windows_lie_in_what_is_usable():
     usable = np.ones(100, dtype=bool)
     usable[[30, 31]] = False
-    begins = window_starts(usable, 20)
-    assert begins.tolist() == [0, 10, 32, 42, 52, 62, 72]
+    assert window_starts(usable, 20).tolist() == [0, 10, 32, 42, 52, 62, 72]
     assert np.flatnonzero(~eroded(usable, 3))[[3, -4]].tolist() == [27, 34]
 
 

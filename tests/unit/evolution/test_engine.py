@@ -185,8 +185,7 @@ def test_failed_models_never_stay_while_there_are_others():
         evaluation.objectives[genes[:, 0] > 30000] = np.nan
         return evaluation
 
-    settings = replace(PAPER, population=40, generations=20, reinsertion="fitness")
-    last = run(failing, settings=settings)[-1]
+    last = run(failing, settings=replace(PAPER, population=40, generations=20, reinsertion="fitness"))[-1]
     assert np.all(np.isfinite(last.objectives))
     assert np.all(np.isfinite(last.front_objectives.min(axis=0)))
 

@@ -15,6 +15,10 @@ from cpfls_cli.evolution.engine import (
     subpopulation_labels,
 )
 
+PARENTS, OFFSPRING = subpopulation_labels(30, 2), subpopulation_labels(24, 2)
+RANKS = np.random.default_rng(1).permutation(54)
+GENES = np.arange(54)[:, np.newaxis]
+
 
 def test_three_bit_code_is_the_published_table():
     table = ["000", "001", "011", "010", "110", "111", "101", "100"]
@@ -108,8 +112,7 @@ def test_intermediate_recombination_stays_in_range_and_takes_its_share_of_the_pa
 
 
 @pytest.mark.parametrize(
-    ("population", "subpopulations", "sizes"),
-    [(75, 5, [15] * 5), (17, 5, [4, 4, 3, 3, 3]), (6, 1, [6])],
+    ("population", "subpopulations", "sizes"), [(75, 5, [15] * 5), (17, 5, [4, 4, 3, 3, 3]), (6, 1, [6])]
 )
 def test_subpopulations_are_as_even_as_possible(population, subpopulations, sizes):
     groups = members(subpopulation_labels(population, subpopulations))
@@ -148,14 +151,8 @@ def test_nobody_moves(subpopulations, rate):
 
 
 def test_a_share_that_is_whole_is_not_rounded_down():
-    labels = subpopulation_labels(200, 2)
-    source = migrate(labels, 0.29, np.random.default_rng(4))
+    source = migrate(subpopulation_labels(200, 2), 0.29, np.random.default_rng(4))
     assert np.count_nonzero(source[:100] != np.arange(100)) == 29
-
-
-PARENTS, OFFSPRING = subpopulation_labels(30, 2), subpopulation_labels(24, 2)
-RANKS = np.random.default_rng(1).permutation(54)
-GENES = np.arange(54)[:, np.newaxis]
 
 
 def split(values, labels):

@@ -25,6 +25,9 @@ from tests.builders.christoffel import torque
 
 # A low order of the harmonics keeps the curvature over the step in attitude small.
 FIRST_ORDER = model_structure(StructureSettings(harmonic_order=1))
+DURATION, STRUCTURE, VEHICLE = 20.0, StructureSettings(), VehicleSettings()
+SMALL = {"starts": 3, "iterations": 20}
+INERTIA = np.array([[0.6, 0.02, -0.01], [0.02, 0.7, 0.03], [-0.01, 0.03, 1.2]])
 
 
 def drawn():
@@ -56,8 +59,7 @@ def test_gradient_of_the_conditioning_is_that_of_differences():
     times, variables = path.times(200), variables_of(path)
     laid_out = design(path, times)
     gradient = laid_out.gradient(conditioning_gradient(FIRST_ORDER, laid_out.motion(variables), 2.0)[1])
-    rng = np.random.default_rng(0)
-    directions = rng.standard_normal((8, *variables.shape))
+    directions = np.random.default_rng(0).standard_normal((8, *variables.shape))
     step = 1e-6
     differences = [
         (smoothed(variables + step * way, path, times) - smoothed(variables - step * way, path, times)) / (2 * step)
@@ -106,10 +108,6 @@ def test_a_path_without_pitch_excites_no_rule_of_pitch():
     structure = model_structure(StructureSettings())
     path = RotationPath(np.zeros(3), np.array([1, 0, 1]), sine, cosine, 20.0)
     assert condition_number(path, structure, 400) > 1e14
-
-
-DURATION, STRUCTURE, VEHICLE = 20.0, StructureSettings(), VehicleSettings()
-SMALL = {"starts": 3, "iterations": 20}
 
 
 def optimised(seed=0, progress=None, structure=STRUCTURE, **settings):
@@ -184,9 +182,6 @@ def test_turns_beyond_the_limits_are_refused():
         optimised(turns=(20, 1, 1))
 
 
-INERTIA = np.array([[0.6, 0.02, -0.01], [0.02, 0.7, 0.03], [-0.01, 0.03, 1.2]])
-
-
 def through_vertical():
     """Motion of a path whose pitch at the first, third and last sample is 90, -90 and again 90 degrees."""
     rng = np.random.default_rng(5)
@@ -209,8 +204,7 @@ def test_harmonic_columns_reach_the_torque_there_too():
     attitude, *_ = motion = through_vertical()
     structure = model_structure(StructureSettings())
     diagonal = np.diag([0.6, 0.7, 1.2])
-    rng = np.random.default_rng(0)
-    seen = rng.uniform(-3, 3, (3, 400, 3))
+    seen = np.random.default_rng(0).uniform(-3, 3, (3, 400, 3))
     coefficients = np.linalg.lstsq(
         regressor_of(structure, seen).reshape(-1, structure.parameters), torque(*seen, diagonal).ravel()
     )[0]

@@ -86,8 +86,7 @@ def test_betaflight_turns_about_one_axis_at_a_time(vehicle):
     lift, roll, pitch, yaw = allocation_matrix(vehicle) @ mixer
     found = np.array([lift, roll, pitch, yaw]) / lift[0]
     # Lift to the right, nose down, counter-clockwise: the last sum enters with the other sign.
-    signs = np.sign(np.diag(found))
-    assert signs.tolist() == [1, 1, 1, -1]
+    assert np.sign(np.diag(found)).tolist() == [1, 1, 1, -1]
     off = found - np.diag(np.diag(found))
     np.testing.assert_allclose(off, 0.0, atol=1e-5 * np.abs(found[1:]).max())
     assert found[1, 1] == pytest.approx(found[2, 2], rel=1e-5)
@@ -180,5 +179,4 @@ def test_what_each_cannot_state_is_said():
 @pytest.mark.parametrize("form", FORMS)
 def test_no_number_is_written_as_minus_nothing(form):
     """A rotor in the plane of the centre of mass has a height of 0 in axes with z down, too."""
-    text = text_of(form, rotors_of(CROSS, height=0.0))
-    assert re.findall(r"(?<![\w.])-0(?:\.0*)?(?![\w.])", text) == []
+    assert re.findall(r"(?<![\w.])-0(?:\.0*)?(?![\w.])", text_of(form, rotors_of(CROSS, height=0.0))) == []

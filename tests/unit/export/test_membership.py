@@ -37,6 +37,7 @@ STRUCTURES = {
     "classic": {"membership_functions": FUNCTIONS, "structure": "fls", "consequents": "seesaw"},
 }
 MIDDLE = [np.nextafter(0.5, 0), 0.5, np.nextafter(0.5, 1)]
+WORDS = {"json": next(line for line in HOW_TO_EVALUATE_INERTIA if Z_FUNCTION in line), "method.md": METHOD.read_text()}
 
 
 @pytest.fixture(params=STRUCTURES)
@@ -174,9 +175,6 @@ def formula(words):
     terms = re.search(r"(\S.*?) up to (?:u = 1/2|the middle) and (.+?) after it", plain).groups()
     left, right = (re.sub(r"(?<=\d) ?(?=[u(])", " * ", term) for term in terms)
     return lambda u: eval(left if u < 0.5 else right, {"u": u})
-
-
-WORDS = {"json": next(line for line in HOW_TO_EVALUATE_INERTIA if Z_FUNCTION in line), "method.md": METHOD.read_text()}
 
 
 @pytest.mark.parametrize("page", WORDS)

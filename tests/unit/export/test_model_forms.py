@@ -26,6 +26,8 @@ from tests.builders.playback_flights import flown, truth
 from tests.builders.spread_vehicles import found_record
 from tests.builders.vehicle_models import HEXA, QUAD, whole
 
+DELAYED = replace(truth(), response=RotorResponse(lag_s=0.035, delay_s=0.013), thrust_linear=0.15)
+
 
 def refuse_constant(name):
     raise AssertionError(f"{name} is no JSON")
@@ -242,9 +244,6 @@ def test_a_name_is_no_longer_than_compilers_tell_names_apart():
     assert checked_identifier(identifier("a" * 5000)) == "a" * 48
     with pytest.raises(InputError, match=r"--name aaaaaaaa\.\.\.: has 5000 letters; at most 48"):
         checked_identifier("a" * 5000)
-
-
-DELAYED = replace(truth(), response=RotorResponse(lag_s=0.035, delay_s=0.013), thrust_linear=0.15)
 
 
 def vehicles(model, count):

@@ -69,8 +69,7 @@ def test_a_library_holds_inertia_that_depends_on_the_attitude(structure):
 @pytest.mark.parametrize("lag", [0.0, 0.035])
 @pytest.mark.parametrize("form", SIMULATORS)
 def test_a_simulator_flies_what_it_holds(form, lag):
-    model = whole(response=RotorResponse(lag_s=lag), remainder=None)
-    _, found = fly(form, model)
+    _, found = fly(form, whole(response=RotorResponse(lag_s=lag), remainder=None))
     assert found.equations.max() < AGREES
     assert found.missing.max() > 1e-3
     assert found.step.max() < 0.3

@@ -152,8 +152,7 @@ RESPONSES = {
 def test_acting_rotors_are_those_of_the_library(response, tmp_path):
     require_gcc()
     model = whole(response=RESPONSES[response], effects=(), remainder=None)
-    rng = np.random.default_rng(7)
-    speed = rng.uniform(500, 1500, (120, 4))
+    speed = np.random.default_rng(7).uniform(500, 1500, (120, 4))
     size = np.repeat([1.0, 1.0, 1500.0, 1 / PERIOD, 1500.0], [1, 4, 4, 4, 4]) * 1500.0
     for form in ("c", "jax"):
         exported = FORMS[form](tmp_path, model)
@@ -259,8 +258,7 @@ def test_numbers_and_terms_have_names(exports):
 
 def test_what_is_not_finite_is_flagged_by_c(exports):
     require_gcc()
-    model = MODELS["harmonic"]
-    points, state = reference_points(model, np.random.default_rng(1), 6), states_of(6)
+    points, state = reference_points(MODELS["harmonic"], np.random.default_rng(1), 6), states_of(6)
     given = np.hstack([points.air, points.rate, points.rotor])
     given[np.arange(3), [0, 4, 9]] = [np.nan, np.inf, -np.inf]
     given[3, 0] = 1e200

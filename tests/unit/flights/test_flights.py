@@ -32,6 +32,9 @@ from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, common_windows
 
 TIME = np.arange(3.0)
 THREE = np.zeros((3, 3))
+SAMPLES = 20
+LENGTH = 30
+PERIOD_S = 0.5
 
 
 @pytest.mark.parametrize(
@@ -90,9 +93,6 @@ def test_a_file_that_does_not_know_its_legs_shows_the_whole_path():
     time, curves = replace(trajectory(), legs=()).first_leg()
     assert len(time) == 5487
     assert curves["displacement"].max() == pytest.approx(64.0)
-
-
-SAMPLES = 20
 
 
 def read(vehicle, speed, **changes):
@@ -230,9 +230,6 @@ def imported(**given):
     return Imported(**(counts | said | given))
 
 
-LENGTH = 30
-
-
 def write_flight(path, samples):
     rng = np.random.default_rng(2)
     signals = {name: rng.normal(size=(samples, 3)) for name in (*MOTION, "torque")}
@@ -280,9 +277,6 @@ def test_another_file_is_refused_with_path_and_remedy(source, change, said):
         next(source.chunks())
 
 
-PERIOD_S = 0.5
-
-
 def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):
     """A flight with a battery that sags, of a log with body torque, or with commands in a unit in its place."""
     rng = np.random.default_rng(4)
@@ -308,11 +302,7 @@ def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):
     [
         ("V", (12.5, -0.3), "voltage is 0 or less at 3 of 90 samples, so it is not used: drop these rows, or check"),
         ("1", (0.9, 0.0), "voltage is 0 or less at 1 of 90 samples"),
-        (
-            "1",
-            (12.5, 10.0),
-            r"12\.5 times that of a full battery, so it is not used: set import\.signals",
-        ),
+        ("1", (12.5, 10.0), r"12\.5 times that of a full battery, so it is not used: set import\.signals"),
     ],
 )
 @pytest.mark.parametrize("read", [recordings.read_flights, playback.flights_to_play])
@@ -331,8 +321,7 @@ def test_a_voltage_that_no_battery_has_is_not_used_and_said(tmp_path, unit, volt
 
 @pytest.mark.parametrize(("unit", "shares"), [("1", True), ("rad/s", False), (None, False)])
 def test_a_flight_to_play_says_whether_its_commands_are_shares_of_a_full_speed(tmp_path, unit, shares):
-    path = driven(tmp_path / "flight.h5", commands=unit)
-    (flight,) = playback.flights_to_play([path], Study())
+    (flight,) = playback.flights_to_play([driven(tmp_path / "flight.h5", commands=unit)], Study())
     assert flight.shares is shares
 
 

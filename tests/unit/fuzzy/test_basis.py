@@ -23,6 +23,11 @@ KINDS = [
     if circular or consequent[0] == "seesaw"
 ]
 RANGE_DATA = np.linspace(-1.1, 0.9, 50)
+CONSEQUENTS = [("seesaw", 1, "additive"), ("harmonic", 1, "additive"), ("harmonic", 2, "tensor")]
+PARTITIONS = [breakpoints(np.array([2.0, 1.0, 3.0, 1.5])), breakpoints(np.array([1.0, 4.0, 2.0]))]
+EPS = 1e-7
+PAGE = (Path(__file__).parents[3] / "docs" / "fuzzy.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 
 
 def evaluate(angles, partitions, circular, input_map, consequents, order, products):
@@ -54,11 +59,6 @@ def test_gradient_is_the_derivative_of_the_value(kind, functions):
         )
         # The slope of a membership has corners, where a central difference is off by half a step times the jump.
         np.testing.assert_allclose(evaluated.gradient[place], (ahead - behind) / (2 * step), atol=1e-4)
-
-
-CONSEQUENTS = [("seesaw", 1, "additive"), ("harmonic", 1, "additive"), ("harmonic", 2, "tensor")]
-PARTITIONS = [breakpoints(np.array([2.0, 1.0, 3.0, 1.5])), breakpoints(np.array([1.0, 4.0, 2.0]))]
-EPS = 1e-7
 
 
 def output(roll, pitch, circular, consequent, input_map="full-circle"):
@@ -159,10 +159,6 @@ def test_beyond_the_ends_the_outer_functions_stay_at_one():
     degrees = memberships(np.array([-0.3, 1.3]), np.array([0.0, 0.4, 1.0]))
     np.testing.assert_array_equal(degrees.value, [[1, 0, 0], [0, 0, 1]])
     np.testing.assert_array_equal(degrees.slope, np.zeros((2, 3)))
-
-
-PAGE = (Path(__file__).parents[3] / "docs" / "fuzzy.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 
 
 @pytest.fixture

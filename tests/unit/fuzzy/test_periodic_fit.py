@@ -66,8 +66,7 @@ def test_the_default_reaches_its_aim_with_noise():
 def test_weight_shrinks_as_rows_below_the_columns_do():
     angles, weight = samples(400), 0.03
     values = surface(angles)
-    settings = PeriodicSettings(membership_functions=4, ridge_weight=weight)
-    system = fit_periodic(angles, values, settings)
+    system = fit_periodic(angles, values, PeriodicSettings(membership_functions=4, ridge_weight=weight))
     A = columns(angles, system.breakpoints, "harmonic", 1, "tensor")
     below = np.sqrt(weight * len(angles)) * np.eye(A.shape[1])
     solution = np.linalg.lstsq(np.vstack([A, below]), np.concatenate([values, np.zeros(A.shape[1])]), rcond=None)[0]

@@ -159,8 +159,7 @@ def test_where_instruments_tell_nothing_or_the_number_may_be_0_nothing_is_named(
 def test_rotors_that_are_measured_are_never_late():
     found = found_with((), [])
     found.hypothesis.can = lambda _candidate: False
-    result = decided_by_instruments(found, [CATALOGUE["motor_lag"]], None)
-    assert result.found is found
+    assert decided_by_instruments(found, [CATALOGUE["motor_lag"]], None).found is found
 
 
 def test_numbers_that_instruments_do_not_tell_are_listed():

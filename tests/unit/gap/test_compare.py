@@ -210,8 +210,7 @@ def test_what_is_repeatable_is_gone_with_the_effect():
 
 
 def test_other_paths_are_not_split():
-    found = compared([recording_of_sines(1, damping), recording_of_sines(2, damping)])
-    assert found.repeatability is None
+    assert compared([recording_of_sines(1, damping), recording_of_sines(2, damping)]).repeatability is None
 
 
 def test_extension_that_does_not_help_is_refused():

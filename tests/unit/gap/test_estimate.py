@@ -1,14 +1,21 @@
-"""Sentences on effects as they were found."""
+"""Estimates of effects: least squares with noisy columns, bounds, how explanations are compared, and what is said."""
 
 import numpy as np
 import pytest
+from scipy.stats import permutation_test, wilcoxon
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.gap.balance.refine import Equations
 from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of
+from cpfls_cli.gap.naming.odds import chance_of_ranks, likely, off_by
+from cpfls_cli.gap.naming.ranking import within_bounds
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
-from tests.builders.gap_flights import candidate, fly, weak
+from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
+
+DAMPING, OFFSET, WIND = (CATALOGUE[name] for name in ("linear_damping", "com_offset", "wind"))
+SURE = np.full(3, 1e-6)
 
 
 def result(name, vehicle=None, **values):
@@ -79,3 +86,155 @@ def test_what_may_be_0_is_not_surely_on_its_bound(low, listed):
     """Also where its interval ends at 0, below which it cannot be."""
     number = Estimate("k_d", "1", 0.05, low, 0.06, (0.0, 0.05))
     assert _on_bounds([number]) == ({number: 0.05} if listed else {})
+
+
+@pytest.mark.parametrize("blocks", [1, 2, 7, 40])
+@pytest.mark.parametrize("mean", [-0.5, 0.0, 0.5])
+def test_the_chance_of_ranks_is_that_of_scipy(blocks, mean):
+    margin = np.random.default_rng(blocks).standard_normal(blocks) + mean
+    expected = wilcoxon(margin, alternative="greater", method="exact").pvalue
+    assert chance_of_ranks(np.append(margin, 0.0)) == pytest.approx(expected, rel=1e-12)
+
+
+def test_equal_margins_share_their_ranks():
+    margin = np.array([1.0, -1.0, 2.0, 2.0, 2.0, -0.5, 3.0, 1.0])
+    ranks = np.array([3.0, 3.0, 6.0, 6.0, 6.0, 1.0, 8.0, 3.0]) * np.sign(margin)
+    above = lambda each: each[each > 0].sum()  # noqa: E731
+    exact = permutation_test((ranks,), above, permutation_type="samples", alternative="greater")
+    assert chance_of_ranks(margin) == pytest.approx(exact.pvalue, rel=1e-12)
+
+
+def test_what_is_equal_is_chance():
+    assert chance_of_ranks(np.zeros(4)) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("explained", "left", "above", "off"),
+    [(1e3, 600.0, 0.0, 10.0), (1e6, 600.0, 0.0, 25.0), (1e6, 1200.0, 600.0, 650.0), (1e4, 1200.0, 600.0, 100.0)],
+    ids=["a tenth of a small gap", "what the floor hides", "what is left above it", "a tenth is the most"],
+)
+def test_formulas_are_off_by_what_is_left_above_the_floor_and_a_tenth_at_most(explained, left, above, off):
+    assert off_by(explained, left, above) == pytest.approx(off)
+
+
+def test_alone_a_set_is_certain():
+    assert likely([]).tolist() == [1.0]
+
+
+def test_what_predicts_every_block_alike_is_as_likely():
+    assert likely([np.zeros(12), np.zeros(12)]) == pytest.approx([1 / 3] * 3)
+
+
+def test_even_odds_of_blocks_multiply():
+    """Where all blocks say the same their weights do not matter: Bayes' rule remains."""
+    odds = np.log([1 / 4, 1 / 19])
+    assert likely([np.full(12, each / 12) for each in odds]) == pytest.approx(
+        [1 / 1.302632, 0.25 / 1.302632, 0.052632 / 1.302632], abs=1e-5
+    )
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_one_block_makes_nothing_certain(sign):
+    """However much it says: were it left out, nothing would be known."""
+    (own, other) = likely([np.r_[sign * 40.0, np.zeros(11)]])
+    assert 0.005 < min(own, other) < 0.1
+    assert (other > own) == (sign > 0)
+
+
+def test_a_refused_sign_takes_out_one_coefficient_only():
+    keep, admissible = within_bounds(DAMPING, np.array([0.1, -0.2, 0.3]), SURE, VEHICLE)
+    assert keep.tolist() == [True, False, True]
+    assert admissible
+
+
+@pytest.mark.parametrize(("length", "admissible"), [(0.10, True), (0.13, False), (-0.13, False)])
+def test_a_centre_of_mass_lies_inside_four_tenths_of_the_arm(length, admissible):
+    keep, found = within_bounds(OFFSET, np.array([length, 0.0]), SURE[:2], VEHICLE)
+    assert found == admissible
+    assert keep.all()
+
+
+def test_what_the_data_leave_open_is_no_reason_to_refuse():
+    far = np.array([0.15, 0.0])
+    assert within_bounds(OFFSET, far, np.array([0.02, 0.02]), VEHICLE)[1]
+    assert not within_bounds(OFFSET, far, np.array([0.01, 0.02]), VEHICLE)[1]
+
+
+def test_a_damping_beyond_all_bodies_is_refused():
+    assert within_bounds(DAMPING, np.array([1.7, 0.0, 0.0]), SURE, VEHICLE)[1]
+    assert not within_bounds(DAMPING, np.array([1.9, 0.0, 0.0]), SURE, VEHICLE)[1]
+
+
+@pytest.mark.parametrize(
+    ("drag", "wind", "error", "admissible"),
+    [(1.3e-3, 8.0, 1e-9, True), (1.3e-3, 20.0, 1e-9, False), (1.3e-3, 20.0, 5e-3, True), (-1.3e-3, 8.0, 1e-9, False)],
+    ids=["usual", "storm", "storm not sure", "drag that pushes"],
+)
+def test_wind_is_bounded_by_its_speed_not_by_its_column(drag, wind, error, admissible):
+    linear = np.array([drag, drag * wind, 0.0])
+    keep, found = within_bounds(WIND, linear, np.full(3, error), VEHICLE)
+    assert keep.all()
+    assert found == admissible
+
+
+RNG = np.random.default_rng(8)
+ROWS = 4000
+TIME = np.linspace(0.0, 1.0, ROWS)
+CLEAN = np.column_stack([np.sin(20 * TIME), np.cos(33 * TIME), np.sin(20 * TIME + 0.4), np.zeros(ROWS)])
+TRUE = np.array([1.0, -2.0, 0.5, 0.0])
+MIXING = np.array([[0.3, 0.0, 0.1, 0.0], [0.0, 0.2, 0.2, 0.0]])
+
+
+def drawn(size, right=0.0, rng=RNG):
+    """Columns with correlated noise, a right side that shares some of it, and noise like both drawn again."""
+
+    def noise():
+        own = size * rng.standard_normal((ROWS, 2))
+        return np.column_stack([own @ MIXING, right * own[:, 0]])
+
+    met = noise()
+    return Equations(CLEAN + met[:, :-1], CLEAN @ TRUE + met[:, -1] + 0.01 * rng.standard_normal(ROWS), noise())
+
+
+def test_without_noise_it_is_least_squares():
+    rows = drawn(0.0)
+    plain = np.linalg.lstsq(rows.columns[:, :3], rows.right, rcond=None)[0]
+    assert rows.solve() == pytest.approx([*plain, 0.0], rel=1e-9, abs=1e-12)
+    assert rows.trusted == 1.0
+
+
+def test_noise_is_taken_off_the_normal_equations():
+    rows = drawn(0.6, right=0.4)
+    noise, own = rows.noise[:, :3], rows.noise[:, -1]
+    gram = rows.columns[:, :3].T @ rows.columns[:, :3] - noise.T @ noise
+    moment = rows.columns[:, :3].T @ rows.right - noise.T @ own
+    assert rows.trusted == 1.0
+    assert rows.solve()[:3] == pytest.approx(np.linalg.solve(gram, moment), rel=1e-8)
+
+
+def test_numbers_that_noise_shrinks_come_out_as_they_are():
+    """Against 200 draws: the mean is the truth to three of its standard errors, that of least squares is not."""
+    rng = np.random.default_rng(3)
+    drawn_rows = [drawn(0.8, right=0.4, rng=rng) for _ in range(200)]
+    found = np.array([rows.solve()[:3] for rows in drawn_rows])
+    plain = np.array([np.linalg.lstsq(rows.columns[:, :3], rows.right, rcond=None)[0] for rows in drawn_rows])
+    error = found.std(axis=0) / np.sqrt(len(found))
+    assert np.all(np.abs(found.mean(axis=0) - TRUE[:3]) < 3 * error)
+    assert np.abs(plain.mean(axis=0) - TRUE[:3]).max() > 0.1
+
+
+def test_no_more_than_half_of_any_combination_is_taken_for_noise():
+    """The difference of the first and the third column is mostly noise."""
+    rows = drawn(5.0)
+    assert 0.0 < rows.trusted < 1.0
+    columns, _ = rows.root
+    left = np.linalg.eigvals(
+        np.linalg.solve(rows.columns[:, :3].T @ rows.columns[:, :3], (columns.T @ columns)[:3, :3])
+    )
+    assert left.real.min() == pytest.approx(0.5, rel=1e-6)
+
+
+def test_about_a_solution_nothing_is_left_to_do():
+    rows = drawn(0.6, right=0.4)
+    there = rows.around(rows.solve(), np.array([True, True, True, False]), np.zeros((ROWS, 0)))
+    assert there.solve() == pytest.approx(np.zeros(3), abs=1e-9)

@@ -1,21 +1,28 @@
-"""What cannot be distinguished, on a system of hand-made effects."""
+"""The search for effects: what cannot be distinguished, steps of their shapes, and small ones by samples."""
 
 from dataclasses import replace
+from itertools import permutations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cpfls_cli.effects.effect import Coefficient, Columns
-from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.gap.balance.balance_system import system
+from cpfls_cli.effects.registry import CATALOGUE, effect
+from cpfls_cli.gap.balance import refine
+from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming import by_samples
+from cpfls_cli.gap.naming.by_samples import _surest, _Test, _Tried
 from cpfls_cli.gap.naming.odds import simplest, unbeaten
 from cpfls_cli.gap.naming.ranking import Scored, rank_effects
 from cpfls_cli.gap.naming.search import alternatives
 from cpfls_cli.gap.settings import GapSettings
-from tests.builders.gap_flights import fly, weak
+from tests.builders.gap_flights import candidate, fly, weak
 
 SETTINGS = GapSettings()
+NAMES = "linear_damping", "rotor_drag", "torque_bias"
+ROUNDED = 1 + np.array([2e-12, 1e-12, 0.0])
 
 
 def hand_made(name, *directions):
@@ -137,3 +144,121 @@ def test_what_no_number_separates_is_what_is_usual(less, wins):
 
 def test_systems_without_flights_of_the_signal_have_no_columns():
     assert system([weak(fly(1))]).columns(Candidate(CATALOGUE["battery_sag"], {"exponent": 1.0})).shape[2] == 0
+
+
+class Ridge:
+    """Squares that fall by next to nothing along steps a thousandth of what the linear system asks for."""
+
+    flights = ()
+    vehicle = None
+    shapes = (SimpleNamespace(bounds=lambda _vehicle: (-1e9, 1e9)),)
+    rotor_wrench = None
+
+    def __init__(self, value, squares, tried):
+        self.shape_values, self.squares, self.tried = np.array([value]), squares, tried
+
+    def following(self, _linear):
+        return np.array([np.nan])
+
+    def with_shapes(self, values):
+        self.tried.append(float(values[0]))
+        assert len(self.tried) < 100
+        step = abs(values[0] - self.shape_values[0])
+        return Ridge(values[0], self.squares - 0.02 if step < 1 else 2e4, self.tried)
+
+    def residual_at(self, _linear):
+        return np.array([[np.sqrt(self.squares)]])
+
+
+def test_a_step_that_has_to_be_a_thousandth_is_none(monkeypatch):
+    asked = SimpleNamespace(solve=lambda: np.array([1000.0]), root=(np.eye(1), np.array([30.0])))
+    monkeypatch.setattr(refine, "_exact", lambda hypothesis, _weight: hypothesis)
+    monkeypatch.setattr(refine, "system", lambda _flights: SimpleNamespace(rotor_wrench=None))
+    monkeypatch.setattr(refine, "torque_loss_ratio", lambda _before, _after: 1.0)
+    monkeypatch.setattr(refine, "fit_within_bounds", lambda *_: (np.zeros(0), np.zeros(0, dtype=bool)))
+    monkeypatch.setattr(refine, "shape_columns", lambda *_: np.ones((1, 1, 1)))
+    monkeypatch.setattr(refine, "equations", lambda *_: SimpleNamespace(around=lambda *_: asked))
+    start = Ridge(0.0, 1e4, [])
+    assert refine.refitted(start, np.ones((1, 1))) is start
+    assert start.tried[0] == 1000.0
+
+
+def test_a_load_whose_mass_goes_as_it_is_fitted_keeps_its_hook(monkeypatch):
+    said = iter([[np.nan, np.nan, 0.1]])
+    monkeypatch.setattr(System, "following", lambda *_: np.array(next(said, [np.nan] * 3)))
+    flight = weak(fly(1, gyro=0.02, rotor=2.0))
+    start = system([flight], [candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.0)])
+    length, _, depth = refine.refitted(start, np.full(6, 1e-4)).shape_values
+    assert depth == 0.1
+    assert length != 0.52
+
+
+def test_columns_are_evaluated_again_only_where_their_shape_or_the_signals_change():
+    load = candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.0)
+    start = system([weak(fly(1))], [candidate("drag_factor_error", error=0.1), candidate("linear_damping"), load])
+    error, length, *others = start.shape_values
+    damping, pull = (start.columns(each) for each in start.free[1:])
+    longer = start.with_shapes(np.array([error, 1.2 * length, *others]))
+    assert longer.columns(longer.free[1]) is damping
+    assert not np.array_equal(longer.columns(longer.free[2]), pull)
+    for moved in (longer, start.with_shapes(np.array([2 * error, length, *others]))):
+        alone = system(moved.flights, moved.chosen)
+        assert np.array_equal(moved.base, alone.base)
+        assert np.array_equal(moved.residual, alone.residual)
+
+
+class Learned:
+    """Answers which of two does without the other."""
+
+    def __init__(self, unneeded):
+        self.unneeded = unneeded
+
+    def tested(self, _effect, own, others):
+        ((other,),) = others
+        return _Test(float((NAMES[own[0]], NAMES[other]) in self.unneeded), *[np.zeros(1)] * 3)
+
+
+def tried(chances, shapes=()):
+    each = [replace(effect(name), shapes=shapes, order=place) for place, name in enumerate(NAMES)]
+    tests = [_Test(chance, *[np.zeros(1)] * 3) for chance in chances]
+    return [
+        _Tried(Candidate(own, {}), np.array([at]), test) for at, (own, test) in enumerate(zip(each, tests, strict=True))
+    ]
+
+
+def chosen(unneeded, tried):
+    best, rivals = _surest(Learned(unneeded), tried, [], 0.01)
+    return best and best.candidate.effect.name, [each.name for each in rivals]
+
+
+@pytest.mark.parametrize("lengths", [(), (0, 900), (4,), (39, 900)])
+def test_a_flight_that_is_shorter_than_a_stretch_shows_no_small_effects(monkeypatch, lengths):
+    sampled = SimpleNamespace(white=None, white_residual=[np.zeros((own, 6)) for own in lengths])
+    monkeypatch.setattr(by_samples, "_Sampled", lambda *_: sampled)
+    found = SimpleNamespace(hypothesis=SimpleNamespace(flights=()))
+    assert by_samples.small_effects(found, (), (), np.ones(6, dtype=bool)) == []
+
+
+@pytest.mark.parametrize("rounded", [*permutations(ROUNDED)])
+def test_of_equally_sure_ones_the_first_is_chosen(rounded):
+    assert chosen((), tried(1e-5 * np.array(rounded))) == (NAMES[0], [])
+
+
+@pytest.mark.parametrize("rounded", [*permutations(ROUNDED)])
+def test_of_those_that_replace_each_other_the_first_of_the_catalogue_is_chosen(rounded):
+    # The second and the third do without each other, the first is less sure.
+    both = [NAMES[1:], NAMES[:0:-1]]
+    assert chosen(both, tried(1e-5 * np.array(rounded) * [10, 1, 1])) == (NAMES[1], [NAMES[2]])
+
+
+def test_what_another_one_replaces_is_not_chosen():
+    assert chosen([NAMES[:2]], tried([1e-6, 1e-5, 1.0])) == (NAMES[1], [])
+
+
+@pytest.mark.parametrize("chances", [[0.02, 0.03, 1.0], [0.005, 0.02, 1.0]])
+def test_what_chance_offers_over_all_that_are_tried_is_not_chosen(chances):
+    assert chosen((), tried(chances)) == (None, [])
+
+
+def test_an_effect_with_shapes_is_not_chosen():
+    assert chosen((), tried([1e-6, 1e-5, 1.0], shapes=effect("motor_lag").shapes)) == (None, [])

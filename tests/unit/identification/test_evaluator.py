@@ -30,6 +30,7 @@ from tests.builders.reference_evaluator import ReferenceEvaluator
 PAPER = {"base": "none", "consequents": "seesaw", "products": "additive", "input_map": "data-range"}
 OFF = LocalSearchSettings(enabled=False)
 WELL_CONDITIONED = 1e6
+STRUCTURE = model_structure(StructureSettings(membership_functions=(2, 3, 1, 5, 6, 7)))
 
 
 @cache
@@ -188,9 +189,6 @@ def test_local_search_ends_in_the_minimum_next_to_its_start(seed):
     expected = fit(plain.refine(start)).mean_squared_error
     assert expected < 0.5 * fit(start).mean_squared_error
     assert found <= expected * (1 + 1e-6)
-
-
-STRUCTURE = model_structure(StructureSettings(membership_functions=(2, 3, 1, 5, 6, 7)))
 
 
 def test_encode_rounds_and_clips_without_making_a_function_of_zero_width():

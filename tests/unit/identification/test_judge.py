@@ -16,6 +16,11 @@ from cpfls_cli.regressor.regressor import Motion
 from cpfls_cli.rotations import body_rate, generalised_torque
 from tests.builders.flights import random_motion, still_flight
 
+RIGID = 6
+WEIGHTS = np.geomspace(1e-6, 1e2, 5)
+PARAMETERS = np.array([0.6, 0.7, 1.2, 0.05, -0.08, 0.1])
+INERTIA = np.array([0.6, 0.7, 1.2, 0.0, 0.0, 0.0])
+
 
 def scores(model, rigid, zero=(1.0, 1.0, 1.0)):
     mse = np.array([[model], [rigid], [zero]])
@@ -40,10 +45,6 @@ def test_the_same_small_numbers_decide_where_the_torque_itself_is_small():
 def test_the_worst_axis_is_named_and_an_axis_without_torque_is_passed_over():
     error, axis = scores((0.1, 0.3, np.nan), (0.1, 0.1, 0.1)).worst("model", "training")
     assert (error, axis) == (pytest.approx(0.3), "pitch")
-
-
-RIGID = 6
-WEIGHTS = np.geomspace(1e-6, 1e2, 5)
 
 
 def problem(fuzzy=9, samples=60, share=0.3, noise=0.5):
@@ -218,9 +219,6 @@ def test_data_that_do_not_fit_are_refused(torque, samples, message):
         TorqueData(np.arange(samples), Motion(zero, zero, zero), torque)
 
 
-PARAMETERS = np.array([0.6, 0.7, 1.2, 0.05, -0.08, 0.1])
-
-
 def tensor(parameters):
     xx, yy, zz, xy, xz, yz = parameters
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -266,17 +264,13 @@ def test_rows_are_weighted_by_axis():
 
 
 def test_variances_are_the_same_chunk_by_chunk(monkeypatch):
-    rng = np.random.default_rng(9)
-    torque, error = rng.standard_normal((2, 50, 3)) + 5.0
+    torque, error = np.random.default_rng(9).standard_normal((2, 50, 3)) + 5.0
     data = still_flight(torque)
     monkeypatch.setattr("cpfls_cli.identification.data.CHUNK", 7)
     predicted = [(torque - error)[start : start + 7] for start in range(0, 50, 7)]
     judged = score_of(data, lambda motion: predicted.pop(0)[: len(motion)])
     np.testing.assert_allclose(judged.vaf, 1 - error.var(axis=0) / torque.var(axis=0))
     np.testing.assert_allclose(judged.r2, 1 - np.mean(error**2, axis=0) / torque.var(axis=0))
-
-
-INERTIA = np.array([0.6, 0.7, 1.2, 0.0, 0.0, 0.0])
 
 
 def small_angle_flight(seed=1, samples=300, yaw=1.0, tilt=0.3):

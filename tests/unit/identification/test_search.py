@@ -24,6 +24,8 @@ from tests.builders.flights import random_flight, rigid_torque
 SETTINGS = IdentificationSettings(
     consequents="seesaw", products="additive", membership_functions=3, population=24, subpopulations=3, generations=6
 )
+SMALL = {"population": 10, "generations": 2, "local_search": LocalSearchSettings(evaluations=2)}
+SEARCHED = {**SMALL, "consequents": "seesaw", "products": "additive", "membership_functions": 3}
 
 
 class Bowls:
@@ -263,10 +265,6 @@ def test_a_refinement_spends_its_budget_and_hands_back_the_products_of_its_genes
     np.testing.assert_array_equal(found.products.gram, again.gram)
     start = problem.point(genes, products).square
     assert found.square < start if evaluations > 1 else found.square == start
-
-
-SMALL = {"population": 10, "generations": 2, "local_search": LocalSearchSettings(evaluations=2)}
-SEARCHED = {**SMALL, "consequents": "seesaw", "products": "additive", "membership_functions": 3}
 
 
 def nearly_rigid_flight(samples=100, noise=0.02, seed=22, limit=np.pi):

@@ -18,6 +18,7 @@ from tests.builders.vehicle_search import CONFIG
 BEFORE_AND_AFTER = "held-out flights before and after, and what to know of the verdict"
 USE = "Take the model with it, extended.h5"
 WRONG = "the inertia about z would have to be 29 times that of the config"
+GUESSED = "guesses from mass and arms are used for what the config leaves open (--accept-guesses); as multiples"
 
 
 def screen(found, **origin):
@@ -77,10 +78,7 @@ def next_steps(found):
             "These flights differ: what shows in some of them does not show in the others.",
         ),
         ({"named": ("gyro_bias",)}, "The sensors are at fault: gyro bias."),
-        (
-            {"named": ("channel_delay",)},
-            "The sensors are at fault: time shift between rotor and gyro channels.",
-        ),
+        ({"named": ("channel_delay",)}, "The sensors are at fault: time shift between rotor and gyro channels."),
         (
             {"named": ("parameter_error",)},
             "A parameter of the vehicle is wrong: Izz over yaw torque +24.0 % against the config.",
@@ -114,9 +112,6 @@ def test_a_wrong_number_of_the_vehicle_is_named_as_people_do():
         "Wrong inertia or thrust scale (parameter_error): Izz over yaw torque +24.0 % [+20.0, +28.1] (p < 10⁻⁶, 93 % of"
         " the gap)."
     ]
-
-
-GUESSED = "guesses from mass and arms are used for what the config leaves open (--accept-guesses); as multiples"
 
 
 @pytest.mark.parametrize(
@@ -183,8 +178,7 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_sepa
 
 def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_shows_them():
     pair = (Alternative("motor_lag", "low_pass_filter", 1.0, "log the speeds of the rotors", "command_delay"),)
-    answer = diagnosis("AMBIGUOUS", named=("low_pass_filter",), alternatives=pair)
-    box, facts, *_ = screen(answer)
+    box, facts, *_ = screen(diagnosis("AMBIGUOUS", named=("low_pass_filter",), alternatives=pair))
     assert "from motor lag with delay of the command" in str(box)
     assert "trajectory" not in facts["Next"]
 

@@ -31,6 +31,10 @@ from tests.builders.forms import in_all_forms, phrases, words
 from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights
 from tests.builders.vehicle_models import QUAD, source_of_vehicle, vehicle_of, whole
 
+WITH = "With offset of the centre of mass"
+NO_EFFECT = "The residual is not repeatable: no effect of the vehicle explains it."
+NOTHING = np.zeros((6, 6))
+
 
 def test_curves_are_distinguished_without_colour():
     looks = [(str(style["linestyle"]), style["linewidth"], style.get("marker")) for style in (MEASURED, BEFORE, HELD)]
@@ -256,11 +260,6 @@ def test_signals_carry_their_units(signal, words):
     assert _signal_words(signal) == words
 
 
-WITH = "With offset of the centre of mass"
-NO_EFFECT = "The residual is not repeatable: no effect of the vehicle explains it."
-NOTHING = np.zeros((6, 6))
-
-
 def shares(**parts):
     """Shares of nothing, but for some channels, by band: all, 2 to 6 Hz, and so on to the slowest."""
     found = NOTHING.copy()
@@ -341,12 +340,7 @@ def test_noise_that_is_larger_than_gusts_is_named():
             f"{WITH}, part of the residual is repeatable, in the torque about y (pitch): more is missing.",
         ),
         # Squares: all of 1.2 of 4.0 is left.
-        (
-            PITCH,
-            1.2,
-            "9 %",
-            f"{WITH}, 9 % at most of the repeatable gap remains: no further effect shows.",
-        ),
+        (PITCH, 1.2, "9 %", f"{WITH}, 9 % at most of the repeatable gap remains: no further effect shows."),
         (
             PITCH + shares(yaw=[0.3, 0.0, 0.0, 0.4, 0.6, 0.0]),
             1.2,
@@ -482,8 +476,7 @@ def test_errors_with_the_past_stand_next_to_those_without():
     player = player_of(VehicleModel(vehicle=SMALL.vehicle), flight)
     known = replace(player, observer=Observer(rate=np.full(6, 20.0), memory_s=np.full(6, 0.5), past_s=0.5))
     pair = Played(flight, player, player, with_past=known)
-    found = replay([pair], 20, 5)
-    held = found.along([pair])
+    held = replay([pair], 20, 5).along([pair])
     assert tuple(held.models) == (*PREDICTIONS, WITH_PAST)
     runs = free_runs(known, flight, flight.starts(20, 5), 20)
     expected = np.linalg.norm(runs.errors[:, :, 3], axis=2).mean(axis=0)

@@ -13,6 +13,8 @@ from cpfls_cli.stage import loaded
 from cpfls_cli.store import findings
 
 FREQUENCY = 10.0 ** (np.arange(-18, 29) / 24)
+STRONG_BELOW = np.where(FREQUENCY < 1.0, 2.5, 1.0)
+LATE_ABOVE = np.where(FREQUENCY > 5.0, np.exp(-1j * np.radians(40)), 1.0)
 
 
 def estimate(ratio=1.0, coherence=0.95, lag_s=0.0, model=True, error=0.02, instrumented=True):
@@ -54,10 +56,6 @@ def answer(made):
     (box,) = [each for each in blocks if isinstance(each, Box)]
     folds = {each.summary: each.blocks for each in blocks if isinstance(each, Folded)}
     return box, [each.text for each in folds["each response in words"]]
-
-
-STRONG_BELOW = np.where(FREQUENCY < 1.0, 2.5, 1.0)
-LATE_ABOVE = np.where(FREQUENCY > 5.0, np.exp(-1j * np.radians(40)), 1.0)
 
 
 def test_a_good_model():

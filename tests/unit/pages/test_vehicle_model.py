@@ -23,6 +23,7 @@ from tests.builders.vehicle_models import number_of, remainder, source_of_vehicl
 
 NAMES = ("inertia.Ixx", "rotor_drag.k_d", "remainder.0_0_0", "remainder_force.3_0_0", "remainder_force.3_0_1")
 LOOP = LoopBounds(np.array([0.21, 0.23, np.nan]), np.array([2.6, 2.4, np.nan]), np.array([0.45, 0.47, np.nan]))
+LAST_UNUSED = (ExplainedBand(2.0, 6.0, np.full(3, 0.97), True), ExplainedBand(1.0, 3.0, np.full(3, 0.97), False))
 
 
 def blocks_of(own):
@@ -62,8 +63,7 @@ def with_first(own, **changed):
 
 
 def of_inertia(own, *moments):
-    model = replace(own.model, vehicle=replace(own.model.vehicle, inertia_kg_m2=moments))
-    return replace(own, model=model)
+    return replace(own, model=replace(own.model, vehicle=replace(own.model.vehicle, inertia_kg_m2=moments)))
 
 
 def test_numbers_without_a_meaning_of_their_own_are_counted_and_not_listed():
@@ -298,9 +298,6 @@ def test_a_response_that_is_off_is_none_of_the_vehicle_and_one_that_is_not_seen_
     assert unseen.verdict == Trust.NOT_JUDGED
     assert "do not show the frequency responses of roll and pitch clearly enough" in " ".join(evidence(unseen))
     assert plain(off)["responses"][0] == {"name": "roll", "cost": 101.0, "low": 0.4, "high": 9.0}
-
-
-LAST_UNUSED = (ExplainedBand(2.0, 6.0, np.full(3, 0.97), True), ExplainedBand(1.0, 3.0, np.full(3, 0.97), False))
 
 
 @pytest.mark.parametrize(

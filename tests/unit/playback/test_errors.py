@@ -57,8 +57,7 @@ def held_out(rate, attitude=None, velocity=None, chance=None, names=FADES):
     within = None if chance is None else np.full(25, chance)
 
     def rows(model):
-        given = (model(horizon), 2 * horizon, 2 * horizon, horizon, 2 * horizon)
-        known = zip(names, given, strict=False)
+        known = zip(names, (model(horizon), 2 * horizon, 2 * horizon, horizon, 2 * horizon), strict=False)
         return {name: (mae, within if name != MODEL or within is None else np.zeros(25)) for name, mae in known}
 
     known = {"body_rate": rate, "attitude": attitude, "velocity": velocity}

@@ -17,9 +17,7 @@ from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown
 from tests.builders.random_flights import VEHICLE, flight_of
 
 OBSERVER = Observer(
-    rate=np.array([20.0, 20.0, 5.0, 9.0, 9.0, 3.0]),
-    memory_s=np.array([0.2, 0.2, 0.5, 0.3, 0.3, 1.0]),
-    past_s=0.2,
+    rate=np.array([20.0, 20.0, 5.0, 9.0, 9.0, 3.0]), memory_s=np.array([0.2, 0.2, 0.5, 0.3, 0.3, 1.0]), past_s=0.2
 )
 MODEL = VehicleModel(vehicle=VEHICLE)
 

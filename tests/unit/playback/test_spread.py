@@ -46,8 +46,7 @@ def test_numbers_lie_in_their_intervals_as_often_as_they_should_and_go_together(
 
 def test_models_have_the_numbers_that_were_drawn():
     model = replace(pushed(), thrust_linear=0.1)
-    record = found_record(model)
-    spread = spread_of(record, 3)
+    spread = spread_of(found_record(model), 3)
     for row, own in zip(spread.values, spread.models, strict=True):
         values = dict(zip(spread.names, row.tolist(), strict=True))
         assert own.vehicle.inertia_kg_m2[:3] == (values["inertia.Ixx"], values["inertia.Iyy"], values["inertia.Izz"])

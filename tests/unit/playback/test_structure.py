@@ -21,9 +21,7 @@ from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown
 
 TRIED = ("linear_damping", "rotor_drag", "flapping_moment", "quadratic_damping", "inertia")
 QUICK = PlaybackSettings(
-    search_windows=20,
-    folds=2,
-    leave_out=tuple(block for block in blocks_of(STATED) if block not in TRIED),
+    search_windows=20, folds=2, leave_out=tuple(block for block in blocks_of(STATED) if block not in TRIED)
 )
 
 

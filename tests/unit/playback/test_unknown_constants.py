@@ -32,6 +32,7 @@ OPEN = validate(
 SETTINGS = PlaybackSettings(
     search_windows=60, leave_out=tuple(block for block in blocks_of(STATED) if block not in TRUE_BLOCKS)
 )
+LOOP = LoopBounds(np.array([0.8, 0.5, np.nan]), np.array([1.1, 1.6, np.nan]), np.array([0.95, 0.6, np.nan]))
 
 
 def found(flights):
@@ -144,9 +145,6 @@ def test_where_nothing_turns_no_factor_of_the_loop_overflows():
     assert _factors(sums).tolist() == [[10.0, 0.1], [1.0, 1.0]]
     assert _explained(np.array([[0.0, 1e10, 0.0, 0.0, 0.0], [4.0, 1.0, 1.0, 0.0, 0.0]])) == pytest.approx([1, 0.25])
     assert Fitted(None, np.zeros(2), 0.0, np.diag([0.0, 1e300])).condition_number < 1e17
-
-
-LOOP = LoopBounds(np.array([0.8, 0.5, np.nan]), np.array([1.1, 1.6, np.nan]), np.array([0.95, 0.6, np.nan]))
 
 
 def test_intervals_hold_what_the_loop_leaves_open():

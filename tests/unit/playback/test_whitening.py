@@ -1,12 +1,22 @@
-"""Innovations of a disturbance that lasts, with noise that is differentiated: white, and nothing that was before."""
+"""Gusts and noise of a residual: innovations, their memory and size, and the parts that a model lacks."""
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.playback.innovations import about_mean, before, predicted, whitening
+from cpfls_cli.estimation.whittle import GaussMarkov
+from cpfls_cli.playback.gusts import GUST_AXES, Gusts
+from cpfls_cli.playback.innovations import ResidualInnovations, about_mean, before, predicted, whitening
+from cpfls_cli.playback.lack import Lack, lack_of
+from tests.builders.playback_flights import truth
 
 KEPT = np.array([0.97, 0.99])
+BLOCKS, WINDOWS = 24, 60
+BLOCK = np.repeat(np.arange(BLOCKS), WINDOWS)
+GUSTS = Gusts(np.array([1e-4, 2e-4, 0.0, 0.01, 0.02, 0.03]), np.array([0.3, 1.2, 1.0, 1.0, 0.1, 0.5]))
+PIECES, FREQUENCIES, STEP_S = 800, 30, 0.02
+KNOWN = np.linspace(2.0, 0.5, FREQUENCIES)
+SHARE, REST, MEMORY_S = np.array([0.3, 0.1, 0.0]), 0.4, 0.5
 
 
 def white_of(found, rows):
@@ -26,8 +36,7 @@ def residual():
 
 
 def test_what_lasts_is_found_below_noise_that_is_differentiated(residual):
-    found = whitening(residual, np.ones(2, dtype=bool))
-    assert np.allclose(found.kept, KEPT, atol=0.002)
+    assert np.allclose(whitening(residual, np.ones(2, dtype=bool)).kept, KEPT, atol=0.002)
 
 
 def test_innovations_are_white_and_correlate_with_nothing_before(residual):
@@ -98,3 +107,145 @@ def test_a_mean_is_taken_off_and_a_constant_leaves_nothing(residual):
     # Not even rounding, which a test of its size would divide by.
     assert not about[:, 2].any()
     assert about_mean(rows[:0]).shape == (0, 3)
+
+
+def innovations_of(new, *, predicted=None, noise=0.0, moved=None):
+    nothing = np.zeros((len(BLOCK), 6))
+    return ResidualInnovations(
+        new,
+        nothing if predicted is None else predicted,
+        np.full(6, noise),
+        nothing[:, :1] if moved is None else moved,
+        BLOCK,
+    )
+
+
+def test_noise_that_nothing_predicts_is_no_part_of_innovations():
+    signal, noise = np.random.default_rng(1).standard_normal((2, len(BLOCK), 6))
+    share, without = innovations_of(signal + noise, predicted=0.5 * signal, noise=1.0).shares
+    assert share == pytest.approx(0.5, abs=0.1)
+    assert without.shape == (BLOCKS, 6)
+    assert np.isnan(innovations_of(noise, noise=2.0).shares[0]).all()
+
+
+def test_a_gust_does_not_grow_with_what_was_before_and_an_effect_does():
+    rng = np.random.default_rng(2)
+    # Gentle and fierce in turn, and by chance.
+    fierce = 1.0 + 3 * (np.sin(np.arange(len(BLOCK)) / 5) > 0)
+    moved = fierce * np.abs(rng.standard_normal(len(BLOCK)))
+    new = rng.standard_normal((len(BLOCK), 6))
+    new[:, 1] *= fierce
+    new[:, 2] /= fierce
+    found = innovations_of(new, moved=np.stack([moved, rng.standard_normal(len(BLOCK))], axis=1))
+    assert found.grows(0.01).tolist() == [False, True, True, False, False, False]
+
+
+def test_what_stands_still_grows_with_nothing():
+    found = innovations_of(np.zeros((len(BLOCK), 6)), moved=np.ones((len(BLOCK), 2)))
+    assert not found.grows(0.05).any()
+
+
+def test_a_gust_has_its_size_and_falls_to_37_percent_within_its_memory():
+    step, count = 0.02, 200_000
+    drawn = GUSTS.drawn(np.random.default_rng(1), step, count)
+    assert drawn.shape == (count, len(GUST_AXES))
+    assert drawn.std(axis=0) == pytest.approx(GUSTS.size, rel=0.05)
+    for column, size, memory in zip(drawn.T, GUSTS.size, GUSTS.memory, strict=True):
+        late = round(memory / step)
+        assert np.mean(column[late:] * column[:-late]) == pytest.approx(size**2 / np.e, rel=0.12)
+
+
+def test_the_first_is_as_large_as_any():
+    rng = np.random.default_rng(2)
+    first = np.array([GUSTS.drawn(rng, 0.01, 1)[0] for _ in range(4000)])
+    assert first.std(axis=0) == pytest.approx(GUSTS.size, rel=0.05)
+
+
+def test_gusts_come_again_with_their_seed():
+    one, other = (GUSTS.drawn(np.random.default_rng(3), 0.01, 50) for _ in range(2))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_white_noise_grows_as_steps_get_shorter():
+    white = Gusts(np.zeros(6), np.ones(6), np.array([1e-3, 0.0, 2e-3, 0.1, 0.2, 0.3]))
+    for step in (0.01, 0.0025):
+        drawn = white.drawn(np.random.default_rng(4), step, 20_000)
+        assert drawn.std(axis=0) * np.sqrt(step) == pytest.approx(white.white, rel=0.03)
+        assert np.abs(np.corrcoef(drawn[1:, 0], drawn[:-1, 0])[0, 1]) < 0.05
+
+
+@pytest.fixture(scope="module")
+def rest():
+    """Spectra of a process seen through pieces of 4 s."""
+    return GaussMarkov.seen_by(np.hanning(200) / np.sqrt(50), STEP_S, 2 * np.pi * 0.25 * np.arange(FREQUENCIES))
+
+
+@pytest.fixture(scope="module")
+def pieces(rest):
+    """Power that is left where parts are of very different sizes on each piece, and the last of them nothing."""
+    rng = np.random.default_rng(5)
+    squares = rng.uniform(0.05, 8.0, (PIECES, 3)) ** 2 * [1.0, 9.0, 0.0]
+    size = REST**2 + squares @ SHARE**2
+    expected = KNOWN + size[:, None] * rest.power(MEMORY_S)[0]
+    return expected * rng.standard_exponential((PIECES, FREQUENCIES)), squares
+
+
+def test_shares_the_rest_and_the_memory_are_found(pieces, rest):
+    found = lack_of(*pieces, KNOWN, rest, (0.05, 8.0))
+    assert found.share[:2] == pytest.approx(SHARE[:2], rel=0.15)
+    assert found.share[2] == 0.0
+    assert found.rest < 3 * REST
+    assert found.memory == pytest.approx(MEMORY_S, rel=0.15)
+
+
+def test_the_unit_of_a_part_does_not_matter(pieces, rest):
+    power, squares = pieces
+    one, other = (
+        lack_of(power, squares, KNOWN, rest, (0.05, 8.0)),
+        lack_of(power, 1e-6 * squares, KNOWN, rest, (0.05, 8.0)),
+    )
+    assert 1e-3 * other.share == pytest.approx(one.share, rel=1e-3)
+
+
+def test_where_nothing_is_lacking_little_is_found(pieces, rest):
+    noise = KNOWN * np.random.default_rng(6).standard_exponential((PIECES, FREQUENCIES))
+    found = lack_of(noise, pieces[1], KNOWN, rest, (0.05, 8.0))
+    size = found.rest**2 + (pieces[1] @ found.share**2).mean()
+    assert size * rest.power(found.memory)[0].mean() < 0.05 * KNOWN.mean()
+
+
+def test_a_model_whose_parts_give_nothing_has_a_rest_alone(rest):
+    rng = np.random.default_rng(7)
+    power = (KNOWN + rest.power(MEMORY_S)[0]) * rng.standard_exponential((PIECES, FREQUENCIES))
+    found = lack_of(power, np.zeros((PIECES, 2)), KNOWN, rest, (0.05, 8.0))
+    assert found.rest == pytest.approx(1.0, rel=0.1)
+    assert not found.share.any()
+
+
+def test_it_is_played_as_large_as_the_parts_are_where_the_vehicle_flies():
+    model, nothing = truth(), [np.nan] * 3
+    share = np.array([[0.3, 0.1, 0.2], [0.0, 2.0, 0.4], [0.1, 0.0, 0.0], *[nothing] * 3])
+    lack = Lack(
+        tuple(one.name for one in model.parts)[:3],
+        share,
+        np.array([0.01, 0.02, 0.0, *nothing]),
+        np.array([0.5, 0.1, 2, *nothing]),
+    )
+    drawn = lack.drawn(model, np.random.default_rng(1), 0.01, 4000)
+    assert drawn.unit[:, :2].std(axis=0) == pytest.approx(1.0, abs=0.15)
+    assert np.corrcoef(drawn.unit[:-1, 1], drawn.unit[1:, 1])[0, 1] == pytest.approx(np.exp(-0.1), abs=0.03)
+    velocity, speed = np.array([2.0, -1.0, 0.5]), np.array([500.0, 600.0, 700.0, 800.0])
+    # No part turns, and all rotors turn alike.
+    alike = np.full(4, np.sqrt((speed**2).mean()))
+    terms = np.concatenate([[1.0], alike, alike**2, np.zeros(8)])
+    still = np.zeros((1, 3))
+    by_part = model.wrench_by_part(velocity[None], still, terms[None])
+    parts = [by_part[name][0] for name in lack.part]
+    size = np.sqrt(
+        lack.rest[:3] ** 2 + sum((own * part[:3]) ** 2 for own, part in zip(share[:3].T, parts, strict=True))
+    )
+    turning = {name: (tuple(part[:3]), tuple(part[3:])) for name, part in zip(lack.part, parts, strict=True)}
+    given = np.array(drawn.at(tuple(drawn.unit[7]), turning))
+    assert given[:3] == pytest.approx(size * drawn.unit[7, :3], rel=1e-9)
+    assert size[1] > 1.02 * lack.rest[1]
+    assert not given[3:].any()

@@ -10,6 +10,9 @@ from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.reduction.training_set import check_space
 from tests.builders.reductions import random_selections, reduce, row_space
 
+FEW = [((11, 12, columns), 8) for columns in (1, 2, 3, 4)]
+REGRESSOR = np.random.default_rng(0).standard_normal((20, 3, 10))
+
 
 def problem(seed, samples=40, columns=8):
     rng = np.random.default_rng(seed)
@@ -54,9 +57,6 @@ def printed_brute_force(Q, size):
         rises = thin[:, -1].max() > max(now * (1 + 1e-9), 1e-6)
         chosen.append(left[int(np.argmax(thin[:, -1] if rises else thin[:, 0]))])
     return chosen
-
-
-FEW = [((11, 12, columns), 8) for columns in (1, 2, 3, 4)]
 
 
 @pytest.mark.parametrize(("given", "size"), [*(((seed,), 25) for seed in range(4)), *FEW])
@@ -228,8 +228,7 @@ def test_the_smallest_and_the_largest_set(size):
 
 
 def test_badly_scaled_samples_are_exchanged_without_squaring_the_condition_number():
-    rng = np.random.default_rng(0)
-    Q = rng.standard_normal((80, 3, 6)) * np.geomspace(1.0, 1e-8, 6)
+    Q = np.random.default_rng(0).standard_normal((80, 3, 6)) * np.geomspace(1.0, 1e-8, 6)
     selection = exchanged(Q, 20)
     greedy = reduce(Q, ReductionSettings(criterion="sigma_min", size=20))
     assert selection.rank == 6
@@ -273,8 +272,7 @@ def test_same_choice_as_in_coordinates_of_full_rank():
 
 
 def test_samples_of_dependent_rows_reach_the_rank_one_by_one():
-    rng = np.random.default_rng(4)
-    Q = rng.standard_normal((30, 1, 6)) * np.array([1.0, 0.5, -2.0])[:, None]
+    Q = np.random.default_rng(4).standard_normal((30, 1, 6)) * np.array([1.0, 0.5, -2.0])[:, None]
     selection = reduce(Q, ReductionSettings(size=12))
     assert selection.rank_trace[:6].tolist() == [1, 2, 3, 4, 5, 6]
     with pytest.raises(SettingError, match="has rank 6, which takes 6 samples"):
@@ -290,8 +288,7 @@ def test_mixed_blocks_prefer_the_sample_that_adds_most_rank():
 
 
 def test_badly_scaled_full_set_keeps_its_small_singular_values():
-    rng = np.random.default_rng(9)
-    Q = rng.standard_normal((50, 3, 6)) * np.geomspace(1.0, 1e-9, 6)
+    Q = np.random.default_rng(9).standard_normal((50, 3, 6)) * np.geomspace(1.0, 1e-9, 6)
     selection = reduce(Q, ReductionSettings(size=20))
     assert selection.rank == 6
     values = [np.linalg.svd(Q[selection.indices[:n]].reshape(-1, 6), compute_uv=False)[-1] for n in range(2, 21)]
@@ -319,9 +316,6 @@ def test_random_selection_has_the_condition_number_of_its_rows():
         assert factor.condition_number == pytest.approx(kept_condition_number(Q, indices, 16), rel=1e-9)
     ((_, few),) = random_selections(Q, 3, 1, np.random.default_rng(0))
     assert (few.rank, few.full_rank, few.condition_number) == (9, False, np.inf)
-
-
-REGRESSOR = np.random.default_rng(0).standard_normal((20, 3, 10))
 
 
 def check_reducible(Q, settings):

@@ -8,18 +8,12 @@ import pytest
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.reduction.settings import ReductionSettings
 from cpfls_cli.reduction.survey import survey
-from cpfls_cli.reduction.training_set import (
-    check_streamed,
-    draw_pool,
-    random_streamed,
-    reduce_streamed,
-)
+from cpfls_cli.reduction.training_set import check_streamed, draw_pool, random_streamed, reduce_streamed
 from tests.builders.reductions import beginning, random_selections, reduce, row_space
 
 
 def regressor(samples=3000, columns=7, seed=0):
-    rng = np.random.default_rng(seed)
-    return rng.standard_normal((samples, 3, columns)) * np.geomspace(1.0, 0.02, columns)
+    return np.random.default_rng(seed).standard_normal((samples, 3, columns)) * np.geomspace(1.0, 0.02, columns)
 
 
 def chunked(Q, size):

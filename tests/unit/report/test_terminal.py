@@ -52,6 +52,8 @@ TABLE = Table(
     ],
     words=frozenset({0, 3}),
 )
+made = {"changed": cache(drawn_changed), "trend": cache(drawn_trend)}
+NOTHING = {"p": 0.5, "causes": (), "numbers": ()}
 
 
 def lines(*blocks, **options):
@@ -158,9 +160,6 @@ def test_what_holds_only_warnings_or_figures_has_no_heading():
     assert [each.text for each in warnings_of([careful])] == ["a gust"]
 
 
-made = {"changed": cache(drawn_changed), "trend": cache(drawn_trend)}
-
-
 def found(name, *sizes, **more):
     """A change of these sizes, each surely not 0."""
     given = tuple(Estimate.around(size, 0.1 * abs(size)) for size in sizes)
@@ -206,9 +205,6 @@ def test_names_and_checks():
     assert cause_name("odd thing") == "odd thing"
     assert what_to_check("scale z").startswith("see whether the gyroscope's range")
     assert what_to_check("odd thing") == "look at the numbers that changed"
-
-
-NOTHING = {"p": 0.5, "causes": (), "numbers": ()}
 
 
 @pytest.mark.parametrize(

@@ -123,10 +123,7 @@ def test_it_is_a_good_artifact_and_equal_states_are_equal_files(checkpoint, tmp_
         (header(mutated_bits=0.5), "identification.mutated_bits = 0.003 there, 0.5 here"),
         (header(ridge={"folds": 7}), "identification.ridge.folds = 5 there, 7 here"),
         (header(generations=2), "identification.generations = 2, but it has reached generation 3"),
-        (
-            header({"flight": replace(INPUTS["flight"], sha256="c" * 64)}),
-            "flight = f.h5 (aaaaaaaaaaaa) there, f.h5 (c",
-        ),
+        (header({"flight": replace(INPUTS["flight"], sha256="c" * 64)}), "flight = f.h5 (aaaaaaaaaaaa) there, f.h5 (c"),
         (header({**INPUTS, "selection": InputFile("s.h5", "d" * 64, "x")}), "selection = none there, s.h5 (dddddddddd"),
         (replace(header(), version="9.9"), "this is 9.9"),
     ],

@@ -31,6 +31,8 @@ from cpfls_cli.weak_form.windows import windows
 from tests.builders.autopilots import CROSS
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, planned, signals_of
 
+USUAL = VehicleSettings()
+
 
 def typical(name):
     """A twentieth of what is possible, to one side and the other in turn; of shapes, what lies in the middle."""
@@ -121,8 +123,7 @@ def pendulum_wrench(signals, values):
 def test_load_pulls_as_a_pendulum_under_the_hook_does():
     values = {"mass": 0.5, "mass_times_depth": 0.05, "mass_times_right": 0.02, "mass_times_behind": -0.01}
     values |= {shape.name: shape.grid[1] for shape in CATALOGUE["payload"].shapes}
-    flight = flown(effects={"payload": values})
-    signals = signals_of(flight)
+    signals = signals_of(flown(effects={"payload": values}))
     weak, left = balance(signals)
     expected = weak.windows.average(pendulum_wrench(signals, values))
     assert rms(expected).min() > 0.02
@@ -204,8 +205,7 @@ def test_battery_empties_by_the_share_that_was_asked_for():
 def test_effects_add_up():
     names = ("com_offset", "rotor_drag", "products_of_inertia", "rotor_acceleration")
     chosen = {name: typical(name) for name in names}
-    flight = flown(effects=chosen)
-    signals = signals_of(flight)
+    signals = signals_of(flown(effects=chosen))
     weak, left = balance(signals)
     listed = simulated_effects(chosen, VEHICLE).listed
     expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in listed)
@@ -285,9 +285,6 @@ def test_parameters_of_no_autopilot_are_refused():
         ClosedLoopSettings(autopilot_parameters={"MC_ROLLRATE_P": 0.1})
     with pytest.raises(SettingError, match="did you mean MC_ROLLRATE_P"):
         ClosedLoopSettings(autopilot="px4", autopilot_parameters={"MC_ROLRATE_P": 0.1})
-
-
-USUAL = VehicleSettings()
 
 
 def of(vehicle=USUAL, *, tilt_max=None, **asked):

@@ -36,6 +36,7 @@ EFFECTS = {
     "com_offset": {"c_x": 0.01, "c_y": -0.02, "c_z": 0.03},
 }
 LOAD = {"mass": 0.4, "mass_times_depth": 0.04, "length_m": 0.6, "damping_1_s": 0.2, "depth_m": 0.1}
+USUAL = VehicleSettings()
 
 
 class Given:
@@ -123,9 +124,6 @@ def test_a_flight_is_that_of_an_adaptive_integrator(load):
     # Of second order: what is left falls to a quarter, and without it next to nothing is left.
     left = np.abs((4 * fine - coarse) / 3 - exact).max(axis=0)
     assert (left < 0.02 * off + 1e-9).all()
-
-
-USUAL = VehicleSettings()
 
 
 def test_values_are_taken_in_the_order_of_the_catalogue_or_by_name():

@@ -18,6 +18,7 @@ from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gap_artifacts import named_effect
 from tests.builders.gusty_flights import SMALL, Truth
 from tests.builders.simulator_files import FRAME, SECTION, rotorpy_of, sdf_of, urdf_of
+from tests.builders.studies import put_file
 
 URDF = """<robot name="cf2">
   <properties arm="0.046" kf="{kf}" km="1.3e-12" thrust2weight="3" drag_coeff_xy="1e-7"/>
@@ -32,6 +33,7 @@ PROP = """  <link name="prop{index}_link"><inertial><origin xyz="{x} {y} 0"/><ma
 
 
 ONE, TWO = (SimpleNamespace(name=f"{name}.csv") for name in ("one", "two"))
+SHIFT = np.array([0.004, -0.003, 0.002])
 
 
 def urdf():
@@ -78,9 +80,7 @@ def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(),
 
 @pytest.fixture
 def mine(tmp_path):
-    path = tmp_path / "mine.sdf"
-    path.write_text(sdf_of(SMALL))
-    return path
+    return put_file(tmp_path / "mine.sdf", sdf_of(SMALL))
 
 
 def replaced(path):
@@ -308,8 +308,7 @@ def test_line_ends_and_comments_stay(mine):
 
 def test_attributes_of_urdf(tmp_path):
     """Its torque is a number of its own, so that a wrong thrust leaves the inertia about z."""
-    path = tmp_path / "cf2x.urdf"
-    path.write_text(urdf())
+    path = put_file(tmp_path / "cf2x.urdf", urdf())
     look = 1 / 0.83 - 1
     wrong = effect("parameter_error", inertia_x=look, inertia_y=0.445, inertia_z=(0.0, 0.004), thrust_scale=-0.17)
     said, new = correct(path, wrong, effect("motor_lag", time_constant_s=(0.03, 0.002)))
@@ -327,8 +326,7 @@ def test_attributes_of_urdf(tmp_path):
 
 
 def test_one_number_for_rotors_that_differ_takes_what_is_common(tmp_path):
-    path = tmp_path / "cf2x.urdf"
-    path.write_text(urdf())
+    path = put_file(tmp_path / "cf2x.urdf", urdf())
     uneven = effect(
         "rotor_mismatch", difference_1=(0.1, 0.001), difference_2=0.0, drag_imbalance=0.0, lift_imbalance=0.0
     )
@@ -349,8 +347,7 @@ def test_one_number_for_rotors_that_differ_takes_what_is_common(tmp_path):
 
 
 def test_what_urdf_without_km_cannot_hold_is_listed(tmp_path):
-    path = tmp_path / "cf2x.urdf"
-    path.write_text(urdf().replace('km="1.3e-12" ', ""))
+    path = put_file(tmp_path / "cf2x.urdf", urdf().replace('km="1.3e-12" ', ""))
     said, _ = correct(path, effect("drag_factor_error", error=(0.3, 0.02)), vehicle=SMALL.vehicle)
     assert said.elsewhere == (
         "yaw torque over thrust, as a factor on that which flights were compared with: all rotors 1.3 [1.28, 1.32]; "
@@ -371,8 +368,7 @@ MJCF = """<mujoco model="cf2">
 
 def test_inertia_and_centre_of_mjcf(tmp_path):
     """Its controls are thrusts: what the flights say of them has no place in the file, and is listed."""
-    path = tmp_path / "cf2.xml"
-    path.write_text(MJCF)
+    path = put_file(tmp_path / "cf2.xml", MJCF)
     of, vehicle = of_log(read_model(path), None, None), SMALL.vehicle
     effects = (
         effect("parameter_error", inertia_x=0.445, thrust_scale=-0.17),
@@ -406,8 +402,7 @@ GEARS = """<mujoco model="cf2">
 
 def test_gear_of_mjcf_is_thrust_and_yaw_torque(tmp_path):
     """Controls are squared speeds: the thrust in the third number, the torque in the sixth, each by its gain."""
-    path = tmp_path / "cf2.xml"
-    path.write_text(GEARS)
+    path = put_file(tmp_path / "cf2.xml", GEARS)
     look = 1 / 0.83 - 1
     wrong = effect("parameter_error", inertia_x=look, inertia_y=look, inertia_z=0.0, thrust_scale=-0.17)
     said, new = correct(path, wrong, effect("drag_factor_error", error=0.25))
@@ -425,8 +420,7 @@ def test_gear_of_mjcf_is_thrust_and_yaw_torque(tmp_path):
 
 
 def test_uneven_rotors_of_mjcf_each_have_their_gear(tmp_path):
-    path = tmp_path / "cf2.xml"
-    path.write_text(GEARS)
+    path = put_file(tmp_path / "cf2.xml", GEARS)
     said, new = correct(path, effect("rotor_mismatch", difference_1=(0.1, 0.001), difference_2=0.0, drag_imbalance=0.0))
     assert replaced(path) == [("1", "1.05"), (".006", "0.0063"), ("2e-8", "1.9e-08"), ("1.2e-10", "1.14e-10")]
     assert [each.element for each in said.changes] == ["gear z", "gear z", "gear yaw", "gear yaw"]
@@ -434,8 +428,7 @@ def test_uneven_rotors_of_mjcf_each_have_their_gear(tmp_path):
 
 
 def test_a_filter_of_mjcf_is_the_lag(tmp_path):
-    path = tmp_path / "cf2.xml"
-    path.write_text(GEARS.replace("<general ", '<general dyntype="filterexact" dynprm="0.02 0" '))
+    path = put_file(tmp_path / "cf2.xml", GEARS.replace("<general ", '<general dyntype="filterexact" dynprm="0.02 0" '))
     said, _ = correct(path, effect("motor_lag", time_constant_s=(0.04, 0.002)))
     assert replaced(path) == [("0.02", "0.04")] * 4
     assert [change.sentence for change in said.changes] == ["time constant of M1 to M4 is 100 % more"]
@@ -510,8 +503,7 @@ def test_each_file_says_its_own_changes(tmp_path):
     whole = (
         "<sdf version='1.9'><model name='w'><include merge='true'><uri>model://base</uri></include>\n{}</model></sdf>"
     )
-    path = tmp_path / "whole" / "model.sdf"
-    path.write_text(whole.format("".join(plugins)))
+    path = put_file(tmp_path / "whole" / "model.sdf", whole.format("".join(plugins)))
     of = of_log(read_model(path), None, None)
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
                             effects=(effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17),))  # fmt: skip
@@ -542,8 +534,7 @@ def lines_that_differ(path):
 
 def test_python_is_corrected_in_place(tmp_path):
     """Literals in place, what is an expression as a whole; effects whose formula RotorPy has among them."""
-    path = tmp_path / "mine.py"
-    path.write_text(rotorpy_of(SMALL).replace("'Ixx': 3.7e-05", "'Ixx': 37e-6 * 1.0"))
+    path = put_file(tmp_path / "mine.py", rotorpy_of(SMALL).replace("'Ixx': 3.7e-05", "'Ixx': 37e-6 * 1.0"))
     said, new = correct(
         path,
         effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17),
@@ -573,8 +564,7 @@ def test_python_is_corrected_in_place(tmp_path):
 
 
 def test_a_curve_is_corrected_in_proportion(tmp_path):
-    path = tmp_path / "params.toml"
-    path.write_text(SECTION.format(name="a"))
+    path = put_file(tmp_path / "params.toml", SECTION.format(name="a"))
     before = read_model(path)
     beside = effect("motor_lag", time_constant_s=(0.2, 0.002)), effect("rotor_drag", k_d=(1e-6, 1e-8))
     said, new = correct(path, effect("parameter_error", inertia_x=0.0, thrust_scale=-0.17), *beside)
@@ -616,13 +606,9 @@ def test_a_direction_that_no_flight_shows_stays(mine):
     """The log states another one, and its flight has no speeds of rotors."""
     of = replace(of_log(read_model(mine), None, None), spins=(-1, 1, -1, -1))
     found = SimpleNamespace(verdict="NO_GAP", contradictions=(), rivals={}, effects=(), not_excited=())
-    flight = SimpleNamespace(name="one.csv", rotor_speed=None)
-    said, files = corrected(of, SMALL.vehicle, found, [flight])
+    said, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name="one.csv", rotor_speed=None)])
     assert files["mine.sdf"] == mine.read_bytes()
     assert said.unchanged[0].startswith("directions of rotors: no flight of more than 5 s")
-
-
-SHIFT = np.array([0.004, -0.003, 0.002])
 
 
 def shifted(path):
@@ -663,8 +649,7 @@ def test_rotors_of_rotorpy_move_around_its_centre(tmp_path):
 
 def test_rotors_of_crazyflow_move_in_its_plane(tmp_path):
     """Its mixing matrix times L has the levers of thrust, and none of heights."""
-    path = tmp_path / "params.toml"
-    path.write_text(SECTION.format(name="a"))
+    path = put_file(tmp_path / "params.toml", SECTION.format(name="a"))
     said, new, before = shifted(path)
     np.testing.assert_allclose(new.hubs[:, :2], before.hubs[:, :2] - SHIFT[:2], rtol=0, atol=3e-5)
     entries = {f"a.mixing_matrix[{row}][{rotor}]" for row in (0, 1) for rotor in range(4)}

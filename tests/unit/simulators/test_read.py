@@ -15,6 +15,7 @@ from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.gusty_flights import LARGE, SMALL
 from tests.builders.playback_flights import truth
 from tests.builders.simulator_files import sdf_of, urdf_of
+from tests.builders.studies import put_file
 from tests.builders.vehicle_models import HEXA, vehicle_of, whole
 
 CLOSE = {"rtol": 1e-9, "atol": 1e-15}
@@ -78,12 +79,10 @@ def test_rotors_of_mjcf_are_those_that_were_written(tmp_path):
 
 
 def test_every_number_has_its_line(tmp_path):
-    path = tmp_path / "mine.sdf"
-    path.write_text(sdf_of(SMALL))
+    path = put_file(tmp_path / "mine.sdf", sdf_of(SMALL))
     read, lines = read_model(path), path.read_text().splitlines()
     thrust = read.rotors[1].thrust
-    line = int(thrust.where.partition("line ")[2].partition(":")[0])
-    assert "<motorConstant>" in lines[line - 1]
+    assert "<motorConstant>" in lines[int(thrust.where.partition("line ")[2].partition(":")[0]) - 1]
     assert path.read_bytes()[thrust.span.start : thrust.span.end] == f"{thrust.value:.6g}".encode()
     assert "base_link" in read.where_of_mass
 
@@ -112,9 +111,7 @@ def test_links_with_poses_add_up(tmp_path):
 
 
 def test_a_plugin_without_a_number_has_its_own(tmp_path):
-    path = tmp_path / "mine.sdf"
-    text = sdf_of(SMALL).replace("<momentConstant>0.006</momentConstant>", "")
-    path.write_text(text)
+    path = put_file(tmp_path / "mine.sdf", sdf_of(SMALL).replace("<momentConstant>0.006</momentConstant>", ""))
     ratio = read_model(path).rotors[0].ratio
     assert ratio.value == 0.016
     assert ratio.span is None
@@ -234,8 +231,7 @@ def test_rotors_of_urdf_on_arms_of_their_own_are_in_the_axes_of_what_these_hang_
     ],
 )
 def test_urdf_with_motor_plugins_is_refused(tmp_path, change, words):
-    path = tmp_path / "bad.urdf"
-    path.write_text(urdf_of(SMALL).replace(*change))
+    path = put_file(tmp_path / "bad.urdf", urdf_of(SMALL).replace(*change))
     with pytest.raises(InputError) as refused:
         read_model(path)
     assert words in str(refused.value)
@@ -255,8 +251,7 @@ def test_urdf_with_motor_plugins_is_refused(tmp_path, change, words):
     ],
 )
 def test_encodings_that_are_not_read(tmp_path, content, words):
-    path = tmp_path / "mine.urdf"
-    path.write_bytes(content)
+    path = put_file(tmp_path / "mine.urdf", content)
     with pytest.raises(InputError, match=words):
         read_model(path)
 
@@ -430,8 +425,7 @@ BAD = {
 def test_a_bad_file_is_refused_in_one_sentence(tmp_path, name):
     text, words = BAD[name]
     assert text != GOOD
-    path = tmp_path / "bad.sdf"
-    path.write_text(text)
+    path = put_file(tmp_path / "bad.sdf", text)
     with pytest.raises(InputError) as refused:
         read_model(path)
     message = str(refused.value)
@@ -461,8 +455,7 @@ def test_units_and_frames_of_the_page_are_those_of_the_table():
 
 def test_what_no_vehicle_has_is_said(tmp_path):
     """A moment larger than the others together; rotors of one turn on either side, as those of Menagerie's X2."""
-    path = tmp_path / "odd.sdf"
-    path.write_text(sdf_of(SMALL))
+    path = put_file(tmp_path / "odd.sdf", sdf_of(SMALL))
     assert read_model(path).notes == ()
     path.write_text(sdf_of(SMALL, inertia=(1.0, 1.0, 1.5), spins=(-1, -1, 1, 1)))
     moment, turns = read_model(path).notes

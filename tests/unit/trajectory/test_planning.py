@@ -17,6 +17,11 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 GRAVITY = 9.81
 CHAIN = ["position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop"]
+PRINTED = [64.0, 8.0, 2.0, 1.0, 1.0, 2.0, 2 * np.pi]
+FREQUENCIES = np.array([1.3, 0.9, 1.7])
+PHASES = np.array([0.2, 1.1, 2.3])
+AMPLITUDES = np.array([6.0, 5.0, 4.0])
+DURATION = 20.0
 
 
 @pytest.fixture(scope="module")
@@ -216,19 +221,12 @@ def test_nothing_moves_where_nothing_is_asked():
     assert [(move.outcome, move.duration) for move in moves] == [(MoveOutcome.ZERO_DISPLACEMENT, 0.0)] * 3
 
 
-PRINTED = [64.0, 8.0, 2.0, 1.0, 1.0, 2.0, 2 * np.pi]
-
-
-@pytest.fixture
-def unit_profile():
-    return BaseProfile(amplitude=1.0, period=1.0)
-
-
-def test_peaks_are_the_printed_ones(unit_profile):
-    peaks = unit_profile.peaks
+def test_peaks_are_the_printed_ones():
+    profile = BaseProfile(amplitude=1.0, period=1.0)
+    peaks = profile.peaks
     values = [peaks.displacement, peaks.velocity, peaks.acceleration, peaks.jerk, peaks.snap, peaks.crackle, peaks.pop]
     np.testing.assert_allclose(values, PRINTED, rtol=1e-12)
-    assert unit_profile.duration == 16.0
+    assert profile.duration == 16.0
 
 
 def test_covering_chooses_the_amplitude():
@@ -282,11 +280,6 @@ def test_a_displacement_that_is_not_finite_is_refused(value):
     with pytest.raises(SettingError, match="give a finite length") as refused:
         plan_move(value, Limits(velocity=1.0))
     assert refused.value.key == "displacement"
-
-
-FREQUENCIES = np.array([1.3, 0.9, 1.7])
-PHASES = np.array([0.2, 1.1, 2.3])
-AMPLITUDES = np.array([6.0, 5.0, 4.0])
 
 
 def oscillation(time):
@@ -346,9 +339,6 @@ def test_sideways_thrust_is_refused():
     translation[0, 0] = [0.0, 5.0, -GRAVITY]
     with pytest.raises(ComputationError, match=r"roll of 90 degrees at t = 0 s"):
         flat_attitude(np.zeros(1), translation, np.zeros((3, 1)), GRAVITY)
-
-
-DURATION = 20.0
 
 
 def drawn(seed=0, **settings):

@@ -48,8 +48,7 @@ def jerk_limited_duration(displacement, velocity, acceleration, jerk):
 
 
 def test_limits_up_to_the_jerk_give_the_move_of_seven_segments():
-    rng = np.random.default_rng(5)
-    displacement, velocity, acceleration, jerk = 10 ** rng.uniform(-3, 3, (4, 1000))
+    displacement, velocity, acceleration, jerk = 10 ** np.random.default_rng(5).uniform(-3, 3, (4, 1000))
     moves = plan_moves(displacement, Limits(velocity=velocity, acceleration=acceleration, jerk=jerk))
     expected = [jerk_limited_duration(*case) for case in zip(displacement, velocity, acceleration, jerk, strict=True)]
     np.testing.assert_allclose(moves.duration, expected, rtol=1e-13)

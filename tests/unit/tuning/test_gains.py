@@ -31,6 +31,8 @@ WIDE = Spread((0.85, 1.2), (0.8, 1.3), (1.0, 1.0))
 
 
 USUAL = AskedMargins()
+FREQUENCY = np.geomspace(0.002, 200.0, 2000)
+S = 2j * np.pi * FREQUENCY
 
 
 def found(name, spread=CERTAIN, asked=USUAL, lag=0.03):
@@ -105,10 +107,6 @@ def test_a_log_that_pauses_is_as_noisy_as_before():
     paused = noise_of([(time + 1e6 * (time > 5), rate)])
     assert paused.density.mean() == pytest.approx(whole.density.mean(), rel=0.05)
     assert noise_of([(np.zeros(len(time)), rate)]) is None
-
-
-FREQUENCY = np.geomspace(0.002, 200.0, 2000)
-S = 2j * np.pi * FREQUENCY
 
 
 def test_margins_of_an_integrator_with_a_delay():

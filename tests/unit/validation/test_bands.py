@@ -19,6 +19,8 @@ from tests.builders.flights import still_flight
 
 RANGE = InputRange(-1.0, 1.0)
 BODY = np.array([0.6, 0.8, 1.2, 0.05, 0.0, -0.03])
+BEST = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
+STRUCTURE = model_structure(IdentificationSettings(harmonic_order=1))
 
 
 def model(visited):
@@ -63,10 +65,6 @@ def test_near_a_vertical_pitch_noise_says_nothing_of_a_body():
 def test_no_cell_was_visited():
     own = model(np.zeros((72, 72), dtype=bool))
     assert definite_share(own, random_draws(own, 0.05)) is None
-
-
-BEST = np.array([0.6, 0.7, 1.2, 0.03, -0.02, 0.04])
-STRUCTURE = model_structure(IdentificationSettings(harmonic_order=1))
 
 
 def drawn(roll, pitch):

@@ -34,6 +34,9 @@ from tests.builders.flights import bent_torque, random_flight, still_flight
 
 BLOCKS, ROWS, PARAMETERS = 6, 9, 5
 TOLERANCE = 1e-10
+CONSTANT = np.array([0.4, -0.3, 0.2])
+SAMPLES = 300
+VALIDATION = ValidationSettings(folds=4)
 
 
 @pytest.fixture(params=[0.0, 3.0], ids=["free", "penalised"])
@@ -120,9 +123,6 @@ def test_a_block_that_alone_determines_a_direction_gives_finite_draws():
     np.testing.assert_array_equal(scores.draws(np.ones((3, 2)), TOLERANCE), np.zeros((3, 2)))
 
 
-CONSTANT = np.array([0.4, -0.3, 0.2])
-
-
 def test_equal_models_differ_by_chance_as_often_as_they_should():
     rng = np.random.default_rng(61)
     found = [compare_errors(*rng.lognormal(sigma=1.0, size=(2, MOST_COMPARED)), 1.0) for _ in range(1500)]
@@ -195,8 +195,7 @@ def test_windows_apart_do_not_overlap():
 
 
 def test_torque_is_scaled_by_axis_and_left_out_where_the_pitch_is_vertical():
-    rng = np.random.default_rng(63)
-    torque = rng.standard_normal((400, 3)) * [10.0, 1.0, 0.1]
+    torque = np.random.default_rng(63).standard_normal((400, 3)) * [10.0, 1.0, 0.1]
     attitude = np.zeros((400, 3))
     attitude[::7, 1] = np.pi / 2
     result = np.arange(400) % 7 != 0
@@ -326,10 +325,6 @@ def test_one_rule_of_harmonics_has_no_use_for_an_input_map():
 )
 def test_names(keys, name):
     assert structure_name(StructureSettings(**keys)) == name
-
-
-SAMPLES = 300
-VALIDATION = ValidationSettings(folds=4)
 
 
 def bending_flight(bent=0.0, noise=0.05, samples=SAMPLES):

@@ -22,6 +22,9 @@ from cpfls_cli.validation.verdict import Reason, Verdict, _band, confirmed_axes,
 from tests.builders.flights import rigid_torque, rotating_motion, still_flight
 
 INERTIA = np.array([0.6, 0.8, 1.2, 0.0, 0.0, 0.0])
+LOOP = LoopBounds(np.full(3, 0.5), np.full(3, 2.0), np.array([0.5, 0.8, 0.1]))
+RANGE = InputRange(-1.0, 1.0)
+BODY = np.array([0.6, 0.8, 1.2, 0.05, 0.0, -0.03])
 
 
 def rotating_flight():
@@ -115,9 +118,6 @@ def test_a_constant_torque_is_taken_off_what_was_measured():
     assert np.mean(found.window_error[1]) > 1.5 * np.mean(plain.window_error[1])
 
 
-LOOP = LoopBounds(np.full(3, 0.5), np.full(3, 2.0), np.array([0.5, 0.8, 0.1]))
-
-
 def visited(roll, pitch):
     cells = np.zeros((72, 72), dtype=bool)
     cells[np.ix_(roll, pitch)] = True
@@ -190,10 +190,6 @@ def test_the_band_of_a_moment_is_no_narrower_than_instruments_know_it():
     known.identification.freed = None
     (reason,) = _band(known)
     assert "0.5 %" in reason.text
-
-
-RANGE = InputRange(-1.0, 1.0)
-BODY = np.array([0.6, 0.8, 1.2, 0.05, 0.0, -0.03])
 
 
 def model(rigid_body=BODY, visited=None, d11=0.0):

@@ -109,8 +109,7 @@ def test_nothing_follows_an_input_that_stays_what_it_is():
 
 
 def test_rounding_is_not_called_coloured():
-    rng = np.random.default_rng(51)
-    torque = rng.standard_normal((500, AXES)) * [5.0, 1.0, 0.1]
+    torque = np.random.default_rng(51).standard_normal((500, AXES)) * [5.0, 1.0, 0.1]
     data = flight_of_errors(torque)
     slow = 1e-12 * np.sin(0.01 * np.arange(500))[:, None] * [1.0, 1.0, 0.0]
     found = examine_residuals("x", data, lambda _: torque + slow + [0.0, 0.0, 1.0] * torque, 20)
@@ -192,8 +191,7 @@ def test_a_mean_of_rounding_or_of_three_samples_is_not_tested():
 
 def test_a_perfect_model_with_noise_follows_nothing():
     """The measured torque holds the error: correlated with it, a perfect model would not look perfect."""
-    rng = np.random.default_rng(63)
-    torque, noise = rng.standard_normal((2, 3000, AXES)) * [[[1.0]], [[0.2]]]
+    torque, noise = np.random.default_rng(63).standard_normal((2, 3000, AXES)) * [[[1.0]], [[0.2]]]
     data = replace(flight_of_errors(noise), torque=torque + noise)
     found = examine_residuals("x", data, lambda _: torque, 10)
     own = found.correlation[found.input.index("predicted roll torque"), 10, 0]

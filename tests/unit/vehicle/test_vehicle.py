@@ -30,6 +30,7 @@ from cpfls_cli.vehicle.values import (
     transposed,
     zero,
 )
+from tests.builders.vehicles import alike
 
 F = ARRAYS
 CASES = {
@@ -47,6 +48,9 @@ CASES = {
     "rotors": lambda x, y: F.total(F.rotors([1.0, -2.0, 0.5]) * x + y) * x + F.total(F.rotors([1.0, 2.0]) * y),
     "vectors": lambda x, y: dot(cross((x, y, 0), (0, y, x)), (1.0, 2.0, x)),
 }
+A, B = (0.3, -1.2, 2.5), (1.1, 0.4, -0.7)
+THRUST, DRAG, ARM = 121.5e-6, 2.7e-6, 0.3
+REACTION = CATALOGUE["rotor_acceleration"]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -83,9 +87,6 @@ def test_a_polynomial_has_a_value_for_each_product_of_its_numbers():
 def test_what_is_no_polynomial_is_refused(case):
     with pytest.raises(NoPolynomialError):
         case(Polynomial.number("a"))
-
-
-A, B = (0.3, -1.2, 2.5), (1.1, 0.4, -0.7)
 
 
 def formulas(functions, a, b):
@@ -185,17 +186,9 @@ def test_derivatives_are_written_as_numbers_with_derivatives_have_them():
         np.testing.assert_allclose(own[-1], (one - other) / 2e-6, rtol=1e-6, atol=1e-7)
 
 
-THRUST, DRAG, ARM = 121.5e-6, 2.7e-6, 0.3
-
-
 def ring(count, spins):
     angles = 2 * np.pi * np.arange(count) / count
-    return VehicleSettings(
-        rotors=tuple(
-            RotorSettings(position_m=(np.cos(angle), np.sin(angle), 0.0), spin=spin)
-            for angle, spin in zip(angles, spins, strict=True)
-        )
-    )
+    return VehicleSettings(rotors=alike(zip(np.cos(angles), np.sin(angles), spins, strict=True)))
 
 
 def test_plus_layout_follows_the_hand_formulas():
@@ -210,17 +203,8 @@ def test_plus_layout_follows_the_hand_formulas():
 
 def test_cross_layout_follows_the_simulator_rotorpy():
     d, k, b = 0.1202081528, 5.57e-6, 1.36e-7
-    hubs = [(d, d, -1), (d, -d, 1), (-d, -d, -1), (-d, d, 1)]
-    rotors = tuple(
-        RotorSettings(position_m=(x, y, 0.0), spin=spin, thrust_factor_n_s2=k, drag_factor_n_m_s2=b)
-        for x, y, spin in hubs
-    )
-    expected = [
-        [k, k, k, k],
-        [k * d, -k * d, -k * d, k * d],
-        [-k * d, -k * d, k * d, k * d],
-        [b, -b, b, -b],
-    ]
+    rotors = alike([(1, 1, -1), (1, -1, 1), (-1, -1, -1), (-1, 1, 1)], k, b, d)
+    expected = [[k, k, k, k], [k * d, -k * d, -k * d, k * d], [-k * d, -k * d, k * d, k * d], [b, -b, b, -b]]
     np.testing.assert_allclose(allocation_matrix(VehicleSettings(rotors=rotors)), expected)
 
 
@@ -291,9 +275,6 @@ def test_a_wrench_that_is_not_finite_is_refused():
 def test_wrong_number_of_rotors_is_refused():
     with pytest.raises(ComputationError, match=r"rotor_speed: expected shape \(time, 4\), got \(1, 6\)"):
         body_wrench(VehicleSettings(), np.zeros((1, 6)))
-
-
-REACTION = CATALOGUE["rotor_acceleration"]
 
 
 @pytest.mark.parametrize(

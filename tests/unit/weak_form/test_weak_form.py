@@ -15,6 +15,7 @@ TIME = 3.0 + 0.01 * np.arange(500)
 LOCAL = np.array(TIME - 5.5)
 THROUGH = windows(0.01, 0.4, 0.5)
 CUBIC = st.lists(st.floats(-5, 5, allow_subnormal=False), min_size=4, max_size=4)
+WINDOWS, CHANNELS, COLUMNS, BLOCKS = 60, 6, 5, 4
 
 
 @given(CUBIC)
@@ -73,9 +74,6 @@ def test_count_is_the_number_of_windows_that_fit(samples):
 def test_windows_of_few_samples_are_refused_by_name():
     with pytest.raises(InputError, match=r"gap.window_s = 0.05: holds 5 samples at 100 Hz; at least 8"):
         windows(0.01, 0.05, 0.5)
-
-
-WINDOWS, CHANNELS, COLUMNS, BLOCKS = 60, 6, 5, 4
 
 
 def problem(seed=0, draws=None):

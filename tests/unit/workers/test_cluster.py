@@ -94,10 +94,7 @@ def test_a_vanished_worker_is_replaced_by_the_other_until_that_vanishes_too(tmp_
 
 
 def test_a_vanished_scheduler_is_an_error_in_words(tmp_path, capfd):
-    with (
-        dask_cluster(tmp_path, workers=1) as (address, scheduler, _),
-        cluster(EVALUATOR, address) as workers,
-    ):
+    with dask_cluster(tmp_path, workers=1) as (address, scheduler, _), cluster(EVALUATOR, address) as workers:
         parts = workers.stream(GENES)
         next(parts)
         scheduler.kill()

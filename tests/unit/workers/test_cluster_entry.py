@@ -11,6 +11,8 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.workers.compatibility import Processor, processor, require_same_processor, require_same_versions
 from cpfls_cli.workers.workforce import employ, require_address
 
+OWN = processor()
+
 
 class Client:
     """A connection to workers of which one has something else."""
@@ -42,9 +44,6 @@ def test_equal_versions_pass():
 def test_a_worker_with_other_software_is_named(package, answer, words):
     with pytest.raises(ComputationError, match=f"worker tcp://10.0.0.2:40001 {words}.*install the same"):
         require_same_versions(Client(package, answer))
-
-
-OWN = processor()
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from tests.builders.evaluators import DEADLY_POISON, POISON, Failing, Loading, L
 
 ROOT = Path(__file__).parents[3]
 GENES = np.random.default_rng(5).integers(0, 32768, (40, 6))
+ROWS = np.arange(12).reshape(6, 2)
 
 
 def column(*values):
@@ -175,9 +176,6 @@ def test_an_interrupt_of_the_whole_group_reaches_only_the_parent(parent):
     errors = parent.communicate()[1]
     assert errors.count("Traceback") == 1
     assert errors.strip().endswith("KeyboardInterrupt")
-
-
-ROWS = np.arange(12).reshape(6, 2)
 
 
 class Backwards(Workforce):
