@@ -423,7 +423,7 @@ def even_step(values: Array) -> float:
 def evenly_rising(columns: Mapping[str, Array]) -> dict[str, float]:
     """Give the steps of columns that may be a clock: alone by its name, and no count of rows or of anything else."""
     groups = column_groups(columns)
-    others = {column for group in groups if len(group.columns) > 1 for column in group.columns}
+    others = {name for group in groups if group.kind in ("xyz", "angles") for name in group.columns}
     for group in groups:
         unit = WRITTEN.get(_symbols(group.ending))
         others |= {*group.columns} if {*group.words} & vocabulary.NO_CLOCK or (unit and unit[0] != "us") else set()
