@@ -60,11 +60,10 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     if wanted is not None:
         return LogContents({"": read_csv(path, set(wanted))}, units)
     left_out = sorted(set(names) - {*numeric, ""})
-    warnings = (f"columns that hold text are left out: {some(left_out, MOST_LISTED)}",) if left_out else ()
-    if names.count("") > 1 and first.get("", "").strip():
-        warnings += ("columns without a name are left out",)
+    warnings = [f"columns that hold text are left out: {some(left_out, MOST_LISTED)}"] * bool(left_out)
+    warnings += ["columns without a name are left out"] * (names.count("") > 1 and bool(first.get("", "").strip()))
     columns = read_csv(path, set(numeric))
-    return LogContents({"": {name: columns[name] for name in numeric}}, units, warnings=warnings)
+    return LogContents({"": {name: columns[name] for name in numeric}}, units, warnings=tuple(warnings))
 
 
 def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
