@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.flightlog.topics import STAMP, YAW_RESETS
 from cpfls_cli.logs.formats import log_contents
+from cpfls_cli.logs.records import stamps_while
 from tests.builders import ulogs
 from tests.builders.dataflash_logs import dataflash
 
@@ -147,3 +148,9 @@ def test_what_ardupilot_does_not_call_a_reset_is_none(tmp_path):
         assert YAW_RESETS not in topics
         jumps = [abs((b - a + 180) % 360 - 180) for a, b in pairwise(topics["ATT"]["Yaw"])]
         assert (max(jumps) > 100.0) == bool(len(turns))
+
+
+def test_a_log_that_never_flies_has_the_axes_of_most_of_it():
+    stamps, changes = np.arange(5.0), np.array([1.0, 3.0])
+    assert stamps_while(stamps, changes, np.array([True, False])).tolist() == [1.0, 2.0]
+    assert stamps_while(stamps, changes, np.array([False, False])).tolist() == stamps.tolist()
