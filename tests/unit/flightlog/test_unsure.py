@@ -359,7 +359,7 @@ def test_what_alone_rises_evenly_is_the_clock_and_said_to_be(name, factor, unit)
         {"Distance": 5 * OWN.time},
         {"x_ref": OWN.time},
         {"battery_mah": OWN.time},
-        {"Tiempo_V": OWN.time},
+        {"Tiempo_deg": OWN.time},
     ],
 )
 def test_what_is_counted_or_means_another_thing_and_two_that_rise_are_no_clock(others):

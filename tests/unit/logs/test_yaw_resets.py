@@ -135,6 +135,12 @@ def test_of_ardupilot_s_resets_near_each_other_each_is_undone(tmp_path, first, s
     np.testing.assert_allclose(np.degrees(topics[YAW_RESETS]["turn"]), resets[:, 1], atol=1.0)
 
 
+def test_an_event_of_ardupilot_is_of_one_turn(tmp_path):
+    resets = np.array([[20.0, 20.0], [20.3, 12.0]])
+    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, (20.1, 62)], resets))
+    assert log_contents(tmp_path / "log.bin").topics[YAW_RESETS][STAMP] == pytest.approx([20.0])
+
+
 def test_ardupilot_s_reset_that_is_as_small_as_what_vibration_makes_is_none(tmp_path):
     marked = [(at, 62) for at in np.arange(12.0, 48.0, 3.0)]
     (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, *marked], (), noise_rad_s=1.0))
