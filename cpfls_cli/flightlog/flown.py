@@ -206,12 +206,15 @@ def _carried(signs: Signs, largest: float) -> BoolArray:
         # By the mean force, in which vibration is none.
         of_hover = level / np.sqrt(np.maximum(np.linalg.norm(averaged(signs.felt, signs.period, _TURN_S), axis=1), 1.0))
     hover = float(np.median(of_hover[level > _OF_LARGEST * largest]))
-    if signs.felt is not None:
-        # In a fast climb rotors give less thrust: it hovers at no more than the level at which it is lifted.
+    if signs.felt is not None and signs.slow is not None:
+        # In a fast climb rotors give less thrust: it hovers at no more than the level at which it is lifted, and turns,
+        # as it does not on the ground, where an accelerometer may read too much.
         hits = np.linalg.norm(signs.felt, axis=1) > HARD
         lifted = np.linalg.norm(averaged(signs.felt, signs.period, SLOW_S), axis=1) > _LIFTS
-        lifted &= (level > ALIVE) & ~binary_dilation(
-            hits, np.ones(2 * max(1, round(SLOW_S / signs.period)) + 1, dtype=np.bool_)
+        lifted &= (
+            (level > ALIVE)
+            & (signs.slow > LIVELY_RAD_S)
+            & ~binary_dilation(hits, np.ones(2 * max(1, round(SLOW_S / signs.period)) + 1, dtype=np.bool_))
         )
         least = float(np.quantile(of_hover[lifted], 0.25)) if lifted.sum() * signs.period > _SHORT_S else hover
         hover = least if least < _OF_CLIMB * hover else hover

@@ -128,6 +128,7 @@ class Named:
         return self.rank >= _BY_AXES
 
 
+_ON_A_WING = 0.4  # Rad.
 # What to do where names do not tell what columns hold.
 BY_HAND: Final = "use common names (gyro_x, roll, rpm_1), or write import.signals of a config by hand"
 # In small letters, in capitals, and each part with a capital, as in frontLeft and FrontLeft.
@@ -169,7 +170,9 @@ def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             )
             if (kind == "angles" and len(axes[0]) > 1) or (ends and (begins or kind in ("xyz", "wxyz"))):
                 columns = tuple(f"{before}{axis}{after}" for axis in axes)
-                if all(column in names for column in columns):
+                # Among P, Q, R and X, Y, Z there are R, P, Y too.
+                others = axes[0] in "rR" and {f"{before}{own}{after}" for own in "qQxX"} & names.keys()
+                if all(column in names for column in columns) and not others:
                     yield ColumnGroup(f"{before}*{after}", kind, columns)
 
 
@@ -298,10 +301,18 @@ def height_columns(names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], fl
             yield (name,), known_unit(stated[0]).factor * stated[1]
 
 
-def only_of_airplanes(names: tuple[str, ...]) -> list[str]:
-    """List columns that only airplanes log: an airspeed and an angle to it; none where one is missing."""
-    found = [next((name for name in names if {*_words(name)} & {*own}), "") for own in vocabulary.AIRPLANE_WORDS]
-    return found if all(found) else []
+def only_of_airplanes(columns: Mapping[str, Array]) -> list[str]:
+    """List an airspeed and an angle to it that stays small in flight, as on a wing; none where one is missing."""
+    words = {name: {*ColumnGroup(name, "one", (name,)).words} - vocabulary.WITH_AIRPLANE for name in columns}
+    alone = {name: own.pop() for name, own in words.items() if len(own) == 1}
+    found = [next((name for name, own in alone.items() if own in known), "") for known in vocabulary.AIRPLANE_WORDS]
+    if not all(found):
+        return []
+    speed, angle = np.abs(np.array([columns[name] for name in found], dtype=float))
+    # A multirotor that measures the wind has it from any side.
+    flies = angle[np.isfinite(angle) & (speed > 0.5 * np.max(speed, initial=0.0, where=np.isfinite(speed)))]
+    most = _ON_A_WING if np.max(flies, initial=0.0) < 2 * np.pi else np.degrees(_ON_A_WING)
+    return found if len(flies) and np.quantile(flies, 0.9) < most else []
 
 
 _SETPOINT_OF: Final[Mapping[SignalName, SignalName]] = {
@@ -345,9 +356,11 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
         turns = ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
         if signal == "body_rate":
             return turns or group.pqr
-        # What is asked about an axis is no angle, and letters are angles where a word says so.
-        letters = len(group.axis) == 1 and not own & meaning.words
-        return not (turns or group.pqr or letters or own & {*group.last_words} & ASKED)
+        # What is asked about an axis is no angle, but a structure of outputs may hold some; letters need a word.
+        part = {*_words(group.pattern.rpartition("/")[2])}
+        asked = part & {*ASKED, "out"} or {*group.last_words} & ASKED - {"output"}
+        letters = len(group.axis) == 1 and not own & meaning.words and group.columns != ("R", "P", "Y")
+        return not (turns or group.pqr or letters or asked)
     if signal == "voltage" and "bat" in own:
         return ending is not None and ending[0] == "V"
     return bool({*words[-meaning.last :]} & meaning.words)
@@ -364,7 +377,7 @@ def _means_rotors(signal: SignalName, group: ColumnGroup, own: set[str], ends_in
     turning = last - AIMED - ASKED == {"w"} and (asked or len(own) == 1)
     counted = last - AIMED - ASKED == {"n"} and asked
     fast = bool(own & vocabulary.FAST) or (many and (turning or counted or ends_in_speed))
-    motors = last - AIMED == {"m"} or bool(vocabulary.MOTORS & own)
+    motors = last - AIMED == {"m"} or bool(vocabulary.MOTORS & own and not vocabulary.TELEMETRY & own)
     if signal == "rotor_speed":
         return fast and not asked
     return bool(last & ASKED) or "pwm" in own or (asked if fast else motors)
@@ -405,6 +418,17 @@ def even_step(values: Array) -> float:
     step = float(np.median(steps))
     # A pause of the recording counts as one step.
     return step if float(np.minimum(np.abs(steps - step), step).mean()) < _EVEN * step else 0.0
+
+
+def evenly_rising(columns: Mapping[str, Array]) -> dict[str, float]:
+    """Give the steps of columns that may be a clock: alone by its name, and no count of rows or of anything else."""
+    groups = column_groups(columns)
+    others = {name for group in groups if group.kind in ("xyz", "angles") for name in group.columns}
+    for group in groups:
+        unit = WRITTEN.get(_symbols(group.ending))
+        others |= {*group.columns} if {*group.words} & vocabulary.NO_CLOCK or (unit and unit[0] != "us") else set()
+    steps = {name: even_step(values) for name, values in columns.items() if name not in others}
+    return {name: step for name, step in steps.items() if step not in (0.0, 1.0)}
 
 
 def nameless_clock(columns: Mapping[str, Array]) -> str | None:

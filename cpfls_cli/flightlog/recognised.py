@@ -16,7 +16,7 @@ from cpfls_cli.flightlog.agreement import handed
 from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
-from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, even_step, named_signals, nameless_clock
+from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, evenly_rising, named_signals, nameless_clock
 from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
@@ -181,7 +181,7 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     clock = nameless_clock(fields)
     if clock is not None:
         return clock, "s", ""
-    even = {name: step for name, values in fields.items() if (step := even_step(values)) not in (0.0, 1.0)}
+    even = evenly_rising(fields)
     for name, step in even.items() if len(even) == 1 else ():
         for unit in (unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]):
             return name, unit, f"{name} alone rises evenly, by {step:.3g}: taken for the stamps, in {unit}"

@@ -97,7 +97,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     candidates = motion_columns.without_other_axes(log, candidates)
     rotors = find_rotors(_of_rotors(log, candidates), parameters, system)
     rotors = rotors if rotors.driving else find_mixed(log) or rotors
-    if rotors.driving is None and log.flat and (only := only_of_airplanes(log.names)):
+    if rotors.driving is None and log.flat and (only := only_of_airplanes(log.topics[""])):
         raise InputError(f"a log of {AIRPLANE} ({joined(only)}), {NO_MULTIROTOR}")
     log, rotors, rebuilt = with_rebuilt(log, rotors, parameters, system)
     shares = None

@@ -93,8 +93,10 @@ WRITTEN: Final = {
 IN_FULL: Final[dict[str, str]] = _TABLE["in_full"]
 ONE_WORD: Final[dict[str, str]] = _TABLE["one_word"]
 A_WORD, RATE_WORDS, WISHED, FAST = (_each(name) for name in ("a_word", "rate_words", "wished", "fast"))
-ASKED, AIMED, MOTORS, HEIGHT = _each("asked"), _each("aimed") | WISHED, _each("motors"), _each("height")
+ASKED, AIMED, HEIGHT = _each("asked"), _each("aimed") | WISHED, _each("height")
+MOTORS, TELEMETRY = _each("motors"), _each("telemetry")
 AIRPLANE_WORDS: Final[list[list[str]]] = _TABLE["airplane"]
+WITH_AIRPLANE: Final = _each("with_airplane")
 FAMILIES: Final = tuple((kind, tuple(axes)) for kind, *axes in _rows("families"))
 NOT_MEASURED, SECOND_HAND = _each("not_measured"), _each("second_hand")
 TOPICS_OF_PX4: Final = _each("topics_of_px4")
@@ -109,6 +111,10 @@ MEANINGS: Final = tuple(
         *(frozenset(own.replace("@rate_words", _TABLE["rate_words"]).split()) for own in words),
     )
     for signal, kinds, number, last, *words in _rows("meanings", "|")
+)
+# "Current" may be the current time.
+NO_CLOCK: Final = (_each("no_clock") | ASKED | HEIGHT | TELEMETRY | NOT_MEASURED - {"current"}).union(
+    *(own.words for own in MEANINGS if own.signal != "position")
 )
 RANGES: Final = tuple(Range._make((*map(_number, row[:5]), *row[5:7], tuple(row[7:]))) for row in _rows("ranges", "|"))
 

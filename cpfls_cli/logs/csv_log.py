@@ -29,8 +29,8 @@ _LONGEST_LINE = 1 << 20
 _LONGEST_ROW = 64  # Lines of the first row.
 _LONGEST_LIST = 50  # Numbers of a list that becomes columns: of a vehicle nothing is longer, a scan is.
 _REMARKS: Final = ("#", "%", "//")  # With which a remark before the column names begins.
-# With which what Betaflight's log viewer exports begins; a spreadsheet drops the quotes and fills lines with commas.
-_EXPORT: Final = re.compile(r'"?Product"?,"?Blackbox flight data recorder')
+# With which what Betaflight's log viewer exports begins; a spreadsheet drops the quotes and fills lines.
+_EXPORT: Final = re.compile(r'"?Product"?[,;]"?Blackbox flight data recorder')
 # A number as it is written in much of Europe, where semicolons separate columns.
 _DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
 
@@ -59,10 +59,11 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     units = {name: "s" for name in numeric if _kind(first[name]) == "time"}
     if wanted is not None:
         return LogContents({"": read_csv(path, set(wanted))}, units)
-    left_out = sorted(set(names) - set(numeric))
-    warnings = (f"columns that hold text are left out: {some(left_out, MOST_LISTED)}",) if left_out else ()
+    left_out = sorted(set(names) - {*numeric, ""})
+    warnings = [f"columns that hold text are left out: {some(left_out, MOST_LISTED)}"] * bool(left_out)
+    warnings += ["columns without a name are left out"] * (names.count("") > 1 and bool(first.get("", "").strip()))
     columns = read_csv(path, set(numeric))
-    return LogContents({"": {name: columns[name] for name in numeric}}, units, warnings=warnings)
+    return LogContents({"": {name: columns[name] for name in numeric}}, units, warnings=tuple(warnings))
 
 
 def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:

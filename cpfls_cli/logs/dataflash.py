@@ -50,6 +50,8 @@ _NO_FACTOR = "-?0"
 _YAW_RESET, _TAKES_OFF, _LANDS = 62, (28,), (11, 18)
 # The attitude is logged 10 times a second; below this, rad, its stamps and the gyroscope's make such turns as well.
 _RESET_WITHIN_S, _LEAST_TURN = 0.25, 0.05
+_AROUND_S, _BEYOND = 2.0, 4.0  # And the multiple of what is usual about it.
+_MOST_RESETS = 100  # Of a log that is not damaged.
 _SCALED = "cCeEL"
 # Our names of units that ArduPilot calls otherwise.
 _UNITS = {"m/s/s": "m/s^2", "degheading": "deg", "RPM": "rpm", "PWM": "us"}
@@ -154,7 +156,8 @@ def _of_tables(
         for topic, fields in _topics(kind, tables[kind.name], stamps[kind.name], stated.get(kind.name, {}))
     }
     if not topics and is_sdlog2(tables):
-        return of_messages(path, {kind.name: kind.begins for kind in kinds.values()}, tables, _parameters(tables))
+        places = {kind.name: kind.begins for kind in kinds.values() if kind.begins}
+        return of_messages(path, places, tables, _parameters(tables))
     if topics.keys() <= {"GPS", *_EVENTS} and "ATT" in tables:
         raise InputError(f"{path}: {_NO_STAMPS}")
     if not topics:
@@ -190,21 +193,29 @@ def _undo_yaw_resets(topics: dict[str, dict[str, Array]]) -> None:
     time, read = attitude[STAMP], gyro[STAMP]
     roll, pitch, yaw = (np.radians(attitude[name]) for name in ("Roll", "Pitch", "Yaw"))
     leant, nose = (np.interp(read, time, own) for own in (roll, pitch))
-    rate = (gyro["GyrY"] * np.sin(leant) + gyro["GyrZ"] * np.cos(leant)) / np.cos(nose)
+    rate = np.nan_to_num((gyro["GyrY"] * np.sin(leant) + gyro["GyrZ"] * np.cos(leant)) / np.cos(nose))
     turned = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(read)))
     beyond = np.asarray(wrapped(np.diff(yaw) - np.diff(np.interp(time, read, turned))))
-    rows = set()
-    for at in event[STAMP][event["Id"] == _YAW_RESET]:
-        near = np.flatnonzero((time[1:] >= at - _RESET_WITHIN_S) & (time[:-1] <= at + _RESET_WITHIN_S))
-        rows |= {int(near[np.abs(beyond[near]).argmax()])} if len(near) else set()
-    kept = np.array([row for row in sorted(rows) if abs(beyond[row]) > _LEAST_TURN], dtype=int)
+    sizes, turns = np.abs(beyond), []
+    for at in np.unique(event[STAMP][event["Id"] == _YAW_RESET])[:_MOST_RESETS]:
+        away = np.maximum(time[:-1] - at, at - time[1:])
+        near = np.flatnonzero(away <= _RESET_WITHIN_S)
+        # What late stamps or vibration make about it is as large.
+        least = max(_LEAST_TURN, _BEYOND * float(np.median(sizes[away <= _AROUND_S]))) if len(near) else np.inf
+        turns += [(-sizes[row], away[row], float(at), int(row)) for row in near if sizes[row] > least]
+    marked: dict[int, float] = {}
+    for _, _, at, row in sorted(turns):
+        # Each event is of a turn of its own.
+        if row not in marked and at not in marked.values():
+            marked[row] = at
+    kept = np.array(sorted(marked), dtype=int)
     if len(kept):
         topics[YAW_RESETS] = {STAMP: time[kept + 1], "turn": beyond[kept]}
         takes_off, lands = (np.isin(event["Id"], own) for own in (_TAKES_OFF, _LANDS))
         aloft = stamps_while(time, event[STAMP][takes_off | lands], takes_off[takes_off | lands])
-        turns = np.degrees(undone_turns(time, time[kept + 1], beyond[kept], aloft))
+        undone = np.degrees(undone_turns(time, time[kept + 1], beyond[kept], aloft))
         for name in {"Yaw", "DesYaw"} & attitude.keys():
-            attitude[name] = (attitude[name] + turns) % 360.0
+            attitude[name] = (attitude[name] + undone) % 360.0
 
 
 def _all_stamps(kinds: Mapping[int, _Kind], tables: Mapping[str, np.ndarray]) -> dict[str, Array]:

@@ -55,16 +55,15 @@ def seconds(stamps: np.ndarray, origin: int, per_second: int) -> Array:
 def undone_turns(stamps: Array, resets: Array, turns: Array, aloft: Array) -> Array:
     """Compute by how much to turn each stamp's yaw so that no reset of an estimator shows, rad.
 
-    Into the axes that hold for most of the stamps aloft, of all where there are none: an estimator resets a yaw that it
-    knows better by then, and what it says on the ground is of other iron. Positions and velocities by satellites are in
-    true axes throughout.
+    Into the axes that hold for most of the stamps aloft: an estimator resets a yaw that it knows better by then, and
+    what it says on the ground is of other iron. Positions and velocities by satellites are in true axes throughout.
     """
     left = np.append(np.cumsum(turns[::-1])[::-1], 0.0)
-    held = np.bincount(np.searchsorted(resets, aloft if len(aloft) else stamps, side="right"))
+    held = np.bincount(np.searchsorted(resets, aloft, side="right"))
     return np.asarray(left[np.searchsorted(resets, stamps, side="right")] - left[held.argmax()], dtype=float)
 
 
 def stamps_while(stamps: Array, changes: Array, on: BoolArray) -> Array:
-    """Keep the stamps at which what changes at times is on; before its first change it is not."""
-    state = np.append(False, on)
-    return np.asarray(stamps[state[np.searchsorted(changes, stamps, side="right")]], dtype=float)
+    """Keep the stamps at which what changes at times is on, or all if it never is; at first it is not."""
+    state = np.append(False, on)[np.searchsorted(changes, stamps, side="right")]
+    return np.asarray(stamps[state] if state.any() else stamps, dtype=float)

@@ -119,15 +119,14 @@ def _undo_yaw_resets(topics: dict[str, dict[str, Array]]) -> None:
     topics[YAW_RESETS] = {STAMP: resets, "turn": turns}
     landed = topics.get("vehicle_land_detected", {})
     stated = landed.keys() >= {STAMP, "landed"}
-    aloft = stamps_while(stamps, landed[STAMP], landed["landed"] == 0) if stated else np.empty(0)
+    aloft = stamps_while(stamps, landed[STAMP], landed["landed"] == 0) if stated else stamps
     for topic, names in (("vehicle_attitude", _QUATERNION), ("vehicle_attitude_setpoint", _ASKED_FOR)):
-        fields = topics.get(topic, {})
-        if not fields.keys() >= {STAMP, *names}:
-            continue
+        fields = topics.get(topic, {STAMP: np.empty(0)})
         half = 0.5 * undone_turns(fields[STAMP], resets, turns, aloft)
-        w, x, y, z = (fields[name] for name in names)
-        c, s = np.cos(half), np.sin(half)
-        fields |= dict(zip(names, (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w), strict=True))
+        if fields.keys() >= {*names}:
+            w, x, y, z = (fields[name] for name in names)
+            c, s = np.cos(half), np.sin(half)
+            fields |= dict(zip(names, (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w), strict=True))
         if "yaw_body" in fields:
             fields["yaw_body"] = np.asarray(wrapped(fields["yaw_body"] + 2 * half))
 

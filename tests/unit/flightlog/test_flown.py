@@ -264,6 +264,16 @@ def test_who_climbs_fast_for_most_of_a_flight_hovers_below_what_the_climb_takes(
     assert flown.span_s == (pytest.approx(3.5, abs=0.3), pytest.approx(37.7, abs=0.3))
 
 
+def test_what_idles_for_long_under_an_accelerometer_that_reads_too_much_stands():
+    level = np.interp(TIME, [0, 1, 18, 19, 36, 36.5, 39, 40], [0, 0.2, 0.2, 0.5, 0.5, 0.2, 0.2, 0])
+    wobbles = between(19, 36, 0.1) * np.sin(2 * TIME)
+    rate = np.column_stack([turning(18, 36.5, 0.4), 0 * TIME, 0 * TIME])
+    felt = np.column_stack([0 * TIME, 0 * TIME, 1.2 * (1 + 2 * wobbles)])
+    rotors = np.repeat((level * (1 + wobbles))[:, None], 4, axis=1)
+    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=felt))
+    assert flown.span_s == (pytest.approx(18.5, abs=0.4), pytest.approx(36.2, abs=0.4))
+
+
 @pytest.mark.parametrize("held", [False, True])
 def test_a_sensor_off_the_centre_of_what_vibrates_shows_no_test_stand(held):
     """A vibration of 8 Hz turns with the force that its lever makes; on a stand the weight turns slowly too."""

@@ -1,5 +1,6 @@
 """Names of columns: which belong together, what they may be, what they are not."""
 
+import numpy as np
 import pytest
 
 from cpfls_cli.flightlog.names import column_groups, height_columns, named_signals, only_of_airplanes, wished_signals
@@ -111,6 +112,14 @@ def first(names, signal, system=""):
         ("x_dot y_dot z_dot", "velocity", "x_dot y_dot z_dot"),
         ("xdot ydot zdot", "velocity", "xdot ydot zdot"),
         ("bat_volt", "voltage", "bat_volt"),
+        # A structure of outputs holds what was measured; what is asked for is a command in volts too.
+        ("out/roll out/pitch out/yaw", "attitude", "out/roll out/pitch out/yaw"),
+        ("output/roll output/pitch output/yaw", "attitude", "output/roll output/pitch output/yaw"),
+        ("/camera/gyro.x /camera/gyro.y /camera/gyro.z", "body_rate", "/camera/gyro.x /camera/gyro.y /camera/gyro.z"),
+        ("volts_cmd_1 volts_cmd_2 volts_cmd_3", "rotor_command", "volts_cmd_1 volts_cmd_2 volts_cmd_3"),
+        ("esc1 esc2 esc3 esc4", "rotor_command", "esc1 esc2 esc3 esc4"),
+        ("R P Y", "attitude", "R P Y"),
+        ("v_dot_x v_dot_y v_dot_z", "acceleration", "v_dot_x v_dot_y v_dot_z"),
         ("batV", "voltage", "batV"),
         # The first instance of a topic bears no number.
         ("ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM", "rotor_speed", "ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM"),
@@ -153,6 +162,15 @@ def test_columns_are_found_by_their_names(names, signal, columns):
         ("battery_w", "voltage"),
         ("motor_temp_1 motor_temp_2 motor_temp_3 motor_temp_4", "rotor_command"),
         ("bat", "voltage"),
+        ("battery_percentage", "voltage"),
+        ("battery_remaining", "voltage"),
+        ("esc1_voltage esc2_voltage esc3_voltage esc4_voltage", "rotor_command"),
+        ("esc_curr_1 esc_curr_2 esc_curr_3 esc_curr_4", "rotor_command"),
+        ("motor_power_1 motor_power_2 motor_power_3 motor_power_4", "rotor_command"),
+        ("roll_out pitch_out yaw_out", "attitude"),
+        ("X Y Z P Q R", "attitude"),
+        ("kp_r kp_p kp_y", "attitude"),
+        ("v_dot_x v_dot_y v_dot_z", "velocity"),
     ],
 )
 def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
@@ -173,9 +191,23 @@ def test_what_is_commanded_may_be_a_setpoint(names, signal):
     assert [named.signal for named in own] == [signal]
 
 
-def test_what_only_airplanes_log_is_known_by_its_words():
-    assert only_of_airplanes(("t", "roll", "airspeed", "aoa_deg")) == ["airspeed", "aoa_deg"]
-    assert not only_of_airplanes(("t", "airspeed", "roll", "yaw"))
+@pytest.mark.parametrize(
+    ("names", "angle", "found"),
+    [
+        ("airspeed aoa_deg", [40.0, 4.0, 8.0, -3.0], True),
+        ("true_airspeed angle_of_attack", [2.0, 0.1, 0.2, 0.0], True),
+        ("va alpha", [0.0, 0.1, 0.2, 0.0], True),
+        # From any side, or another thing.
+        ("airspeed sideslip", [0.0, 150.0, -60.0, 5.0], False),
+        ("airspeed aoa", [0.1, 0.9, 0.5, 0.4], False),
+        ("airspeed aoa", [np.nan] * 4, False),
+        ("va alpha_x", [0.0, 0.1, 0.2, 0.0], False),
+        ("airspeed yaw", [0.0, 0.1, 0.2, 0.0], False),
+    ],
+)
+def test_an_airplane_flies_where_its_nose_points(names, angle, found):
+    columns = dict(zip(names.split(), np.array([[0.0, 15.0, 14.0, 16.0], angle]), strict=True))
+    assert only_of_airplanes({"t": np.arange(4.0), **columns}) == (names.split() if found else [])
 
 
 def test_a_height_is_one_column_in_its_unit():

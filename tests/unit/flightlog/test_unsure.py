@@ -350,8 +350,22 @@ def test_what_alone_rises_evenly_is_the_clock_and_said_to_be(name, factor, unit)
     assert any(f"{name} alone rises evenly" in words for words in proposal.warnings)
 
 
-@pytest.mark.parametrize("others", [{}, {"lap": 2.5 * OWN.time, "odometer": 0.3 * OWN.time}])
-def test_rows_that_are_counted_and_two_that_rise_are_no_clock(others):
+@pytest.mark.parametrize(
+    "others",
+    [
+        {},
+        {"Tiempo": 2.5 * OWN.time, "Uhr": 0.3 * OWN.time},
+        {"loopIteration": 400 * OWN.time},
+        {"Distance": 5 * OWN.time},
+        {"x_ref": OWN.time},
+        {"battery_mah": OWN.time},
+        {"Tiempo_deg": OWN.time},
+    ],
+)
+def test_what_is_counted_or_means_another_thing_and_two_that_rise_are_no_clock(others):
+    others = {name: np.round(values, 6) for name, values in others.items()}
+    if "x_ref" in others:
+        others |= dict.fromkeys(("y_ref", "z_ref"), np.sin(OWN.time))
     with pytest.raises(InputError, match="no column of time stamps is recognised"):
         proposed(t={"step": np.arange(len(OWN.time), dtype=float), **others})
 

@@ -296,15 +296,16 @@ def test_what_the_log_viewer_exports_is_read_as_the_log(read, tmp_path):
         np.testing.assert_allclose(exported.topics[""][name], values, rtol=1e-6, atol=1e-9, err_msg=name)
     assert exported.topics[""]["flightModeFlags"].tolist() == [1.0] * len(rows)
     assert (exported.units, exported.system) == (log.units, log.system)
-    # A spreadsheet drops quotes that it does not need, and fills each line.
+    # A spreadsheet drops quotes that it does not need, and fills each line; of much of Europe with semicolons.
     width = len(NAMES) + 2
     filled = [next(csv.reader([line])) for line in text.splitlines()]
-    with (tmp_path / "saved.csv").open("w", newline="") as file:
-        csv.writer(file).writerows([*own, *[""] * (width - len(own))] for own in filled)
-    saved = log_contents(tmp_path / "saved.csv")
-    assert (saved.parameters, saved.units) == (exported.parameters, exported.units)
-    for name, values in exported.topics[""].items():
-        np.testing.assert_array_equal(saved.topics[""][name], values)
+    for delimiter in ",;":
+        with (tmp_path / "saved.csv").open("w", newline="") as file:
+            csv.writer(file, delimiter=delimiter).writerows([*own, *[""] * (width - len(own))] for own in filled)
+        saved = log_contents(tmp_path / "saved.csv")
+        assert (saved.parameters, saved.units) == (exported.parameters, exported.units)
+        for name, values in exported.topics[""].items():
+            np.testing.assert_array_equal(saved.topics[""][name], values)
     alike = {"motorOutput", "rollPID", "pitchPID", "d_min", "vbatcellvoltage"}
     assert {name: exported.parameters[name] for name in alike} == {name: log.parameters[name] for name in alike}
     assert exported.parameters["pidsum_limit"] == 500.0

@@ -60,8 +60,11 @@ def test_of_a_csv_only_what_is_wanted_is_read(tmp_path):
 
 
 def test_columns_without_names_that_a_spreadsheet_adds_are_none(tmp_path):
-    (tmp_path / "log.csv").write_text("t,roll,,\n0,1,,\n1,2,,\n")
-    assert listed(log_contents(tmp_path / "log.csv"))[""] == {"t": [0, 1], "roll": [1, 2]}
+    for filled, warnings in (("", ()), ("5", ("columns without a name are left out",))):
+        (tmp_path / "log.csv").write_text(f"t,roll,,\n0,1,{filled},{filled}\n1,2,,\n")
+        contents = log_contents(tmp_path / "log.csv")
+        assert listed(contents)[""] == {"t": [0, 1], "roll": [1, 2]}
+        assert contents.warnings == warnings
 
 
 def test_a_ulog_holds_topics_and_what_px4_knows_of_the_vehicle(tmp_path):

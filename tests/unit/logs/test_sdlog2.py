@@ -66,6 +66,12 @@ def test_messages_have_the_time_before_them_and_the_names_of_ulog(tmp_path, name
     assert contents.begins == {"": 7.0}
 
 
+def test_a_kind_that_is_described_again_and_never_written_changes_nothing(tmp_path):
+    again = b"".join(definition(60 + place, name, *KINDS[name]) for place, name in enumerate(("ATT", "TIME")))
+    (tmp_path / "log.px4log").write_bytes(sdlog2(flight(ANGLES)) + again)
+    assert len(log_contents(tmp_path / "log.px4log").topics["vehicle_attitude"][STAMP]) == 20
+
+
 def test_without_an_attitude_it_is_said_what_the_file_is(tmp_path):
     (tmp_path / "log.px4log").write_bytes(sdlog2([("TIME", (5,)), ("GPS", (5, 3))]))
     with pytest.raises(InputError, match=r"before ULog \(sdlog2\), without the attitude"):

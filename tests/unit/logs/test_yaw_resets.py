@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.flightlog.topics import STAMP, YAW_RESETS
 from cpfls_cli.logs.formats import log_contents
+from cpfls_cli.logs.records import stamps_while
 from tests.builders import ulogs
 from tests.builders.dataflash_logs import dataflash
 
@@ -22,17 +23,17 @@ def angles(time):
     return np.column_stack([0.2 * np.sin(0.7 * time), 0.3 * np.sin(0.5 * time + 1), yaw])
 
 
-def off(time):
+def off(time, resets=RESETS):
     """By how much, rad, an estimate is off that is right between the second reset and the third."""
-    turns = np.radians(RESETS[:, 1])
-    return (time[:, None] >= RESETS[:, 0]) @ turns - turns[:2].sum()
+    turns = np.radians(resets[:, 1])
+    return (time[:, None] >= resets[:, 0]) @ turns - turns[:2].sum()
 
 
 def apart(one, other):
     return np.degrees((one.inv() * other).magnitude().max())
 
 
-def of_px4(path, counts=(1, 1, 1)):
+def of_px4(path, counts=(1, 1, 1), asked="float[4] q_d"):
     """Write what PX4 logs: the stated quaternion is that of the turn, or its negative, which is the same one."""
     true = Rotation.from_euler("ZYX", angles(TIME)[:, ::-1])
     turned = Rotation.from_rotvec(off(TIME)[:, None] * [0, 0, 1])
@@ -44,7 +45,7 @@ def of_px4(path, counts=(1, 1, 1)):
         stated[at <= TIME] = np.array([np.cos(half), np.sin(half)]) * sign
     fields = {
         "vehicle_attitude": "uint64_t timestamp;float[4] q;float quat_reset_counter;float[4] delta_q_reset",
-        "vehicle_attitude_setpoint": "uint64_t timestamp;float[4] q_d;float yaw_body",
+        "vehicle_attitude_setpoint": f"uint64_t timestamp;{asked};float yaw_body",
         "vehicle_land_detected": "uint64_t timestamp;float landed",
     }
     sent = []
@@ -76,6 +77,12 @@ def test_of_two_resets_between_two_rows_neither_is_known(tmp_path):
     np.testing.assert_allclose(topics[YAW_RESETS][STAMP], RESETS[1:, 0], atol=1e-9)
 
 
+def test_px4_s_yaw_asked_for_is_turned_where_no_quaternion_is(tmp_path):
+    of_px4(tmp_path / "log.ulg", asked="float[4] roll_pitch")
+    asked = log_contents(tmp_path / "log.ulg").topics["vehicle_attitude_setpoint"]
+    assert np.abs(np.sin(asked["yaw_body"] - angles(TIME)[:, 2])).max() < 1e-4
+
+
 def of_ardupilot(events, turns=RESETS, noise_rad_s=0.0):
     """Write what ArduCopter logs: an attitude in hundredths of a degree, a gyroscope faster, and events."""
     fast = np.arange(0.0, 60.0, 0.04)
@@ -95,7 +102,7 @@ def of_ardupilot(events, turns=RESETS, noise_rad_s=0.0):
         "IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ"),
         "EV": ("QB", "TimeUS,Id"),
     }
-    logged = angles(TIME) + np.column_stack([0 * TIME, 0 * TIME, off(TIME) if len(turns) else 0 * TIME])
+    logged = angles(TIME) + np.column_stack([0 * TIME, 0 * TIME, off(TIME, turns) if len(turns) else 0 * TIME])
     hundredths = np.round(100 * ((np.degrees(logged) + 180) % 360 - 180)).astype(int)
     rows = [(at, "ATT", (round(1e6 * at), *own, own[2])) for at, own in zip(TIME, hundredths.tolist(), strict=True)]
     rows += [(at, "IMU", (round(1e6 * at), *own)) for at, own in zip(fast, rate.tolist(), strict=True)]
@@ -119,6 +126,27 @@ def test_ardupilot_s_resets_are_measured_and_undone(tmp_path, noise_rad_s):
     np.testing.assert_allclose(np.degrees(topics[YAW_RESETS]["turn"]), RESETS[:, 1], atol=1.0)
 
 
+@pytest.mark.parametrize(("first", "second"), [(20.0, 12.0), (12.0, 20.0), (-20.0, 20.0)])
+def test_of_ardupilot_s_resets_near_each_other_each_is_undone(tmp_path, first, second):
+    resets = np.array([[20.0, first], [20.3, second]])
+    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, *((at, 62) for at, _ in resets)], resets))
+    topics = log_contents(tmp_path / "log.bin").topics
+    np.testing.assert_allclose(topics[YAW_RESETS][STAMP], resets[:, 0], atol=1e-9)
+    np.testing.assert_allclose(np.degrees(topics[YAW_RESETS]["turn"]), resets[:, 1], atol=1.0)
+
+
+def test_an_event_of_ardupilot_is_of_one_turn(tmp_path):
+    resets = np.array([[20.0, 20.0], [20.3, 12.0]])
+    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, (20.1, 62)], resets))
+    assert log_contents(tmp_path / "log.bin").topics[YAW_RESETS][STAMP] == pytest.approx([20.0])
+
+
+def test_ardupilot_s_reset_that_is_as_small_as_what_vibration_makes_is_none(tmp_path):
+    marked = [(at, 62) for at in np.arange(12.0, 48.0, 3.0)]
+    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, *marked], (), noise_rad_s=1.0))
+    assert YAW_RESETS not in log_contents(tmp_path / "log.bin").topics
+
+
 def test_what_ardupilot_does_not_call_a_reset_is_none(tmp_path):
     for events, turns in ((FLIES, RESETS), ([*FLIES, (20.0, 62)], ())):
         (tmp_path / "log.bin").write_bytes(of_ardupilot(events, turns))
@@ -126,3 +154,9 @@ def test_what_ardupilot_does_not_call_a_reset_is_none(tmp_path):
         assert YAW_RESETS not in topics
         jumps = [abs((b - a + 180) % 360 - 180) for a, b in pairwise(topics["ATT"]["Yaw"])]
         assert (max(jumps) > 100.0) == bool(len(turns))
+
+
+def test_a_log_that_never_flies_has_the_axes_of_most_of_it():
+    stamps, changes = np.arange(5.0), np.array([1.0, 3.0])
+    assert stamps_while(stamps, changes, np.array([True, False])).tolist() == [1.0, 2.0]
+    assert stamps_while(stamps, changes, np.array([False, False])).tolist() == stamps.tolist()
