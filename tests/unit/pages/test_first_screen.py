@@ -331,7 +331,8 @@ def test_effects_are_credited_with_what_the_vehicles_own_numbers_leave():
     record = diagnosis("PARTIAL")
     left = replace(record.residual, parameters=0.2 * record.residual.before)
     said = screen(replace(record, residual=left))[1]["How sure"]
-    assert said.startswith("Of the held-out gap above the noise, the vehicle's own parameters refitted, 97 % is gone")
+    refitted = "that is left with the vehicle's own parameters refitted"
+    assert said.startswith(f"Of the held-out gap above the noise {refitted}, 97 % is gone")
 
 
 def test_what_differs_between_flights_stands_above_and_not_below():
