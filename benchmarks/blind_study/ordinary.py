@@ -15,6 +15,8 @@ LEVELLED_S = 10.0
 """Within which the attitude follows what the accelerometer takes for the vertical."""
 WANDERS = {"tilt": (0.009, 20.0), "heading": (0.05, 30.0), "velocity": (0.1, 3.0), "position": (0.5, 10.0)}
 """Size, rad, m/s and m, and memory, s, of the errors of the estimator."""
+SMOOTH_S = 1.0
+"""Within which an estimator follows what it measures, so that its errors have no steps."""
 GYROSCOPE_RAD_S, ACCELEROMETER_M_S2, HEADING_RAD = 0.005, 0.1, 0.08
 """Standard deviation of what is constant in a flight."""
 SHAKES = {"w": (0.01, 0.01, 0.004), "a": (0.2, 0.2, 0.14)}
@@ -63,10 +65,11 @@ def _log(path, mounted, rng):
 
     def wander(name):
         size, memory = WANDERS[name]
-        kept = np.exp(-period / memory)
-        steps = rng.standard_normal(rows) * np.sqrt(1 - kept**2)
-        steps[0] = rng.standard_normal()
-        return size * lfilter([1], [1, -kept], steps)
+        values = rng.standard_normal(2 * rows)
+        for lasting in (memory, SMOOTH_S):
+            kept = np.exp(-period / lasting)
+            values = lfilter([1 - kept], [1, -kept], values)
+        return size * np.sqrt((memory + SMOOTH_S) / (0.5 * period)) * values[rows:]
 
     turned = Rotation.from_euler("ZYX", np.stack([table[name] for name in reversed(_ANGLES)], axis=1))
     acceleration = np.stack([table[name] for name in _FELT], axis=1)
