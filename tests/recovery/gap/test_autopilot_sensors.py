@@ -50,6 +50,12 @@ def test_an_attitude_that_an_accelerometer_levels_makes_no_gyroscope_late(levell
     assert abs(fit.value[12]) < 4 * fit.error[12]
 
 
+def test_without_a_log_of_the_accelerometer_it_is_seen_as_well(levelled_flights):
+    flights = [replace(s, specific_force=None, rotor_speed=None) for s in levelled_flights]
+    assert audit(flights, WINDOWS).named == ()
+    assert abs(sensors_of(flights, WINDOWS).gyroscope.fit.value[13] - 0.1) < 0.01
+
+
 def test_a_delay_is_found_next_to_it(levelled_flights):
     found = audit([replace(s, attitude=late(s.attitude, 0.03)) for s in levelled_flights], WINDOWS)
     assert found.named == ()
