@@ -96,6 +96,7 @@ def test_rows_with_a_random_offset_of_the_accelerometer_and_noise_are_independen
         taken[3:] @ (25 * every + offset**2) @ taken[3:].swapaxes(1, 2), [25 * every] * 3, atol=1e-9
     )
     assert 0.01 < 1 - taken[5].sum() / len(flight) < 0.5
+    np.testing.assert_allclose(flight.motion[:, 3:], COUPLED.mass_kg * AVERAGED.average(ACCELERATION), atol=1e-9)
 
 
 def test_rows_are_computed_once_on_the_logged_signals_only():
