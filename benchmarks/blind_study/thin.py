@@ -27,7 +27,7 @@ def thinned(folder):
 def _thin(path, rng):
     names = path.read_text(encoding="ascii").partition("\n")[0].split(",")
     table = np.genfromtxt(path, delimiter=",", skip_header=1)
-    period, rows = table[1, 0] - table[0, 0], np.arange(len(table))
+    period, rows = np.median(np.diff(table[:, 0])), np.arange(len(table))
     # Columns of one rate are one topic, which begins at a moment of its own.
     begun = {hz: rng.uniform(0, 1 / hz) for hz in (10.0, 20.0)}
     for column, name in enumerate(names):
