@@ -235,7 +235,7 @@ def fit_gyro(flights: Sequence[Kinematics], scanned: DelayScan) -> GyroFit | Non
     if block.max() + 1 < FEWEST_BLOCKS:
         return None
     plain = _regressed(flights, scanned, index, block, levels=False)
-    levelled = _regressed(flights, scanned, index, block, levels=bool(scanned.excited[:2].any()))
+    levelled = _regressed(flights, scanned, index, block, levels=bool(scanned.excited.any()))
     if levelled.value[13] > max(_LEVELS, _SURELY * levelled.error[13]):
         return levelled
     # Levelling that is left out shifts the delay by about that, whose variance is the difference of both.

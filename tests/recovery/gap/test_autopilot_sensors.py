@@ -50,6 +50,12 @@ def test_an_attitude_that_an_accelerometer_levels_makes_no_gyroscope_late(levell
     assert abs(fit.value[12]) < 4 * fit.error[12]
 
 
+def test_without_a_log_of_the_accelerometer_it_is_seen_as_well(levelled_flights):
+    flights = [replace(s, specific_force=None, rotor_speed=None) for s in levelled_flights]
+    assert audit(flights, WINDOWS).named == ()
+    assert abs(sensors_of(flights, WINDOWS).gyroscope.fit.value[13] - 0.1) < 0.01
+
+
 def test_a_delay_is_found_next_to_it(levelled_flights):
     found = audit([replace(s, attitude=late(s.attitude, 0.03)) for s in levelled_flights], WINDOWS)
     assert found.named == ()
@@ -63,31 +69,40 @@ def test_one_that_nothing_levels_says_so_of_none():
 
 def test_of_one_slow_swing_no_gyroscope_is_late_because_the_attitude_may_be_levelled():
     """The lead of a levelled attitude at one frequency is any delay's."""
-    flights = [replace(s, rotor_speed=None) for s in levelled_slowly()]
+    flights = [replace(s, rotor_speed=None) for s in levelled_slowly(0.1)]
     assert audit(flights, WINDOWS).named == ()
 
 
-def levelled_slowly():
+def test_an_attitude_levelled_so_fast_that_the_gyroscope_hardly_agrees_makes_none_late_either():
+    """What it leaves about roll makes only yaw look as if it turned."""
+    flights = list(levelled_slowly(1.0, speed=1.0, yaw=0.5))
+    assert audit(flights, WINDOWS).named == ()
+    assert not sensors_of(flights, WINDOWS).clocks
+    assert abs(sensors_of(flights, WINDOWS).gyroscope.fit.value[13] - 1.0) < 0.05
+
+
+def levelled_slowly(gain, speed=2.0, yaw=0.0):
     time = PERIOD * np.arange(4000)
     for seed in range(2):
         rng = np.random.default_rng(seed)
-        angle = 0.2 * np.sin(2.0 * time + seed)
-        rate = 0.4 * np.cos(2.0 * time + seed)
+        angle = 0.2 * np.sin(speed * time + seed)
+        rate = 0.2 * speed * np.cos(speed * time + seed)
         signals = signals_of(flown(20.0, integration_rate_hz=COARSE))
         still = np.zeros_like(time)
+        heading, turning = yaw * np.sin(1.3 * time), 1.3 * yaw * np.cos(1.3 * time)
         # It accelerates as its lean says, so that the accelerometer feels the thrust alone.
         swing = replace(
             signals,
             time=time,
-            attitude=np.stack([angle, still, still], axis=1),
-            body_rate=np.stack([rate, still, still], axis=1),
+            attitude=np.stack([angle, still, heading], axis=1),
+            body_rate=np.stack([rate, turning * np.sin(angle), turning * np.cos(angle)], axis=1),
             specific_force=np.tile([0.0, 0.0, 9.81], (len(time), 1)),
             velocity=np.zeros((len(time), 3)),
             acceleration=None,
             position=None,
             rotor_speed=np.zeros((len(time), 4)),
         )
-        yield noisy(levelled(swing, 0.1), rng)
+        yield noisy(levelled(swing, gain), rng)
 
 
 def diagnosed(flights):

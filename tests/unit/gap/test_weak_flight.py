@@ -11,7 +11,14 @@ from cpfls_cli.effects.effect import Columns
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.weak_flight import Candidate, actuated, columns_of, rotation_balance, translation_balance
+from cpfls_cli.gap.balance.weak_flight import (
+    Candidate,
+    actuated,
+    columns_of,
+    rotation_balance,
+    translation_balance,
+    weak_flight,
+)
 from cpfls_cli.gap.naming.open_questions import bends_of
 from cpfls_cli.regressor.regressor import InertiaValues
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -77,6 +84,19 @@ def test_unknown_channels_are_zero():
     assert flight.averaged(everything)[:, 3:].any() == False  # noqa: E712
     np.testing.assert_allclose(flight.averaged(everything)[:, :3], 1.0)
     assert weak(replace(fly(1), specific_force=None, velocity=None), force=True).known[3:].tolist() == [False] * 3
+
+
+def test_rows_with_a_random_offset_of_the_accelerometer_and_noise_are_independent():
+    floor = np.full(6, 5.0)
+    flight = weak_flight(replace(FLIGHT, specific_force=ACCELERATION), AVERAGED, None, force=True, floor=floor)
+    every = np.eye(len(flight))
+    taken = np.moveaxis(flight.of_channels(np.repeat(every[:, None], 6, axis=1)), 1, 0)
+    offset = 0.1 * COUPLED.mass_kg
+    np.testing.assert_allclose(
+        taken[3:] @ (25 * every + offset**2) @ taken[3:].swapaxes(1, 2), [25 * every] * 3, atol=1e-9
+    )
+    assert 0.01 < 1 - taken[5].sum() / len(flight) < 0.5
+    np.testing.assert_allclose(flight.motion[:, 3:], COUPLED.mass_kg * AVERAGED.average(ACCELERATION), atol=1e-9)
 
 
 def test_rows_are_computed_once_on_the_logged_signals_only():
