@@ -26,10 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 _SAME = 1e-6
 """Relative difference of numbers in files that is rounding."""
 
-_FLY = [
-    "config > study.yaml",
-    "trajectory study.yaml --hover 30 --excite roll,pitch -o path.h5",
-]
+_FLY = ["config > study.yaml", "trajectory study.yaml --hover 30 --excite roll,pitch -o path.h5"]
 _CLOSED = "simulate study.yaml {path} --mode closed-loop {more} -o {out}.h5"
 
 

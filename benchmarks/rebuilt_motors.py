@@ -49,11 +49,7 @@ def row(name: str, found: Rebuilt | None) -> tuple[str, ...]:
         return (name, *["-"] * 8, "nothing to rebuild")
     shares = (*found.by_axis, found.common)
     numbers = (f"{own:.4f}" for own in shares)
-    rest = (
-        f"{1e3 * found.lag:.1f}",
-        f"{found.scale:.3f}",
-        f"{100 * found.error:.2f}",
-    )
+    rest = (f"{1e3 * found.lag:.1f}", f"{found.scale:.3f}", f"{100 * found.error:.2f}")
     return (name, f"{found.logged_hz:.0f} to {found.rate_hz:.0f}", *numbers, *rest, found.refused or "no")
 
 

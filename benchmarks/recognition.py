@@ -189,12 +189,7 @@ SETS = {
     "PX4 1.15, simulated (ULog)": LogSet(
         ("sample_px4_events.ulg",),
         PX4_SIGNALS,
-        FRD
-        | {
-            "quaternion_order": "wxyz",
-            "acceleration_frame": "body-specific-force",
-            "rotor_command_is": "speed",
-        },
+        FRD | {"quaternion_order": "wxyz", "acceleration_frame": "body-specific-force", "rotor_command_is": "speed"},
         PX4,
         {
             "setpoint_position": columns("trajectory_setpoint.position[*]", range(3)),

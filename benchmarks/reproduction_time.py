@@ -49,11 +49,7 @@ def works_of(size: int) -> tuple[Callable[[], object], ...]:
     plain = replace(search, local_search=replace(search.local_search, enabled=False))
     reference, fast = ReferenceEvaluator(learned, learned, plain), model_evaluator(learned, learned, plain)
     genes = np.random.default_rng(5).integers(1, 2**16, (1, reference.structure.genes))
-    return (
-        lambda: np.linalg.svd(matrix, full_matrices=False),
-        lambda: reference(genes),
-        lambda: fast(genes),
-    )
+    return (lambda: np.linalg.svd(matrix, full_matrices=False), lambda: reference(genes), lambda: fast(genes))
 
 
 def spread_samples(size: int) -> TorqueData:

@@ -308,10 +308,7 @@ def body_inertia(model: InertiaModel, attitude: Array) -> tuple[InertiaValues, A
 
 
 def runge_kutta_step(
-    slope: Callable[[Array, Array], Array],
-    state: Array,
-    torque: tuple[Array, Array, Array],
-    step: float | Array,
+    slope: Callable[[Array, Array], Array], state: Array, torque: tuple[Array, Array, Array], step: float | Array
 ) -> Array:
     """Take one step of the classic Runge-Kutta method of fourth order.
 

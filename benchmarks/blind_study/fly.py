@@ -49,10 +49,7 @@ def flown(each, folder):
 def config(vehicle_file, asked=()):
     """Describe a vehicle and the columns of its logs as YAML, what was asked of it among them."""
     stated = json.loads(vehicle_file.read_text(encoding="utf-8"))
-    factors = {
-        "drag_factor_n_m_s2": stated["torque_factor"],
-        "radius_m": stated["rotor_radius"],
-    }
+    factors = {"drag_factor_n_m_s2": stated["torque_factor"], "radius_m": stated["rotor_radius"]}
     hover = (stated["mass"] * stated["gravity"] / sum(stated["thrust_factors"])) ** 0.5
     vehicle = {
         "gravity_m_s2": stated["gravity"],

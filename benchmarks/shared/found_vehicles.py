@@ -35,9 +35,7 @@ def constants_unknown(vehicle: VehicleSettings) -> VehicleSettings:
 
 
 def learned(
-    vehicle: VehicleSettings,
-    training: Sequence[PlaybackFlight],
-    baselines: bool = True,
+    vehicle: VehicleSettings, training: Sequence[PlaybackFlight], baselines: bool = True
 ) -> dict[str, VehicleModel]:
     """Find a vehicle with the program's settings, and fit the baselines of the choice; what was found is printed."""
     used, start = PlaybackSettings(), perf_counter()

@@ -48,10 +48,7 @@ class Ratio:
 
 
 def in_turn(
-    slow: Callable[[], object],
-    fast: Callable[[], object],
-    repeats: int = 5,
-    clock: Callable[[], float] = process_time,
+    slow: Callable[[], object], fast: Callable[[], object], repeats: int = 5, clock: Callable[[], float] = process_time
 ) -> Ratio:
     """Time two things in turn, each once unmeasured before; medians, and the range of the ratio."""
     slow(), fast()

@@ -64,9 +64,7 @@ class Common:
     numbers: Annotated[
         Path | None,
         typer.Option(
-            "--model",
-            metavar="VEHICLE",
-            help="Take what the config leaves open from this vehicle of `cpfls vehicle`.",
+            "--model", metavar="VEHICLE", help="Take what the config leaves open from this vehicle of `cpfls vehicle`."
         ),
     ] = None
 
@@ -216,10 +214,7 @@ WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     (
         "Something changed",
-        (
-            "cpfls changed study.yaml today.csv --reference logs/* -o changed",
-            "cpfls trend study.yaml logs -o trend",
-        ),
+        ("cpfls changed study.yaml today.csv --reference logs/* -o changed", "cpfls trend study.yaml logs -o trend"),
     ),
     (
         "I want gains",

@@ -28,11 +28,7 @@ _DRAG_LEVER = 0.1
 _HOVER = 0.55
 """Rotor speed in hover, share of the largest: a vehicle lifts about three times its weight."""
 
-_OFF: Final[dict[Unknown, str]] = {
-    "thrust_factor": "0.35 to 2",
-    "drag_factor": "0.2 to 3",
-    "inertia": "0.8 to 4",
-}
+_OFF: Final[dict[Unknown, str]] = {"thrust_factor": "0.35 to 2", "drag_factor": "0.2 to 3", "inertia": "0.8 to 4"}
 """How many times a guess real vehicles have: by the ranges above, and hover at 0.4 to 0.9 of the largest speed."""
 
 _TAKEN = frozenset({"import", "config", "vehicle", "report", "export", "predict", "trajectory", "changed", "trend"})

@@ -7,15 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
-from cpfls_cli.blocks import (
-    BLOCK_S,
-    ENOUGH_BLOCKS,
-    block_length,
-    contiguous,
-    half_width,
-    jackknife_error,
-    serial_error,
-)
+from cpfls_cli.blocks import BLOCK_S, ENOUGH_BLOCKS, block_length, contiguous, half_width, jackknife_error, serial_error
 from cpfls_cli.consistency.channels import AXES, SAME, TWICE, axes_apart
 from cpfls_cli.consistency.findings import Finding, off_clock
 from cpfls_cli.consistency.repairs import UP

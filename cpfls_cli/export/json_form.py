@@ -10,13 +10,7 @@ import numpy as np
 from cpfls_cli.dynamics import CELLS, VERTICAL, InertiaFunctions
 from cpfls_cli.export.points import PERIOD, traced_wrench, units_of
 from cpfls_cli.export.sheet import EXPORTER, GUST_RECIPE, Sheet, base_of, rule_labels
-from cpfls_cli.export.source import (
-    attitudes_of,
-    points_of,
-    response_of,
-    run_of,
-    visited_rows,
-)
+from cpfls_cli.export.source import attitudes_of, points_of, response_of, run_of, visited_rows
 from cpfls_cli.export.text import strict_json
 from cpfls_cli.fuzzy.basis import Z_FUNCTION
 from cpfls_cli.inertia import INERTIA_PARAMETERS, symmetric

@@ -28,11 +28,7 @@ from cpfls_cli.vehicle.tracing import SYMBOLS
 from cpfls_cli.vehicle.values import Each, Functions, NoPolynomialError, Polynomial, Value, Vector
 
 _AXES = "uvwpqr"
-_PAIRS = (
-    *combinations_with_replacement("uvw", 2),
-    *product("uvw", "pqr"),
-    *combinations_with_replacement("pqr", 2),
-)
+_PAIRS = (*combinations_with_replacement("uvw", 2), *product("uvw", "pqr"), *combinations_with_replacement("pqr", 2))
 _PRODUCTS = ((), *((axis,) for axis in _AXES), *_PAIRS)
 _SIGNED = (*(("|u|", axis) for axis in "uvw"), *((f"|{axis}|", axis) for axis in "pqr"))
 TERMS = (*(tuple(each) for each in _PRODUCTS), *_SIGNED)
@@ -61,9 +57,7 @@ def _none(*_given: Value) -> Value:
     raise NoPolynomialError
 
 
-_FUNCTIONS = Functions(
-    *(_root, _none, _none, _none, _none, _none, _size, _none, _none, _none, Each, SYMBOLS.total),
-)
+_FUNCTIONS = Functions(*(_root, _none, _none, _none, _none, _none, _size, _none, _none, _none, Each, SYMBOLS.total))
 
 
 def _symbols(names: Iterable[str]) -> tuple[Polynomial, ...]:

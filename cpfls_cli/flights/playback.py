@@ -142,14 +142,7 @@ def _flight(flight: ReadFlight, study: Study, hold: Hold | None) -> LoggedFlight
     shares = actuation == "rotor_command" and flight.units.get(actuation) == "1"
     updated = flight.updated_hz.get(actuation)
     about = (words[actuation], named, wrong)
-    return LoggedFlight(
-        parts,
-        hold or usual,
-        *about,
-        shares=shares,
-        updated_hz=updated,
-        system=flight.system,
-    )
+    return LoggedFlight(parts, hold or usual, *about, shares=shares, updated_hz=updated, system=flight.system)
 
 
 def _known(flight: ReadFlight, actuation: str, part: slice) -> dict[str, Array]:

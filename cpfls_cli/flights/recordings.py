@@ -204,11 +204,7 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     own = ReadFlight(path.name, flight.signals, units_of(path, origin, study), (), begins=flight.begins)
     if isinstance(flight, Imported):
         return replace(
-            own,
-            updated_hz=flight.updated_hz,
-            repeated=flight.repeated,
-            stated=flight.stated,
-            system=flight.system,
+            own, updated_hz=flight.updated_hz, repeated=flight.repeated, stated=flight.stated, system=flight.system
         )
     return own
 

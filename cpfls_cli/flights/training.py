@@ -20,12 +20,7 @@ from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.files import read_content
 from cpfls_cli.flightlog.results import MOTION, Flight
 from cpfls_cli.flightlog.settings import SETPOINTS
-from cpfls_cli.flights.recordings import (
-    ReadFlight,
-    check_flight,
-    read_flight,
-    units_of,
-)
+from cpfls_cli.flights.recordings import ReadFlight, check_flight, read_flight, units_of
 from cpfls_cli.identification.data import (
     CHUNK,
     TRAINING,

@@ -286,11 +286,7 @@ def feature_count(inputs: int, consequents: Consequents, harmonic_order: int, pr
 
 
 def features(
-    angles: list[Array],
-    mapped: list[MappedInput],
-    consequents: Consequents,
-    harmonic_order: int,
-    products: Products,
+    angles: list[Array], mapped: list[MappedInput], consequents: Consequents, harmonic_order: int, products: Products
 ) -> Basis:
     """Evaluate the consequent features of a fuzzy system, which each rule adds up.
 

@@ -151,10 +151,7 @@ def diagnose(
     judged = [replace(each, effect=effect) for each, effect in zip(judged, known, strict=True)]
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
-    doubts = [
-        *_doubts(unnamed, bends, judged, settings),
-        *(refused.sentence for refused in named.refusals),
-    ]
+    doubts = [*_doubts(unnamed, bends, judged, settings), *(refused.sentence for refused in named.refusals)]
     notes = [*not_judged(held_out), *([] if named.differ else doubts)]
     inertial = hypothesis.by_flight(lambda flight, _: flight.motion)
     # Above the floor of the sensors alone.

@@ -17,14 +17,7 @@ from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, BoolArray, runs, stretches
 from cpfls_cli.dynamics import rigid_columns, vertical, why_unphysical
 from cpfls_cli.effects.registry import CATALOGUE
-from cpfls_cli.identification.data import (
-    Flights,
-    TorqueData,
-    TorqueSource,
-    axis_scale,
-    gathered,
-    sample_times,
-)
+from cpfls_cli.identification.data import Flights, TorqueData, TorqueSource, axis_scale, gathered, sample_times
 from cpfls_cli.inertia import INERTIA_ENTRIES, KNOWN, VISIBLE
 from cpfls_cli.playback.constants import Constants, find_constants
 from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight

@@ -144,9 +144,7 @@ def gathered(source: TorqueSource, samples: IntArray) -> TorqueData:
         start += len(data)
     motion = [np.concatenate([getattr(part.motion, name) for part in parts]) for name in vars(parts[0].motion)]
     return TorqueData(
-        np.concatenate([part.time for part in parts]),
-        Motion(*motion),
-        np.concatenate([part.torque for part in parts]),
+        np.concatenate([part.time for part in parts]), Motion(*motion), np.concatenate([part.torque for part in parts])
     )
 
 

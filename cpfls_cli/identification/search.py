@@ -173,11 +173,7 @@ def _searched(
 
 
 def _evolved(
-    evaluator: Evaluator,
-    workers: Workforce,
-    settings: IdentificationSettings,
-    rng: np.random.Generator,
-    run: SearchRun,
+    evaluator: Evaluator, workers: Workforce, settings: IdentificationSettings, rng: np.random.Generator, run: SearchRun
 ) -> tuple[Archive, History, StopReason]:
     """Breed until the end, or until asked to stop; then what of a generation is evaluated counts too."""
     state = run.resumed

@@ -43,12 +43,7 @@ _MOSTLY = 0.5
 _NO_ANGLE = 1e-3
 """Gain of the angle, 1/s, that is none: the search takes a loop around the rate."""
 _NOISE_STEP_HZ = 8.0
-_STICK_MODES = {
-    "px4": "Stabilized",
-    "ardupilot": "Stabilize",
-    "betaflight": "acro",
-    "crazyflie": "attitude setpoints",
-}
+_STICK_MODES = {"px4": "Stabilized", "ardupilot": "Stabilize", "betaflight": "acro", "crazyflie": "attitude setpoints"}
 """Modes in which the stick is the setpoint of the attitude or of the rate: no position or height control moves it."""
 _STICK_MOVES = {"roll": (0.4, 0.5, 4.0), "pitch": (0.4, 0.5, 4.0), "yaw": (0.6, 0.3, 2.0)}
 """Share of the full stick, and lowest and highest frequency, Hz, of moves that identify an axis."""
@@ -188,12 +183,7 @@ def _manoeuvres(autopilot: str, axes: Sequence[str]) -> Iterator[Manoeuvre]:
     for axis in axes if autopilot in _STICK_MODES else ():
         amplitude, low, high = _STICK_MOVES[axis]
         yield Manoeuvre(
-            axis=axis,
-            mode=_STICK_MODES[autopilot],
-            amplitude=amplitude,
-            lowest=low,
-            highest=high,
-            seconds=_STICK_S,
+            axis=axis, mode=_STICK_MODES[autopilot], amplitude=amplitude, lowest=low, highest=high, seconds=_STICK_S
         )
 
 

@@ -150,10 +150,7 @@ class Event:
 
 
 def timeline(
-    flight: LogFlight,
-    topics: Topics,
-    recognition: Recognition,
-    messages: Sequence[Message] = (),
+    flight: LogFlight, topics: Topics, recognition: Recognition, messages: Sequence[Message] = ()
 ) -> tuple[Event, ...]:
     """List what happens in a log, in order; many of one kind are one.
 

@@ -214,9 +214,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 
 
-def compared_constants(
-    vehicles: Sequence[Source[Vehicle]],
-) -> Iterator[tuple[Parameter, bool, list[str]]]:
+def compared_constants(vehicles: Sequence[Source[Vehicle]]) -> Iterator[tuple[Parameter, bool, list[str]]]:
     """Give each constant of several vehicles, whether two of its values lie apart, and all of them in words."""
     for constants in _constants(vehicles):
         known = [each for each in constants if each is not None]

@@ -400,16 +400,10 @@ FIGURES: Mapping[str, Drawn] = {
         lambda r: r.steps is not None,
     ),
     "convergence": Drawn(
-        "Best error, largest error and condition number by generation",
-        4.6,
-        _draw_convergence,
-        lambda r: r.searched,
+        "Best error, largest error and condition number by generation", 4.6, _draw_convergence, lambda r: r.searched
     ),
     "pareto-front": Drawn(
-        "Scatter of error against condition number, the chosen member marked",
-        3.0,
-        _draw_front,
-        lambda r: r.searched,
+        "Scatter of error against condition number, the chosen member marked", 3.0, _draw_front, lambda r: r.searched
     ),
     "figure-6": Drawn(
         "Membership functions of each fuzzy partition on the interval 0 to 1",

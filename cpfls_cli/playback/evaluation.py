@@ -46,18 +46,7 @@ from cpfls_cli.vehicle.motion import Acting, Instant, Numbers, Vehicle, Wrench, 
 from cpfls_cli.vehicle.rotors import with_factors
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.tracing import Graph, Symbol, array_symbols, traced_in_two
-from cpfls_cli.vehicle.values import (
-    ARRAYS,
-    Functions,
-    Polynomial,
-    Tangent,
-    Value,
-    Vector,
-    dot,
-    inverse,
-    times,
-    zero,
-)
+from cpfls_cli.vehicle.values import ARRAYS, Functions, Polynomial, Tangent, Value, Vector, dot, inverse, times, zero
 
 _POSITIVE = {
     **{log: (f"inertia.{name}", "kg m^2") for log, name in zip(LOG_INERTIA, INERTIA_PARAMETERS, strict=False)},

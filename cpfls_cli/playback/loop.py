@@ -61,8 +61,7 @@ class LoopBounds(NamedTuple):
     ] = np.zeros((0, 3))
     turning: Annotated[Array, _by_axis("body rate, root mean square", "rad/s")] = np.full(3, np.nan)
     missed: Annotated[
-        Array,
-        _by_axis("share explained by the model that was found, where rotors that only lag explain much more"),
+        Array, _by_axis("share explained by the model that was found, where rotors that only lag explain much more")
     ] = np.full(3, np.nan)
 
     @property

@@ -33,9 +33,7 @@ class PlaybackSettings(Settings):
     horizon_s: Annotated[float, Gt(0), Doc("how far free runs go, s")] = 0.5
     window_interval_s: Annotated[float, Gt(0), Doc("time between the starts of the windows that are fitted, s")] = 0.6
     history_s: Annotated[
-        float,
-        Ge(0),
-        Doc("how much of the past before its start a forecast may use, s; 0: no such forecast is fitted"),
+        float, Ge(0), Doc("how much of the past before its start a forecast may use, s; 0: no such forecast is fitted")
     ] = 0.5
     search_windows: Annotated[int, Ge(20), Doc("about how many windows the structures are judged on in the search")] = (
         400

@@ -12,14 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.inertia import (
-    INERTIA_ENTRIES,
-    INERTIA_PARAMETERS,
-    MEASURED,
-    nearest_body,
-    six_parameters,
-    symmetric,
-)
+from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, MEASURED, nearest_body, six_parameters, symmetric
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel

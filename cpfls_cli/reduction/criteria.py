@@ -121,12 +121,7 @@ def eigenvalues_below(eigenvalues: Array, projections: Array, shift: float) -> I
 
 
 def lazy_best(
-    rows: Array,
-    vectors: Array,
-    bounds: Array,
-    floor: float,
-    exceeds: Predicate,
-    bound_vectors: tuple[int, ...] = (),
+    rows: Array, vectors: Array, bounds: Array, floor: float, exceeds: Predicate, bound_vectors: tuple[int, ...] = ()
 ) -> int:
     """Find the sample with the largest score, the lowest index among equals.
 

@@ -314,11 +314,7 @@ def integration_rate(law: Law | None, rate: float) -> float:
 
 
 def asked(
-    time: Array,
-    planned: Mapping[str, Array],
-    vehicle: VehicleSettings,
-    settings: ClosedLoopSettings,
-    state: Array,
+    time: Array, planned: Mapping[str, Array], vehicle: VehicleSettings, settings: ClosedLoopSettings, state: Array
 ) -> dict[str, Array]:
     """Give what the autopilot asked for along a flight: of its position loop the plan, of its attitude loop the target.
 

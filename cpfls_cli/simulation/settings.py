@@ -43,8 +43,7 @@ class ClosedLoopSettings(Settings):
         Doc("effects to fly by name (`cpfls effects`): a list of coefficients, then shapes, or values by name"),
     ] = field(default_factory=dict)
     gusts: Annotated[
-        bool,
-        Doc("play the gusts that the model of `--model` holds, which `cpfls vehicle` found in its flights"),
+        bool, Doc("play the gusts that the model of `--model` holds, which `cpfls vehicle` found in its flights")
     ] = False
     rotor_time_constant_s: Annotated[
         float, Gt(0), Doc("time in which the rotors reach 63 % of a step, s; the effect motor_lag replaces it")

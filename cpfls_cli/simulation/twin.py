@@ -500,11 +500,7 @@ def twin_of(
 
 
 def compared(
-    flight: LoggedFlight,
-    asked: Asked,
-    measured: Array,
-    simulated: Array,
-    instrument: Callable[[Array], Array | None],
+    flight: LoggedFlight, asked: Asked, measured: Array, simulated: Array, instrument: Callable[[Array], Array | None]
 ) -> dict[str, TwinChannel]:
     """Compare a simulated vehicle with a flight by channel, shape (time, channel), in time and by frequency.
 

@@ -80,13 +80,7 @@ _OF_PLUGIN = {
 _TAGS = {
     **dict.fromkeys(_OF_PLUGINS, _OF_PLUGIN),
     "urdf": {"thrust": "kf", "torque": "km", "drag": "drag_coeff_xy"},
-    "mjcf": {
-        "thrust": "gear z",
-        "torque": "gear yaw",
-        "ratio": "gear yaw",
-        "lag_up": "dynprm",
-        "lag_down": "dynprm",
-    },
+    "mjcf": {"thrust": "gear z", "torque": "gear yaw", "ratio": "gear yaw", "lag_up": "dynprm", "lag_down": "dynprm"},
     "rotorpy": {"thrust": "k_eta", "torque": "k_m", "lag_up": "tau_m", "lag_down": "tau_m", "drag": "k_d"},
     "ardupilot": {"thrust": "hoverThrOut", "ratio": "motorN_yaw"},
     "crazyflow": {

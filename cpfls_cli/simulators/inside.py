@@ -125,9 +125,7 @@ class Simulator(NamedTuple):
 _EXTRA = install_command("simulators")
 SIMULATORS = {
     "mjcf": Simulator(
-        *("MuJoCo", "mujoco", "3.2.7", _EXTRA, 100_000),
-        lambda file, of: compiled(file, of.model.file.parent),
-        _mujoco,
+        *("MuJoCo", "mujoco", "3.2.7", _EXTRA, 100_000), lambda file, of: compiled(file, of.model.file.parent), _mujoco
     ),
     "rotorpy": Simulator(
         *("RotorPy", "rotorpy", "3.0", _EXTRA, 2_500), lambda file, of: quad_params(file, of.model), _rotorpy

@@ -20,17 +20,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.rotations import rotation_matrix
 from cpfls_cli.simulators.document import Node, Stated, read_xml
-from cpfls_cli.simulators.model import (
-    ENTRIES,
-    Body,
-    Rotor,
-    SimulatorModel,
-    of_quaternion,
-    part_of,
-    pose,
-    turning,
-    unit,
-)
+from cpfls_cli.simulators.model import ENTRIES, Body, Rotor, SimulatorModel, of_quaternion, part_of, pose, turning, unit
 
 MOTOR = re.compile(r"multicopter-motor-model|gazebo_motor_model")
 """In the names of the files of the plugins: gz-sim's, PX4's and RotorS'."""

@@ -110,9 +110,4 @@ FIGURES = {
     ),
 }
 
-WORDS = {
-    "axes": AXES,
-    "infeasible_sentence": infeasible_sentence,
-    "plain": plain,
-    "speed_units": SPEED_UNITS,
-}
+WORDS = {"axes": AXES, "infeasible_sentence": infeasible_sentence, "plain": plain, "speed_units": SPEED_UNITS}

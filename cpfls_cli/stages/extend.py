@@ -86,11 +86,7 @@ def named_effects(diagnosis: Diagnosis) -> Sequence[NamedEffect]:
 
 
 def extended(
-    study: Study,
-    training: Sequence[Signals],
-    held: Sequence[Signals],
-    diagnosis: Diagnosis,
-    base: VehicleModel,
+    study: Study, training: Sequence[Signals], held: Sequence[Signals], diagnosis: Diagnosis, base: VehicleModel
 ) -> Extended:
     """Put the effects that a diagnosis names into a model; refused where the held-out gap does not shrink."""
     gusty_floor = diagnosis.gap.floor if diagnosis.gusts else None

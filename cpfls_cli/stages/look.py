@@ -232,8 +232,7 @@ FIGURES = {
 
 @stage(Look, figures=FIGURES, folder=True)
 def look(
-    run: Run,
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG", help=f"Flight logs: {suffixes_in_words()}.")],
+    run: Run, logs: Annotated[list[Path], typer.Argument(metavar="LOG", help=f"Flight logs: {suffixes_in_words()}.")]
 ) -> dict[str, Look] | None:
     """Look into logs, each by itself."""
     named = unique_names(logs)

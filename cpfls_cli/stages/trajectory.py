@@ -110,9 +110,7 @@ BandOption = Annotated[
 SizeOption = Annotated[
     float | None,
     typer.Option(
-        "--size",
-        metavar="DEG",
-        help="Its largest angle, degrees; smaller, with a warning, where the vehicle cannot.",
+        "--size", metavar="DEG", help="Its largest angle, degrees; smaller, with a warning, where the vehicle cannot."
     ),
 ]
 MissionOption = Annotated[

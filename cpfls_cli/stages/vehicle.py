@@ -383,11 +383,7 @@ def _require_rotors(flight: LoggedFlight) -> None:
 
 
 def _found(
-    run: Run,
-    flights: Sequence[LoggedFlight],
-    settings: PlaybackSettings,
-    checkpoint: VehicleCheckpoint,
-    kept: Kept,
+    run: Run, flights: Sequence[LoggedFlight], settings: PlaybackSettings, checkpoint: VehicleCheckpoint, kept: Kept
 ) -> tuple[FoundVehicle, int | None]:
     """Search; an interrupt ends the search, and its number is given with what has been found until then."""
     study, watch = run.study, Watch(run, None)

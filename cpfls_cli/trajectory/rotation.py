@@ -116,10 +116,7 @@ class RotationPath:
 
 
 def full_rotation(
-    settings: RotationSettings,
-    duration: float,
-    rng: np.random.Generator,
-    inertia: Sequence[float] | None = None,
+    settings: RotationSettings, duration: float, rng: np.random.Generator, inertia: Sequence[float] | None = None
 ) -> RotationPath:
     """Draw a random path that uses up one of its limits.
 

@@ -310,21 +310,18 @@ class TrajectorySettings(Settings):
         ),
     ] = "cube-diagonal"
     direction: Annotated[
-        tuple[float, float, float],
-        Doc("direction of a straight path, world frame with z up; any length but zero"),
+        tuple[float, float, float], Doc("direction of a straight path, world frame with z up; any length but zero")
     ] = (1.0, 1.0, 1.0)
     legs: Annotated[int, Ge(1), Le(10_000), Doc("number of moves to and fro: out, back, out, ...")] = 3
     displacement_m: Annotated[
-        float | None,
-        Doc("displacement of a move to or fro, m; null when amplitude_m_s5 is given"),
+        float | None, Doc("displacement of a move to or fro, m; null when amplitude_m_s5 is given")
     ] = 64.0
     displacement_measure: Annotated[
         Literal["along-path", "per-axis"],
         Doc("whether displacement and limits hold along the path or on the axis that moves most"),
     ] = "along-path"
     amplitude_m_s5: Annotated[
-        float | None,
-        Doc("crackle amplitude A, m/s^5; null chooses the one that covers the displacement exactly"),
+        float | None, Doc("crackle amplitude A, m/s^5; null chooses the one that covers the displacement exactly")
     ] = None
     waypoints: Annotated[
         tuple[WaypointSettings, ...],

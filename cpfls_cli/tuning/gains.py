@@ -491,11 +491,7 @@ def gains_for_vehicle(
         hover_signal=hover.signal,
         parameters={
             names.get(each.parameter.name, each.parameter.name): ParameterRow.of(
-                each.parameter,
-                today.get(each.parameter.name, np.nan),
-                each.value,
-                each.wanted,
-                clipped=each.clipped,
+                each.parameter, today.get(each.parameter.name, np.nan), each.value, each.wanted, clipped=each.clipped
             )
             for each in proposals
             if _exists(each, today)

@@ -23,8 +23,7 @@ class RotorSettings(Settings):
     """Describe one rotor whose thrust points along body z."""
 
     position_m: Annotated[
-        tuple[float, float, float],
-        Doc("hub relative to the centre of mass, m; body frame x forward, y left, z up"),
+        tuple[float, float, float], Doc("hub relative to the centre of mass, m; body frame x forward, y left, z up")
     ] = (0.3, 0.0, 0.0)
     spin: Annotated[
         Literal[1, -1],

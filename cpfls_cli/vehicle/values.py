@@ -383,11 +383,7 @@ def dot(a: Iterable[Value], b: Iterable[Value]) -> Value:
 def cross(a: Vector, b: Vector) -> Vector:
     """Multiply two vectors to the one across."""
     (x, y, z), (p, q, r) = a, b
-    return (
-        minus(times(y, r), times(z, q)),
-        minus(times(z, p), times(x, r)),
-        minus(times(x, q), times(y, p)),
-    )
+    return (minus(times(y, r), times(z, q)), minus(times(z, p), times(x, r)), minus(times(x, q), times(y, p)))
 
 
 def inverse(rows: Sequence[Vector]) -> tuple[Vector, ...]:

@@ -21,12 +21,7 @@ gap: {shifts: 39, horizon_s: 0.1, ignore: [wind]}
 
 # Squared speeds to thrust, roll, pitch and yaw of the '+' layout, written out.
 ALLOCATION = np.array(
-    [
-        [THRUST] * 4,
-        [0, -ARM * THRUST, 0, ARM * THRUST],
-        [-ARM * THRUST, 0, ARM * THRUST, 0],
-        [-DRAG, DRAG, -DRAG, DRAG],
-    ]
+    [[THRUST] * 4, [0, -ARM * THRUST, 0, ARM * THRUST], [-ARM * THRUST, 0, ARM * THRUST, 0], [-DRAG, DRAG, -DRAG, DRAG]]
 )
 
 

@@ -102,12 +102,7 @@ def test_default_vehicle_is_table_3():
     vehicle = VehicleSettings()
     assert (vehicle.gravity_m_s2, vehicle.mass_kg) == (GRAVITY, MASS)
     assert vehicle.inertia_kg_m2 == (0.6, 0.6, 1.2)
-    expected = [
-        [K, K, K, K],
-        [0, -ARM * K, 0, ARM * K],
-        [-ARM * K, 0, ARM * K, 0],
-        [-B, B, -B, B],
-    ]
+    expected = [[K, K, K, K], [0, -ARM * K, 0, ARM * K], [-ARM * K, 0, ARM * K, 0], [-B, B, -B, B]]
     np.testing.assert_allclose(allocation_matrix(vehicle), expected, atol=1e-20)
 
 

@@ -41,11 +41,4 @@ _EFFECT = Effect(
 _HEIGHT = Coefficient(
     "c_z", "m", -0.4, 0.4, "true centre of mass, above that of the model; shown by forces across the rotors", scales.arm
 )
-EFFECT = replace(
-    _EFFECT,
-    exact=replace(
-        _EFFECT,
-        coefficients=(*_EFFECT.coefficients, _HEIGHT),
-        columns=None,
-    ),
-)
+EFFECT = replace(_EFFECT, exact=replace(_EFFECT, coefficients=(*_EFFECT.coefficients, _HEIGHT), columns=None))

@@ -29,7 +29,7 @@ def _describe(_vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
 EFFECT = Effect(
     name="mounting",
     order=195,
-    title="autopilot mounted askew",
+    title="askew mounting of the autopilot",
     kind="wrench",
     formula="F = theta x (0, 0, T),  M = theta x M_rotors - (d/dt (dI omega) + omega x dI omega),"
     "  dI = [theta]x I - I [theta]x",

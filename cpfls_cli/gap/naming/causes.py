@@ -216,11 +216,5 @@ def _without_columns(
 ) -> NamedEffect:
     """Name what is no part of a model: a fault of the sensors, or wrong numbers of the vehicle."""
     return NamedEffect(
-        name=name,
-        shape={},
-        linear=np.zeros(0),
-        numbers=numbers,
-        p_value=p_value,
-        share=share,
-        sentence=sentence,
+        name=name, shape={}, linear=np.zeros(0), numbers=numbers, p_value=p_value, share=share, sentence=sentence
     )

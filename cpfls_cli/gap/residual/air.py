@@ -18,12 +18,7 @@ from cpfls_cli.gap.settings import ERRORS, RARE, GapSettings
 from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.gusts import RANGES
-from cpfls_cli.playback.innovations import (
-    MOST_PREDICTED,
-    ResidualInnovations,
-    blows,
-    residual_innovations,
-)
+from cpfls_cli.playback.innovations import MOST_PREDICTED, ResidualInnovations, blows, residual_innovations
 from cpfls_cli.playback.instruments import (
     GivenKind,
     InstrumentKind,
@@ -142,13 +137,7 @@ def _without_copies(flights: Sequence[Signals]) -> Iterator[int]:
             yield number
 
 
-def air(
-    hypothesis: System,
-    linear: Array,
-    block: IntArray,
-    given: Instruments,
-    settings: GapSettings,
-) -> Air | None:
+def air(hypothesis: System, linear: Array, block: IntArray, given: Instruments, settings: GapSettings) -> Air | None:
     """Find gusts in the residual of flights under a hypothesis.
 
     The motion of the vehicle follows its setpoints, and is repeatable where these are; a gust is neither. Without

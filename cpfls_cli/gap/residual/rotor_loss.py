@@ -78,12 +78,7 @@ def rotor_losses(
 
 
 def _step(
-    rows: Array,
-    own: Array,
-    within: BoolArray,
-    settings: GapSettings,
-    rng: np.random.Generator,
-    above_chance: float,
+    rows: Array, own: Array, within: BoolArray, settings: GapSettings, rng: np.random.Generator, above_chance: float
 ) -> tuple[int, int, Estimate] | None:
     """Find the rotor and the window from which on a loss explains most; None where that is chance, or no single rotor.
 

@@ -105,14 +105,7 @@ def heat_map(
     count = np.histogram2d(across, along, edges)[0]
     total = np.histogram2d(across, along, edges, weights=residual[known])[0]
     mean = np.divide(total, count, out=np.full_like(count, np.nan), where=count > 0)
-    return HeatMap(
-        channel=channel,
-        signals=signals,
-        first_edge=edges[0],
-        second_edge=edges[1],
-        mean=mean,
-        count=count,
-    )
+    return HeatMap(channel=channel, signals=signals, first_edge=edges[0], second_edge=edges[1], mean=mean, count=count)
 
 
 def _edges(signal: Array, bins: int) -> Array:

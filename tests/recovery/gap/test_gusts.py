@@ -128,10 +128,7 @@ def test_a_centre_of_mass_is_distinguished_from_a_constant_torque_in_gusts(flown
     # Rotors that carry a constant torque turn as much faster and slower as it takes.
     carried = np.linalg.solve(TRUE.mixer, [0.0, *(TRUE.mass * GRAVITY * at[::-1] * [1, -1]), 0.0])
     pushed = [replace(each, speed=np.sqrt(each.speed**2 + carried)) for each in flown["asked"]]
-    for name, recordings in (
-        ("com_offset", aside),
-        ("torque_bias", recorded(pushed, TRUE.vehicle, setpoints=True)),
-    ):
+    for name, recordings in (("com_offset", aside), ("torque_bias", recorded(pushed, TRUE.vehicle, setpoints=True))):
         found = diagnosed(recordings).diagnosis
         assert (found.verdict, [each.name for each in found.effects]) == (GapVerdict.NAMED, [name])
         assert not found.alternatives

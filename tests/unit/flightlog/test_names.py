@@ -104,11 +104,7 @@ def first(names, signal, system=""):
         ("qi qx qy qz", "quaternion", "qi qx qy qz"),
         ("xvel yvel zvel", "velocity", "xvel yvel zvel"),
         ("xrate yrate zrate", "body_rate", "xrate yrate zrate"),
-        (
-            "motor_one motor_two motor_three motor_four",
-            "rotor_command",
-            "motor_one motor_two motor_three motor_four",
-        ),
+        ("motor_one motor_two motor_three motor_four", "rotor_command", "motor_one motor_two motor_three motor_four"),
         ("x_dot y_dot z_dot", "velocity", "x_dot y_dot z_dot"),
         ("xdot ydot zdot", "velocity", "xdot ydot zdot"),
         ("bat_volt", "voltage", "bat_volt"),

@@ -215,11 +215,7 @@ def messages_of(contents):
 
 @pytest.mark.parametrize("form", ["structures", "matrices"])
 def test_messages_that_a_ground_station_made_variables_of_matlab_are_those_of_the_log(read, tmp_path, form):
-    kinds = {
-        "IMU": ("QBff", "TimeUS,I,GyrX,AccX"),
-        "ATT": ("Qcc", "TimeUS,Roll,Yaw"),
-        "RCOU": ("QHH", "TimeUS,C1,C2"),
-    }
+    kinds = {"IMU": ("QBff", "TimeUS,I,GyrX,AccX"), "ATT": ("Qcc", "TimeUS,Roll,Yaw"), "RCOU": ("QHH", "TimeUS,C1,C2")}
     own = {
         "IMU": [(5_000_000 + 1000 * row, row % 2, 0.5 * row, 9.5) for row in range(6)],
         "ATT": [(5_000_500 + 2000 * row, 100 * row, -250) for row in range(3)],
