@@ -213,7 +213,7 @@ def named_signals(groups: tuple[ColumnGroup, ...], system: str = "") -> tuple[Na
     # A log that does not say what wrote it is of a kind by two names at least: motor[0] alone has many authors.
     found = [named for named in known if system or of_kind[named.known] > 1]
     by_words = [named for group in groups for named in _by_words(group)]
-    # Motors beside what is asked of them are measured, and nobody says in what.
+    # Motors next to what is asked of them are measured, and nobody says in what.
     asked = {frozenset(own.group.words) - ASKED - AIMED for own in by_words if {*own.group.words} & (ASKED | AIMED)}
     found += [own for own in by_words if own.signal != "rotor_command" or {*own.group.words} not in asked]
     # Of what has an attitude or a velocity the axes are a place.
