@@ -202,7 +202,8 @@ class GyroFit:
     # rotation vector in body axes.
     value: Array
     error: Array  # Shape (14,): standard errors by the jackknife over blocks.
-    pull: Array  # Shape (14,): how far noise of the gyroscope can have pulled the value at most.
+    # Shape (14,): how far noise of the gyroscope, or levelling that is left out, can have pulled the value at most.
+    pull: Array
     known: BoolArray  # Shape (14,): what the motion identifies.
     blocks: int
     variance: Array  # Shape (3,), rad^2/s^2: left about each axis.
