@@ -15,7 +15,7 @@ from cpfls_cli.flightlog import bandwidth, conversion, repair, stretches
 from cpfls_cli.flightlog.flown import flown_crop, warn_of_end
 from cpfls_cli.flightlog.repair import SignalTable
 from cpfls_cli.flightlog.results import DelayEstimate, Imported
-from cpfls_cli.flightlog.settings import SETPOINTS, ImportSettings
+from cpfls_cli.flightlog.settings import MOTION, SETPOINTS, ImportSettings
 from cpfls_cli.flightlog.smoothing import body_rate_of, derivative, low_pass
 from cpfls_cli.flightlog.topics import hold_asked, previous_rows
 from cpfls_cli.inertia import body_torque_columns
@@ -85,6 +85,10 @@ def read_signals(
     present = np.isfinite(np.hstack(list(repaired.signals.values())))
     rows, incomplete_ends, beyond_gap = repair.longest_stretch(table.time, present, settings)
     table, repaired = table.rows(rows), repaired.rows(rows)
+    # Those of topics are regular by now.
+    motion = [] if stamped_hz else [own for name, own in repaired.signals.items() if name in MOTION]
+    time, scattered = repair.regular_stamps(table.time, motion)
+    table, repaired = (replace(own, time=time) for own in (table, repaired))
     resting = stretches.rotors_at_rest(table, settings)
     slow = bandwidth.slow_signals(table, stamped_hz)
     spikes, updated_hz = {name: own[rows] for name, own in spikes.items()}, {own.name: own.rate_hz for own in slow}
@@ -100,7 +104,7 @@ def read_signals(
         *(*cut, *broken, *stretches.warn_of_values(counts), *dead, *stretches.warn_of_rest(table, resting, settings)),
         *(*bandwidth.warn_of_slow(slow, rate_hz), *bandwidth.warn_of_cut_offs(filtered, settings)),
         *([f"{beyond_gap} rows beyond a gap are not used"] if beyond_gap else []),
-        *(*hurried, *stretches.warn_of_angles(read.signals), *unknown),
+        *(*scattered, *hurried, *stretches.warn_of_angles(read.signals), *unknown),
     )
     dropped |= {"incomplete_ends": incomplete_ends, "gap": beyond_gap}
     return Imported(

@@ -6,8 +6,10 @@ from math import floor, log10, pi
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
+from cpfls_cli.blocks import mean_error
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.settings import ImportSettings
 from cpfls_cli.units import KNOWN_UNITS
@@ -23,6 +25,13 @@ _DEVIATION_OF_MEDIAN = 1.4826  # Standard deviation of normal noise over the med
 _LARGEST = {"rad": 1e6, "rad/s": 1e5, "m": 1e9, "m/s": 1e5, "m/s^2": 1e6, "N m": 1e6, "N": 1e8, "V": 1e5, "1": 1e9}
 _LARGEST |= {"s": 1e3}
 _LARGEST_SHARE_BROKEN = 0.01  # Of values up to which some are broken, and not the unit wrong.
+_LONG_STEP = 1.4  # Periods from which on rows may be missing between two.
+_NEAR = 3  # Rows before and behind a long step by which that is decided.
+_WANDERS = 201  # Rows over which a clock may wander.
+_LEAST_SCATTER = 1e-3  # Of stamps, share of a period: less changes nothing.
+_CURVE = 5  # Rows of which the middle one is compared with the cubic through the others.
+_SURELY = 3.0  # Standard errors.
+_BLOCKS = 20  # Over which the mean is sure.
 
 
 @dataclass(frozen=True)
@@ -312,3 +321,67 @@ def align_quaternion_signs(quaternion: Array) -> Array:
     flips = np.sign((present[1:] * present[:-1]).sum(axis=1))
     continuous[known] = present * np.cumprod(np.concatenate([[1.0], np.where(flips < 0, -1.0, 1.0)]))[:, None]
     return continuous
+
+
+def regular_stamps(time: Array, motion: Sequence[Array], of: str = "") -> tuple[Array, list[str]]:
+    """Take the regular clock about which stamps scatter, where the motion is surely smoother along it, and say so.
+
+    Messages wait for a bus or a disk, and are stamped as they arrive, though a sensor is read regularly. A row is put
+    where the regular clock has it; steps without rows stay, and so does what the clock wanders by in long.
+
+    Parameters
+    ----------
+    time : array, shape (sample,), s
+    motion : sequence of array, shape (sample,) or (sample, column)
+        What is smooth in time; absent values NaN.
+    of : str
+        Whose stamps they are, in the sentence.
+
+    Returns
+    -------
+    array, shape (sample,), s
+        The stamps as given where they are regular, or the motion does not show that they should be.
+    list of str
+        A sentence where they are others.
+    """
+    steps = np.diff(time)
+    if not motion or len(time) < _BLOCKS * _CURVE or not (steps > 0).all():
+        return time, []
+    period = np.median(steps)
+    first, early, apart = 0, time - period * np.arange(len(time)), np.ones(len(steps))
+    for row in np.flatnonzero(steps > _LONG_STEP * period) + 1:
+        # What arrives late is followed by what does not.
+        missing = np.round((early[row : row + _NEAR].min() - early[max(first, row - _NEAR) : row].min()) / period)
+        if missing > 0:
+            first, apart[row - 1] = int(row), 1 + missing
+    rows = np.concatenate([[0], np.cumsum(apart)])
+    line = np.polyfit(rows, time, 1)
+    late = time - np.polyval(line, rows)
+    late -= uniform_filter1d(late, _WANDERS, mode="mirror")
+    regular = time - late
+    if late.std() < _LEAST_SCATTER * period or not (np.diff(regular) > 0).all():
+        return time, []
+    whole = rows[_CURVE - 1 :] - rows[: 1 - _CURVE] == _CURVE - 1
+    given, other = (_beyond_cubic(stamps, np.column_stack(motion))[whole] ** 2 for stamps in (time, regular))
+    size = np.nan_to_num(given).mean(axis=0)
+    gained = np.nan_to_num(given - other)[:, size > 0] @ (1 / size[size > 0])
+    if len(gained) < _BLOCKS:
+        return time, []
+    blocks = np.array([own.mean() for own in np.array_split(gained, _BLOCKS)])
+    if blocks.mean() <= _SURELY * mean_error(blocks):
+        return time, []
+    words = f"stamps{of} scatter by {1e3 * late.std():.2g} ms about a regular clock of {1 / line[0]:.4g} Hz"
+    return regular, [f"{words}, along which the motion is surely smoother: rows are put where that has them"]
+
+
+def _beyond_cubic(time: Array, motion: Array) -> Array:
+    """Compare each row with the cubic through the two before and the two behind it, per standard error of both."""
+    stamps, values = sliding_window_view(time, _CURVE), sliding_window_view(motion, _CURVE, axis=0)
+    middle, others = _CURVE // 2, [place for place in range(_CURVE) if place != _CURVE // 2]
+    weights = np.zeros_like(stamps)
+    for own in others:
+        rest = [place for place in others if place != own]
+        apart = (stamps[:, [middle]] - stamps[:, rest]) / (stamps[:, [own]] - stamps[:, rest])
+        weights[:, own] = -apart.prod(axis=1)
+    weights[:, middle] = 1.0
+    return np.asarray(np.einsum("nw,ncw->nc", weights, values) / np.linalg.norm(weights, axis=1)[:, None])

@@ -57,6 +57,7 @@ SETPOINTS: Final[Mapping[SignalName, SignalName]] = MappingProxyType(
 """Signals that say what was asked of the autopilot and of its loops, and the name of each among the setpoints."""
 ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")  # Signals with a column for each rotor.
 # Signals that keep their value until the next one.
+MOTION: Final = ("position", "velocity", "attitude", "quaternion", "body_rate")
 COMMANDS: Final = ("torque", "body_torque", "thrust", "rotor_command")
 _COLUMNS_OF_SIGNAL: Final[Mapping[str, int]] = MappingProxyType(
     {"quaternion": 4, "thrust": 1, "voltage": 1, "setpoint_thrust": 1}

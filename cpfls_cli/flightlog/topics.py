@@ -11,8 +11,8 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.bandwidth import is_fast
 from cpfls_cli.flightlog.conversion import columns_in_words, present_choices
-from cpfls_cli.flightlog.repair import align_quaternion_signs, increasing_rows, unwrap_angles
-from cpfls_cli.flightlog.settings import COMMANDS, SETPOINTS, ImportSettings, SignalMap
+from cpfls_cli.flightlog.repair import align_quaternion_signs, increasing_rows, regular_stamps, unwrap_angles
+from cpfls_cli.flightlog.settings import COMMANDS, MOTION, SETPOINTS, ImportSettings, SignalMap
 from cpfls_cli.units import known_unit
 
 Topics = Mapping[str, Mapping[str, Array]]
@@ -110,9 +110,14 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
     columns = {name: np.empty(0) for name in column_names(topics)}
     base, stamp = topic_and_field(str(settings.time_column))
     clocks = {topic: fields.get(stamp, fields[STAMP]) for topic, fields in topics.items() if STAMP in fields}
-    target = topics[base][stamp]
+    used, warnings = {base}, list[str]()
+    smooth = [_continuous(name, signal, topics) for name, signal in settings.signals.items() if name in MOTION]
+    for topic, time in clocks.items():
+        motion = [own for each in smooth for column, own in each.items() if topic_and_field(column)[0] == topic]
+        clocks[topic], scattered = regular_stamps(time, motion, f" of topic {topic}")
+        warnings += scattered
+    target = clocks[base]
     columns[str(settings.time_column)] = target.copy()
-    used, warnings = {base}, []
     for name, signal in settings.signals.items():
         asked = name in SETPOINTS
         # A setpoint comes as seldom as it likes: it stays until the next one.

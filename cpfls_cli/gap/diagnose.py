@@ -379,7 +379,8 @@ def _wrong_inertia(named: _Named) -> bool:
     (hypothesis, estimates, *_), held_out = named.judgement
     names = (each.effect.name for each in hypothesis.chosen)
     numbers = dict(zip(names, estimates.effects, strict=True))
-    wrong = wrong_numbers(estimates, numbers, held_out.removed_by_numbers(0.0), hypothesis.vehicle)
+    removed = held_out.removed_by_numbers(0.0)
+    wrong = wrong_numbers(estimates, numbers, removed, named.judge.unknown(held_out), hypothesis.vehicle)
     return wrong is not None and any(each.name.startswith("inertia") for each in wrong.numbers)
 
 
@@ -460,7 +461,8 @@ def _concluded(
     # In gusts instruments identify the numbers, and a gap need not be clear.
     still = not hypothesis.gusty.any()
     taken = held_out.removed_by_numbers(NOISE if still else 0.0)
-    numbers = wrong_numbers(estimates, {each.name: each.numbers for each in effects}, taken, hypothesis.vehicle)
+    known, unknown = {each.name: each.numbers for each in effects}, found.judge.unknown(held_out)
+    numbers = wrong_numbers(estimates, known, taken, unknown, hypothesis.vehicle)
     effects += [numbers] if numbers is not None else []
     # Where wrong numbers leave no gap, there is none that names could take a share of.
     removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)

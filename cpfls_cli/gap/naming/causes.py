@@ -120,7 +120,11 @@ def shares(found: NamedFit) -> Array:
 
 
 def wrong_numbers(
-    estimates: Estimates, effects: Mapping[str, Sequence[Estimate]], removed: Array, vehicle: VehicleSettings
+    estimates: Estimates,
+    effects: Mapping[str, Sequence[Estimate]],
+    removed: Array,
+    unknown: Array,
+    vehicle: VehicleSettings,
 ) -> NamedEffect | None:
     """Name the numbers of the vehicle that are significantly wrong, relevant, and not explained by a named effect.
 
@@ -128,9 +132,11 @@ def wrong_numbers(
 
     `effects`: the numbers of those that are named.
     `removed`, shape (6,): part of each channel's gap on unseen flights that refitting the numbers takes off.
+    `unknown`, shape (6,): what is left of each channel where that is clear, relative to the motion: if all of it went
+    with the motion, as where a loop answers it, the number of that channel would be off by so much.
     """
     # Each shows in a channel of its own.
-    shown = dict(zip(NUMBERS, (*removed[:3], removed[5]), strict=True))
+    shown, hidden = (dict(zip(NUMBERS, (*each[:3], each[5]), strict=True)) for each in (removed, unknown))
     named = [
         (CATALOGUE[name].accounts, {number.name: number.value for number in numbers})
         for name, numbers in effects.items()
@@ -139,7 +145,8 @@ def wrong_numbers(
     for number in (each for each in estimates.parameters if each.name in NUMBERS):
         accounted = sum(accounts(number.name, values) for accounts, values in named if accounts is not None)
         # At the rate of errors of names, over all numbers that are asked.
-        sure = len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > max(_MATTERS, accounted)
+        least = max(_MATTERS, accounted, hidden[number.name])
+        sure = len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > least
         if sure and shown[number.name] >= COUNTS:
             wrong.append(number)
     if not wrong:

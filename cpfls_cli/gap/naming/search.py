@@ -198,8 +198,10 @@ def alternatives(
 ) -> list[Alternative]:
     """List the rivals of a chosen effect that explain a fair part of what it does.
 
-    Those that hold it as a special case are none.
+    Those that hold it as a special case are none. What averages over windows do not show has no rivals there.
     """
+    if chosen.gain <= 0:
+        return []
     effect, known = chosen.candidate.effect, names_of(chosen.chosen)
     found = []
     for scored in unbeaten(chosen, ranking, above_floor):

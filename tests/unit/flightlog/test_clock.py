@@ -73,3 +73,45 @@ def test_rows_are_those_of_the_log_under_a_crop_too():
     time = np.concatenate([STAMPS, STAMPS])
     with pytest.raises(InputError, match="at row 3501 "):
         read(time, crop_s=(5.0, 25.0))
+
+
+def turning(time):
+    return np.stack([np.sin(3 * time), 2 * np.cos(7 * time), np.sin(11 * time)], axis=1)
+
+
+def scattered(seed):
+    """Stamps of messages that wait for 1.5 ms on average, with lost ones, and when they were sent."""
+    rng = np.random.default_rng(seed)
+    kept = np.ones(len(STAMPS), dtype=bool)
+    kept[rng.choice(len(STAMPS), 20, replace=False)], kept[1000:1003] = False, False
+    return STAMPS[kept], np.maximum.accumulate(STAMPS + rng.exponential(1.5e-3, len(STAMPS)))[kept]
+
+
+def rows_of(time, rates, noise=0.002):
+    rates = rates + noise * np.random.default_rng(9).standard_normal(rates.shape)
+    columns = {"t": time} | dict(zip("pqr", rates.T, strict=True))
+    return read_signals(columns, ImportSettings(signals=RATE, torque_source=None, gap_s=10.0))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_messages_that_wait_are_put_where_a_regular_clock_has_them(seed):
+    sent, stamps = scattered(seed)
+    found = rows_of(stamps, turning(sent))
+    assert [each for each in found.warnings if each.startswith("stamps scatter by 1.")]
+    off = found.body_rate - turning(found.time + sent[0])
+    # They wait so long on average.
+    as_stamped = [np.interp(STAMPS, stamps, own) for own in turning(sent + 1.5e-3).T]
+    assert off.std() < 0.5 * (np.stack(as_stamped, axis=1) - turning(STAMPS)).std()
+
+
+def test_samples_that_were_taken_irregularly_stay_at_their_stamps():
+    _, stamps = scattered(0)
+    found = rows_of(stamps, turning(stamps))
+    assert not [each for each in found.warnings if "scatter" in each]
+    # Straight lines between samples leave so much.
+    assert (found.body_rate - turning(found.time + stamps[0])).std() < 0.004
+
+
+def test_motion_below_its_noise_decides_on_no_stamps():
+    sent, stamps = scattered(0)
+    assert not [each for each in rows_of(stamps, turning(sent), noise=3.0).warnings if "scatter" in each]

@@ -265,3 +265,14 @@ def test_a_pause_makes_no_topic_slow():
     kept = np.concatenate([flown, 648.0 + flown])
     settings = ImportSettings(time_column=None, torque_source=None, signals=signals(voltage=["battery.v"]))
     assert stamped_rates({"battery": {"timestamp": kept, "v": kept}}, settings) == pytest.approx({"voltage": 10})
+
+
+def test_stamps_of_a_topic_that_scatter_become_regular_and_its_signals_with_them():
+    time = 0.01 * np.arange(2000)
+    late = np.random.default_rng(0).exponential(1e-3, len(time))
+    motion = {name: np.sin(rate * time) for name, rate in zip("xyz", (3.0, 7.0, 11.0), strict=True)}
+    clean = {"timestamp": 0.004 * np.arange(5000), "q": np.ones(5000)}
+    columns, warnings = put({"gyro": {"timestamp": time + late} | motion, "other": clean}, body_rate=RATE)
+    assert warnings[0].startswith("stamps of topic gyro scatter by 1 ms about a regular clock of 100 Hz, along which")
+    assert np.diff(columns["gyro.timestamp"]).std() < 0.1 * np.diff(late).std()
+    np.testing.assert_array_equal(columns["gyro.x"], motion["x"])

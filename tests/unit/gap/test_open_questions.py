@@ -154,9 +154,9 @@ def named(name, *coefficients):
 SURE = number("inertia_x", 0.15, 0.02)
 
 
-def result(*numbers, effects=(), share=0.5):
-    known = {each.name: each.numbers for each in effects}
-    effect = wrong_numbers(found(*numbers), known, np.broadcast_to(share, 6), VehicleSettings())
+def result(*numbers, effects=(), share=0.5, unknown=0.0):
+    known, each = {each.name: each.numbers for each in effects}, (np.broadcast_to(one, 6) for one in (share, unknown))
+    effect = wrong_numbers(found(*numbers), known, *each, VehicleSettings())
     return () if effect is None else tuple(each.name for each in effect.numbers)
 
 
@@ -182,6 +182,11 @@ def test_a_refit_that_takes_nothing_off_the_gap_shows_nothing():
     assert result(SURE, share=0.04) == ()
 
 
+def test_a_residual_that_could_be_all_of_a_number_leaves_it_unnamed():
+    assert result(SURE, unknown=0.14) == ("inertia_x",)
+    assert result(SURE, unknown=0.16) == ()
+
+
 def test_the_channel_of_the_number_has_to_shrink():
     elsewhere, there = np.zeros(6), np.zeros(6)
     elsewhere[1:], there[0] = 0.9, 0.9
@@ -190,7 +195,9 @@ def test_the_channel_of_the_number_has_to_shrink():
 
 
 def test_probability_is_that_of_a_normal_error_of_the_surest_number():
-    effect = wrong_numbers(found(SURE, number("inertia_y", 0.05, 0.02)), {}, np.full(6, 0.5), VehicleSettings())
+    effect = wrong_numbers(
+        found(SURE, number("inertia_y", 0.05, 0.02)), {}, np.full(6, 0.5), np.zeros(6), VehicleSettings()
+    )
     assert effect.p_value == pytest.approx(2 * norm.sf(1.96 * 0.15 / 0.02))
     assert (effect.name, effect.share) == ("parameter_error", 0.5)
 
@@ -223,7 +230,7 @@ def test_a_wrong_drag_factor_accounts_for_as_much_of_izz():
 @pytest.mark.parametrize(("inertia", "said"), [(0.0, True), (1 / 0.9 - 1, False)])
 def test_where_rates_show_a_wrong_thrust_too_it_is_no_mass(inertia, said):
     numbers = found(number("thrust_scale", -0.1, 0.001), number("inertia_x", inertia, 0.005))
-    effect = wrong_numbers(numbers, {}, np.full(6, 0.5), VehicleSettings())
+    effect = wrong_numbers(numbers, {}, np.full(6, 0.5), np.zeros(6), VehicleSettings())
     assert ("A mass of" in effect.sentence) is said
 
 

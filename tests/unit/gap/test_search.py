@@ -71,6 +71,10 @@ def test_a_column_that_is_the_same_is_an_alternative_and_a_superset_is_none(step
     assert found["twin"].separated_by == "fly otherwise"
 
 
+def test_what_windows_do_not_show_has_no_rivals_by_them(step):
+    assert alternatives(replace(of(step, "special"), gain=-1.0), step.ranking, step.above_floor, SETTINGS) == []
+
+
 def test_a_superset_explains_as_much_all_the_same(step):
     names = {other.candidate.effect.name for other in unbeaten(of(step, "special"), step.ranking, step.above_floor)}
     assert names == {"twin", "general"}
