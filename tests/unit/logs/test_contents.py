@@ -102,6 +102,17 @@ def test_a_message_of_a_ulog_that_is_longer_than_any_is_refused_before_it_is_lis
         log_contents(path)
 
 
+def test_a_ulog_whose_last_message_is_longer_than_the_file_is_refused_in_time(tmp_path):
+    """Back by all of such a message, the reader would come to the same place of the definitions again and again."""
+    path = tmp_path / "log.ulg"
+    described = ulogs.message("F", f"{'a' * 77}:uint64_t timestamp;".encode())
+    assert len(described) == 100
+    path.write_bytes(ulogs.header() + 200 * described + struct.pack("<HB", 51 + 150 * 100, 0) + bytes(50))
+    run = [sys.executable, "-m", "cpfls_cli", "look", str(path)]
+    said = subprocess.run(run, capture_output=True, text=True, check=False, timeout=60)
+    assert "a ULog file without samples: was the logger stopped at once, or the file cut off?" in said.stderr
+
+
 def test_a_message_of_a_ulog_within_itself_is_refused(tmp_path):
     path = tmp_path / "log.ulg"
     path.write_bytes(ulogs.ulog([(0, 0, [1.0])], {"a": "uint64_t timestamp;a x"}))

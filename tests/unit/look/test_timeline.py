@@ -356,7 +356,7 @@ def test_an_accelerometer_that_reads_wrong_in_a_log_that_never_stands(size, said
     assert texts == [f"the accelerometer reads {each} g in steady flight: calibrate it" for each in said]
     # What leans or turns may be pushed by its rotors, and of a short flight nothing is known.
     lively = own.body_rate + np.sin(own.time)[:, None]
-    leaning = replace(own, attitude=own.attitude + [0.0, 0.4, 0.0])
+    leaning = replace(own, attitude=own.attitude + np.array([0.0, 0.4, 0.0]))
     for each in (replace(own, body_rate=lively), leaning, replace(own, usable=own.time < 10.0)):
         assert not list(_misread(each))
 
