@@ -357,7 +357,8 @@ def _beyond_flight(signs: Signs, part: tuple[int, int], *, lies_then: bool) -> t
     late = np.arange(first, stop) >= before.stop
     nothing = np.zeros(stop - first, dtype=bool)
     # What lies afterwards, or is upside down where the log ends, flew no more, however short it flew.
-    over = after == len(signs.time) and signs.upright is not None and _turned_up(signs.upright, before)[-1] < 0
+    ends = len(signs.time) - after < round(_THEN_S / signs.period)
+    over = ends and signs.upright is not None and _turned_up(signs.upright, before)[-1] < 0
     fewest = _REST_S if lies_then or over else _FEWEST_S
     if signs.turning is None or signs.body_rate is None or (before.stop - first) * signs.period < fewest:
         return nothing, nothing, nothing

@@ -397,7 +397,9 @@ def _gathered(seen: Seen, flown: FlownPart, speeds: Array | None, moved: MovedBy
         flown=flown,
         rate_hz=rates[base.signal],
         slowest_s=max(1 / rates[guess.signal] for guess in signals),
-        slowest_but_voltage_s=max(1 / rates[guess.signal] for guess in signals if guess.signal != "voltage"),
+        slowest_but_voltage_s=max(
+            (1 / rates[own.signal] for own in signals if own.signal != "voltage"), default=np.inf
+        ),
         moved=moved,
         speeds=speeds,
         load=None if speeds is None or seen.open_rotors else _load(seen, speeds),

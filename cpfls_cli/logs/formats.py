@@ -319,7 +319,12 @@ _TEXTS: Final = (
     (rb"(?s:<.*)?<kml\b", "a KML track", _TRACK),
     (rb"<!doctype html|<html\b", "a web page", "the download gave a page in the place of the log; save the log itself"),
     (rb"<\?xml", "XML", _AS_CSV),
-    (rb"\[\d{4}-\d\d-\d\d[ t]", "text with a stamp in brackets before each line", _AS_CSV),
+    # After the stamp of a table comes a number, or nothing but its zone.
+    (
+        rb"\[\d{4}-\d\d-\d\d[ t]|\d{4}-\d\d-\d\d[ t][\d:]+([.,]\d+)?\]?[ \t][^\d,;]*[a-z]+[\s:\])-]",
+        "text with a stamp before each line",
+        _AS_CSV,
+    ),
     (rb"[{\[]", "JSON", _AS_CSV),
     (rb"\d+\.\d+ \d+ [a-z_0-9]+ ", "a log of Paparazzi", _AS_CSV),
     (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*^[\w/]+:)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),

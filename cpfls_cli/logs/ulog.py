@@ -23,7 +23,7 @@ _PER_SECOND = 10**6
 _QUATERNION = tuple(f"q[{each}]" for each in range(4))
 _ASKED_FOR = tuple(f"q_d[{each}]" for each in range(4))
 _RECEIVERS = ("vehicle_gps_position", "sensor_gps")
-_HEADER_BYTES, _LONGEST_MESSAGE = 16, 65535
+_HEADER_BYTES, _LONGEST_MESSAGE, _MARK_BYTES = 16, 65535, 8
 _FIELD = re.compile(r"([^;\s\[]+)(?:\[(\d+)\])? [^;]*")
 
 
@@ -58,10 +58,20 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     return LogContents(topics, {}, parameters, system, _warn_of_file(log, origin), _flown_at(topics), begins, said)
 
 
+class _Stream(io.BufferedReader):
+    """A file for pyulog, which goes back for ever by all of a message that a damaged file is too short for."""
+
+    def seek(self, offset: int, whence: int = 0, /) -> int:
+        """Go to a place, from the end back by a mark of it at most: pyulog takes the error for damage."""
+        if whence == io.SEEK_CUR and offset < -_MARK_BYTES and not self.peek(1):
+            raise ValueError("a message is cut off")
+        return super().seek(offset, whence)
+
+
 def _parsed(path: Path) -> Any:
     try:
         # The reader prints what it finds wrong, which is asked for below, and leaves a file that it cannot read open.
-        with path.open("rb") as stream, redirect_stdout(io.StringIO()):
+        with _Stream(path.open("rb", buffering=0)) as stream, redirect_stdout(io.StringIO()):
             if stream.read(len(ULOG_MAGIC)) != ULOG_MAGIC:
                 raise InputError(f"{path}: not a ULog file: it does not start like one")
             _refuse_endless(path, stream)

@@ -17,6 +17,7 @@ from cpfls_cli.flightlog.recognised import Recognition
 from cpfls_cli.flightlog.topics import STAMP, YAW_RESETS, Topics
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
 from cpfls_cli.look.flight import LogFlight, Samples
+from cpfls_cli.look.steady import FEWEST_WINDOWS, calm, on_clock, windows_of
 from cpfls_cli.result import about, result
 from cpfls_cli.units import STANDARD_GRAVITY
 
@@ -453,9 +454,16 @@ def _clipped(sensor: Samples, scales: Sequence[float], name: str) -> Iterator[Ev
 
 
 def _misread(flight: LogFlight) -> Iterator[Event]:
-    reads = flight.reads_at_rest
+    reads, where = flight.reads_at_rest, "at rest"
+    if not np.isfinite(reads):
+        # What neither turns nor leans is not accelerated for long.
+        windows = windows_of(flight)
+        felt, leans = (windows.means(on_clock(flight, own)) for own in (flight.specific_force, flight.attitude))
+        sizes = np.linalg.norm(felt, axis=1)[calm(flight, windows) & np.isfinite(felt + leans).all(axis=1)]
+        reads = float(np.median(sizes)) / STANDARD_GRAVITY if len(sizes) >= FEWEST_WINDOWS else np.nan
+        where = "in steady flight"
     if abs(reads - 1) > _READS:
-        text = f"the accelerometer reads {reads:.2f} g at rest: calibrate it"
+        text = f"the accelerometer reads {reads:.2f} g {where}: calibrate it"
         yield Event(time_s=float(flight.time[0]), kind="calibration", text=text, severity="warning")
 
 

@@ -112,6 +112,15 @@ def test_a_log_that_ends_upside_down_after_a_few_seconds_of_flight():
     assert flown(over).ended == ""
 
 
+@pytest.mark.parametrize("known", [("height", "upright"), ("upright",)])
+def test_a_log_that_ends_upside_down_right_after_its_rotors_stopped(known):
+    over = ended.then(flight(6.0), 0.5, rate=-12.0, rotors=1.0)
+    found = flown(ended.then(over, 0.3, rate=-12.0), known)
+    assert re.fullmatch(r"loss of control at [56]\.\d s", found.ended)
+    # Long afterwards it has been carried away.
+    assert flown(ended.then(over, 3.0, rate=-12.0), known).ended == ""
+
+
 def test_a_vehicle_that_hangs_on_one_of_four_rotors_throughout_does_not_fly():
     time, noise = np.arange(0.0, 20.0, 0.02), np.random.default_rng(0).standard_normal((1000, 3))
     rotors, force = np.tile([0.9, 0.1, 0.1, 0.1], (1000, 1)), [0.6, 0.0, 0.8] + 0.01 * noise

@@ -102,6 +102,17 @@ def test_a_message_of_a_ulog_that_is_longer_than_any_is_refused_before_it_is_lis
         log_contents(path)
 
 
+def test_a_ulog_whose_last_message_is_longer_than_the_file_is_refused_in_time(tmp_path):
+    """Back by all of such a message, the reader would come to the same place of the definitions again and again."""
+    path = tmp_path / "log.ulg"
+    described = ulogs.message("F", f"{'a' * 77}:uint64_t timestamp;".encode())
+    assert len(described) == 100
+    path.write_bytes(ulogs.header() + 200 * described + struct.pack("<HB", 51 + 150 * 100, 0) + bytes(50))
+    run = [sys.executable, "-m", "cpfls_cli", "look", str(path)]
+    said = subprocess.run(run, capture_output=True, text=True, check=False, timeout=60)
+    assert "a ULog file without samples: was the logger stopped at once, or the file cut off?" in said.stderr
+
+
 def test_a_message_of_a_ulog_within_itself_is_refused(tmp_path):
     path = tmp_path / "log.ulg"
     path.write_bytes(ulogs.ulog([(0, 0, [1.0])], {"a": "uint64_t timestamp;a x"}))
@@ -737,7 +748,9 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.kml", b"<kml>", "a KML track", "log of the autopilot"),
         ("a.csv", b"<!DOCTYPE html>\n<html>a,b", "a web page", "save the log itself"),
         ("a.csv", b'{"t": 1,\n', "JSON", "write its numbers as CSV"),
-        ("a.log", b"[2024-06-13 11:56:33.1] [0x7f] Time [s], x [m]\n", "text with a stamp in brackets", "as CSV"),
+        ("a.log", b"[2024-06-13 11:56:33.1] [0x7f] Time [s], x [m]\n", "text with a stamp before each line", "as CSV"),
+        ("a.log", b"2025-08-14 15:48:34,661 - INFO - Position: x=2, y=0\n", "text with a stamp before each", "as CSV"),
+        ("a.csv", b"2025-08-14 15:48:34.661 DEBUG: x=2,y=0\n", "text with a stamp before each line", "as CSV"),
         (
             "a.csv",
             b"Date,Time,1RSS(dB),Alt(m),Alt(m)\n",
@@ -774,7 +787,8 @@ def test_a_file_that_is_no_log_is_named_with_the_way_to_one(tmp_path, name, cont
     assert way in said
 
 
-def test_a_log_is_no_foreign_file(tmp_path):
+@pytest.mark.parametrize("line", ["t,x\n0,1\n", "2025-08-14 15:48:34.1,0.1\n", "2025-08-14 15:48:34 UTC,0.1\n"])
+def test_a_log_is_no_foreign_file(tmp_path, line):
     path = tmp_path / "a.csv"
-    path.write_text("t,x\n0,1\n")
+    path.write_text(line)
     assert foreign_file(path) is None

@@ -215,6 +215,16 @@ def test_a_log_without_a_gyroscope():
         read(contents)
 
 
+def test_a_log_of_heights_and_a_voltage_alone():
+    contents = logs.ardupilot(OWN)
+    for name in set(contents.topics) - {"BAT"}:
+        del contents.topics[name]
+    climbs = 5 - 5 * np.cos(0.5 * OWN.time)
+    contents.topics["CTUN"] = {"timestamp": OWN.time, "Alt": climbs, "BAlt": climbs}
+    with pytest.raises(InputError, match=r"^a log without a gyroscope \(it holds .*voltage.*\): .*LOG_BITMASK"):
+        read(contents)
+
+
 def test_surfaces_of_an_airplane_are_no_rotors():
     asked = {"throttle": 0.5 + 0 * OWN.time, "aileron": OWN.angles[:, 0], "elevator": OWN.angles[:, 1]}
     with pytest.raises(InputError, match=r"acceleration.*; aileron and elevator are no rotors\): log body rates"):

@@ -11,7 +11,7 @@ from cpfls_cli.look.flight import Samples
 from cpfls_cli.look.logged import what_is_logged
 from cpfls_cli.look.look import look_at
 from cpfls_cli.look.reading import read_flight
-from cpfls_cli.look.timeline import _at_limit, timeline
+from cpfls_cli.look.timeline import _at_limit, _misread, timeline
 from tests.builders import ended_flights as ended
 from tests.builders import looked_logs as logs
 from tests.builders.dataflash_logs import dataflash
@@ -347,6 +347,18 @@ def test_an_accelerometer_that_reads_wrong_shows_no_hover():
         "the accelerometer reads 0.79 g at rest: calibrate it"
     ]
     assert not np.isfinite(read(contents)[0].specific_force).any()
+
+
+@pytest.mark.parametrize(("size", "said"), [(1.28, ["1.28"]), (1.05, []), (0.8, ["0.80"])])
+def test_an_accelerometer_that_reads_wrong_in_a_log_that_never_stands(size, said):
+    own = still_flight(20.0, specific_force=np.tile([0.0, 0.0, -9.80665 * size], (1000, 1)))
+    texts = [event.text for event in _misread(own)]
+    assert texts == [f"the accelerometer reads {each} g in steady flight: calibrate it" for each in said]
+    # What leans or turns may be pushed by its rotors, and of a short flight nothing is known.
+    lively = own.body_rate + np.sin(own.time)[:, None]
+    leaning = replace(own, attitude=own.attitude + np.array([0.0, 0.4, 0.0]))
+    for each in (replace(own, body_rate=lively), leaning, replace(own, usable=own.time < 10.0)):
+        assert not list(_misread(each))
 
 
 def test_the_autopilots_word_for_take_off_may_come_long_before():
