@@ -10,13 +10,10 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over, logarithmic, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, Axes, Drawn, Figure, legend_over, logarithmic, style_of
 from cpfls_cli.report.content import UNKNOWN, number, printed, whole_percent, with_interval
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from cpfls_cli.gap.naming.results import Estimate, GapChange, NamedEffect
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,13 +27,8 @@ from cpfls_cli.pages.gap import (
 from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
 from cpfls_cli.pages.trust import contradicted
-from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over
+from cpfls_cli.report.canvas import GREY, Axes, Drawn, Figure, in_columns, legend_over
 from cpfls_cli.report.content import plain, probability
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4 -o mission.h5"
 """Plans of flights that separate the vehicle from the loop, and a missing effect from gusts."""

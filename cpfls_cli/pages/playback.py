@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,14 +21,10 @@ from cpfls_cli.playback.errors import (
     ByHorizon,
 )
 from cpfls_cli.playback.gusts import GustAxis
-from cpfls_cli.report.canvas import BASELINE, GREY, HELD, legend_over, line, stacked, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, HELD, Figure, legend_over, line, stacked, style_of
 from cpfls_cli.report.content import number
 from cpfls_cli.rounding import less
 from cpfls_cli.words import joined
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 WHO: Mapping[str, str] = {
     MODEL: "the model",

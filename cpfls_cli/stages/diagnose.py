@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -47,7 +46,7 @@ from cpfls_cli.pages.playback import SIGNALS, WHO, axis_words, draw_errors, erro
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.errors import AFTER
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.canvas import GREY, Drawn, legend_over, plain_ticks, stacked
+from cpfls_cli.report.canvas import GREY, Axes, Drawn, Figure, legend_over, plain_ticks, stacked
 from cpfls_cli.report.content import Command
 from cpfls_cli.report.source import Source
 from cpfls_cli.rounding import less
@@ -55,10 +54,6 @@ from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.stages.compare import check_ignored, progress_of, to_correct
 from cpfls_cli.words import joined
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _VISIBLE = 0.05  # Share of the error without a model by which a playback has to grow to be called worse.
 

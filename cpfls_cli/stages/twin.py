@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from cpfls_cli.report.canvas import (
     BASELINE,
     HELD,
     Drawn,
+    Figure,
     band,
     legend_over,
     line,
@@ -65,9 +66,6 @@ from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import STILL_AIR
 from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.stages.compare import to_gap
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _CPFLS = "cpfls"
 _SHOWN_S = 6.0

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 from fnmatch import fnmatch
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +63,7 @@ from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
 from cpfls_cli.playback.vehicle import FoundVehicle, Share, find_vehicle
-from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over, line, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, legend_over, line, style_of
 from cpfls_cli.report.content import percent
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
 from cpfls_cli.response.spectra import ACCEPTABLE
@@ -74,9 +74,6 @@ from cpfls_cli.stages._checkpoint import stop_note
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import did_you_mean, joined
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _KEPT_EVERY = 10
 """Structures after which the checkpoint is written again: what a killed search has to judge anew at most."""
