@@ -6,6 +6,7 @@ In addition to Markdown, a template knows
   page shows them open;
 - figures, ``![caption](name)`` on a line of their own, which a terminal leaves out;
 - notes, ``> text``, which a terminal prints on standard error; those with a tone however many others there are;
+- ``{% notes texts %}`` and ``{% paragraphs texts %}`` for several, with a tone behind a comma;
 - tones, ``{good}``, ``{warning}`` or ``{unsure}`` behind a cell, a heading or a paragraph;
 - names, ``{#name}`` behind a heading of a section, for links, or behind the paragraph before a table, its caption;
 - ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page, ``####``
@@ -25,12 +26,14 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import count, pairwise
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 from urllib.parse import quote
 
 import numpy as np
-from jinja2 import BytecodeCache, Environment, FileSystemLoader, StrictUndefined
+from jinja2 import BytecodeCache, Environment, FileSystemLoader, StrictUndefined, nodes
 from jinja2.bccache import Bucket
+from jinja2.ext import Extension
+from jinja2.parser import Parser
 from markdown_it import MarkdownIt
 from markdown_it.rules_core import StateCore
 from markdown_it.token import Token
@@ -187,6 +190,25 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 _NOTHING: Mapping[str, Any] = {}
 
 
+class _Listed(Extension):
+    """``{% notes texts %}``, ``{% paragraphs texts, "warning" %}``: one behind the other, perhaps with a tone."""
+
+    tags: ClassVar = {"notes", "paragraphs"}
+
+    def parse(self, parser: Parser) -> nodes.Node:
+        """Read what is listed, and the tone of all of it."""
+        tag = next(parser.stream)
+        given = [nodes.Const("> " if tag.value == "notes" else ""), parser.parse_expression()]
+        if parser.stream.skip_if("comma"):
+            given.append(parser.parse_expression())
+        return nodes.Output([self.call_method("written", given)], lineno=tag.lineno)
+
+    def written(self, begin: str, texts: Iterable[Any], tone: str = "") -> Markup:
+        """Write each with a blank line behind it."""
+        behind = f" {{{tone}}}" if tone else ""
+        return Markup("".join(f"{begin}{escaped(text)}{behind}\n\n" for text in texts))
+
+
 class _Compiled(BytecodeCache):
     """Templates as compiled, once for all stages: what each adds is looked up when they are rendered."""
 
@@ -218,6 +240,7 @@ def environment(folder: Path, added: Mapping[str, Any]) -> Environment:
         finalize=escaped,
         undefined=StrictUndefined,
         bytecode_cache=_COMPILED,
+        extensions=[_Listed],
         trim_blocks=True,
         lstrip_blocks=True,
     )
