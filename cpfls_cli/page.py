@@ -6,7 +6,8 @@ In addition to Markdown, a template knows
   page shows them open;
 - figures, ``![caption](name)`` on a line of their own, which a terminal leaves out;
 - notes, ``> text``, which a terminal prints on standard error; those with a tone however many others there are;
-- ``{% notes texts %}`` and ``{% paragraphs texts %}`` for several, with a tone behind a comma;
+- ``{% notes texts %}`` and ``{% paragraphs texts %}`` for several, with a tone behind a comma, and
+  ``{% list name = x for y in z if w %}``;
 - tones, ``{good}``, ``{warning}`` or ``{unsure}`` behind a cell, a heading or a paragraph;
 - names, ``{#name}`` behind a heading of a section, for links, or behind the paragraph before a table, its caption;
 - ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page, ``####``
@@ -26,7 +27,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import count, pairwise
 from pathlib import Path
-from typing import Any, ClassVar, cast
+from typing import Any, cast
 from urllib.parse import quote
 
 import numpy as np
@@ -191,17 +192,34 @@ _NOTHING: Mapping[str, Any] = {}
 
 
 class _Listed(Extension):
-    """``{% notes texts %}``, ``{% paragraphs texts, "warning" %}``: one behind the other, perhaps with a tone."""
+    """Several at once: ``{% notes xs %}``, ``{% paragraphs xs, "warning" %}``, ``{% list x = f(y) for y in ys %}``."""
 
-    tags: ClassVar = {"notes", "paragraphs"}
+    tags = {"notes", "paragraphs", "list"}  # noqa: RUF012  # as the library declares it
 
-    def parse(self, parser: Parser) -> nodes.Node:
+    def parse(self, parser: Parser) -> nodes.Node | list[nodes.Node]:
         """Read what is listed, and the tone of all of it."""
         tag = next(parser.stream)
+        if tag.value == "list":
+            return [each.set_lineno(tag.lineno) for each in self._listed(parser)]
         given = [nodes.Const("> " if tag.value == "notes" else ""), parser.parse_expression()]
         if parser.stream.skip_if("comma"):
             given.append(parser.parse_expression())
         return nodes.Output([self.call_method("written", given)], lineno=tag.lineno)
+
+    @staticmethod
+    def _listed(parser: Parser) -> Iterator[nodes.Node]:
+        """Read a name, what is listed under it, and of what: as a loop that appends."""
+        name = parser.parse_assign_target(name_only=True)
+        parser.stream.expect("assign")
+        each = parser.parse_expression()
+        parser.stream.expect("name:for")
+        target = parser.parse_assign_target(extra_end_rules=("name:in",))
+        parser.stream.expect("name:in")
+        every = parser.parse_tuple(with_condexpr=False, extra_end_rules=("name:if",))
+        test = parser.parse_expression() if parser.stream.skip_if("name:if") else None
+        append = nodes.Getattr(nodes.Name(name.name, "load"), "append", "load")
+        yield nodes.Assign(name, nodes.List([]))
+        yield nodes.For(target, every, [nodes.ExprStmt(nodes.Call(append, [each], [], None, None))], [], test, False)
 
     def written(self, begin: str, texts: Iterable[Any], tone: str = "") -> Markup:
         """Write each with a blank line behind it."""
