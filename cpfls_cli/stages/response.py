@@ -54,6 +54,7 @@ from cpfls_cli.response.spectra import (
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, with_numbers
 from cpfls_cli.stages.compare import to_correct, to_gap
+from cpfls_cli.words import by_name
 
 _FOLLOWERS = (*(f"{axis} rate" for axis in ROTATION), *(f"{axis} angle" for axis in ROTATION[:2]))
 _KINDS = {
@@ -143,13 +144,7 @@ def _bode(name: str) -> Drawn:
     Responses,
     title="Frequency responses",
     figures={name.replace(" ", "-"): _bode(name) for name in _KINDS},
-    words={
-        "contradicted": contradicted,
-        "hz_behind": hz_behind,
-        "kinds": _KINDS.__getitem__,
-        "limits": (GOOD, ACCEPTABLE),
-        "median_of": median_of,
-    },
+    words={**by_name(contradicted, hz_behind, median_of), "kinds": _KINDS.__getitem__, "limits": (GOOD, ACCEPTABLE)},
     study=True,
 )
 def response(

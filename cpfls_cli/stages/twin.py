@@ -66,6 +66,7 @@ from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import STILL_AIR
 from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.stages.compare import to_gap
+from cpfls_cli.words import by_name
 
 _CPFLS = "cpfls"
 _SHOWN_S = 6.0
@@ -196,13 +197,9 @@ def _is_judged(r: Twin) -> bool:
         "time": Drawn("Difference by second", 4.4, _seconds, _is_judged),
     },
     words={
-        "blown_of": blown_of,
-        "contradicted": contradicted,
+        **by_name(blown_of, contradicted, _named, stretch_of, _unit),
         "finite": np.isfinite,
         "law_of": lambda name: AUTOPILOTS[name].title if name in AUTOPILOTS else name,
-        "named": _named,
-        "stretch_of": stretch_of,
-        "unit": _unit,
     },
     study=True,
 )
