@@ -6,6 +6,8 @@ In addition to Markdown, a template knows
   page shows them open;
 - figures, ``![caption](name)`` on a line of their own, which a terminal leaves out;
 - notes, ``> text``, which a terminal prints on standard error; those with a tone however many others there are;
+- ``{% notes texts %}`` and ``{% paragraphs texts %}`` for several, with a tone behind a comma, and
+  ``{% list name = x for y in z if w %}``;
 - tones, ``{good}``, ``{warning}`` or ``{unsure}`` behind a cell, a heading or a paragraph;
 - names, ``{#name}`` behind a heading of a section, for links, or behind the paragraph before a table, its caption;
 - ``#`` for the answer, ``##`` for a section, ``###`` for a card of it, with ``{wide}`` as wide as the page, ``####``
@@ -29,8 +31,10 @@ from typing import Any, cast
 from urllib.parse import quote
 
 import numpy as np
-from jinja2 import BytecodeCache, Environment, FileSystemLoader, StrictUndefined
+from jinja2 import BytecodeCache, Environment, FileSystemLoader, StrictUndefined, nodes
 from jinja2.bccache import Bucket
+from jinja2.ext import Extension
+from jinja2.parser import Parser
 from markdown_it import MarkdownIt
 from markdown_it.rules_core import StateCore
 from markdown_it.token import Token
@@ -187,6 +191,42 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 _NOTHING: Mapping[str, Any] = {}
 
 
+class _Listed(Extension):
+    """Several at once: ``{% notes xs %}``, ``{% paragraphs xs, "warning" %}``, ``{% list x = f(y) for y in ys %}``."""
+
+    tags = {"notes", "paragraphs", "list"}  # noqa: RUF012  # as the library declares it
+
+    def parse(self, parser: Parser) -> nodes.Node | list[nodes.Node]:
+        """Read what is listed, and the tone of all of it."""
+        tag = next(parser.stream)
+        if tag.value == "list":
+            return [each.set_lineno(tag.lineno) for each in self._listed(parser)]
+        given = [nodes.Const("> " if tag.value == "notes" else ""), parser.parse_expression()]
+        if parser.stream.skip_if("comma"):
+            given.append(parser.parse_expression())
+        return nodes.Output([self.call_method("written", given)], lineno=tag.lineno)
+
+    @staticmethod
+    def _listed(parser: Parser) -> Iterator[nodes.Node]:
+        """Read a name, what is listed under it, and of what: as a loop that appends."""
+        name = parser.parse_assign_target(name_only=True)
+        parser.stream.expect("assign")
+        each = parser.parse_expression()
+        parser.stream.expect("name:for")
+        target = parser.parse_assign_target(extra_end_rules=("name:in",))
+        parser.stream.expect("name:in")
+        every = parser.parse_tuple(with_condexpr=False, extra_end_rules=("name:if",))
+        test = parser.parse_expression() if parser.stream.skip_if("name:if") else None
+        append = nodes.Getattr(nodes.Name(name.name, "load"), "append", "load")
+        yield nodes.Assign(name, nodes.List([]))
+        yield nodes.For(target, every, [nodes.ExprStmt(nodes.Call(append, [each], [], None, None))], [], test, False)
+
+    def written(self, begin: str, texts: Iterable[Any], tone: str = "") -> Markup:
+        """Write each with a blank line behind it."""
+        behind = f" {{{tone}}}" if tone else ""
+        return Markup("".join(f"{begin}{escaped(text)}{behind}\n\n" for text in texts))
+
+
 class _Compiled(BytecodeCache):
     """Templates as compiled, once for all stages: what each adds is looked up when they are rendered."""
 
@@ -218,6 +258,7 @@ def environment(folder: Path, added: Mapping[str, Any]) -> Environment:
         finalize=escaped,
         undefined=StrictUndefined,
         bytecode_cache=_COMPILED,
+        extensions=[_Listed],
         trim_blocks=True,
         lstrip_blocks=True,
     )

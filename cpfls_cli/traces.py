@@ -15,12 +15,10 @@ from markupsafe import escape
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import visible
 from cpfls_cli.page import TEMPLATES
-from cpfls_cli.report.canvas import BASELINE, Drawn, legend_above, stacked, style_of
+from cpfls_cli.report.canvas import BASELINE, Drawn, Figure, legend_above, stacked, style_of
 from cpfls_cli.trace import Track, thinned
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from cpfls_cli.look.timeline import Event
 
 MOST_VALUES = 1_500_000

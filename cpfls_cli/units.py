@@ -61,30 +61,21 @@ class Unit:
     si: str
 
 
+_FACTORS = {
+    "1": {"1": 1.0},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "rad": {"rad": 1.0, "deg": pi / 180},
+    "rad/s": {"rad/s": 1.0, "deg/s": pi / 180, "rpm": 2 * pi / 60},
+    "m": {"m": 1.0, "mm": 1e-3},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3},
+    "m/s^2": {"m/s^2": 1.0, "g": STANDARD_GRAVITY},
+    "N m": {"N·m": 1.0, "N m": 1.0, "N mm": 1e-3},
+    "N": {"N": 1.0},
+    "V": {"V": 1.0},
+}
+"""Of each SI unit those of the same quantity, and their size in it."""
 KNOWN_UNITS: Final = MappingProxyType[str, Unit](
-    {
-        "1": Unit(1.0, "1"),
-        "s": Unit(1.0, "s"),
-        "ms": Unit(1e-3, "s"),
-        "us": Unit(1e-6, "s"),
-        "ns": Unit(1e-9, "s"),
-        "rad": Unit(1.0, "rad"),
-        "deg": Unit(pi / 180, "rad"),
-        "rad/s": Unit(1.0, "rad/s"),
-        "deg/s": Unit(pi / 180, "rad/s"),
-        "rpm": Unit(2 * pi / 60, "rad/s"),
-        "m": Unit(1.0, "m"),
-        "mm": Unit(1e-3, "m"),
-        "m/s": Unit(1.0, "m/s"),
-        "mm/s": Unit(1e-3, "m/s"),
-        "m/s^2": Unit(1.0, "m/s^2"),
-        "g": Unit(STANDARD_GRAVITY, "m/s^2"),
-        "N·m": Unit(1.0, "N m"),
-        "N m": Unit(1.0, "N m"),
-        "N mm": Unit(1e-3, "N m"),
-        "N": Unit(1.0, "N"),
-        "V": Unit(1.0, "V"),
-    }
+    {name: Unit(factor, si) for si, units in _FACTORS.items() for name, factor in units.items()}
 )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from textwrap import wrap
+from typing import Any
 
 
 def joined(words: Iterable[str], last: str = "and") -> str:
@@ -28,6 +29,11 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str, *, most: int =
     """Ask whether one of the known names was meant that are most alike; say something else where none is."""
     near = get_close_matches(name, list(known), n=most, cutoff=cutoff)
     return f"did you mean {' or '.join(near)}?" if near else otherwise
+
+
+def by_name(*functions: Any) -> dict[str, Any]:
+    """Give functions by their names, as templates call them."""
+    return {each.__name__.lstrip("_"): each for each in functions}
 
 
 def broken(text: str, width: int | None, indent: str = "") -> list[str]:

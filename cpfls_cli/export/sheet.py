@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -142,6 +142,10 @@ class Sheet:
     def facts(self) -> list[str]:
         """Paragraphs that say what the model is, what it is good for and where it comes from."""
         return [*self.remarks, "", *self._origin()]
+
+    def said(self, remarks: Sequence[str], use: Sequence[str] = ()) -> list[str]:
+        """Give the paragraphs with which a file begins: facts, what it does not hold, how it is used."""
+        return [*self.facts, "", *remarks, *(["", *use] if use else [])]
 
     @property
     def remarks(self) -> list[str]:

@@ -30,6 +30,11 @@ def comment_lines(paragraphs: Sequence[str]) -> list[str]:
     return lines
 
 
+def commented(mark: str, paragraphs: Sequence[str]) -> list[str]:
+    """Write paragraphs as lines of a comment that each begin with a mark."""
+    return [f"{mark}{line}".rstrip() for line in comment_lines(paragraphs)]
+
+
 def comment_text(text: str) -> str:
     """Make text fit for a comment: printable ASCII in one line, without the signs that comments end and begin with."""
     ascii_only = re.sub(r"[^\x20-\x7e]", "?", text).replace("\\", "|")
@@ -118,7 +123,7 @@ def _written(value: Any, depth: int) -> str:
 
 def yaml_text(comment: Sequence[str], document: Mapping[str, Any]) -> str:
     """Write a document as YAML that any reader takes, below a comment: mappings in lines, lists of numbers in one."""
-    return "\n".join([*(f"#{line}".rstrip() for line in comment_lines(comment)), *_yaml_lines(document, ""), ""])
+    return "\n".join([*commented("#", comment), *_yaml_lines(document, ""), ""])
 
 
 def _yaml_lines(document: Mapping[str, Any], blank: str) -> Iterator[str]:

@@ -22,6 +22,11 @@ DERIVATIVES = ("pop", "crackle", "snap", "jerk", "acceleration", "velocity", "di
 """Derivatives of the displacement, from the sixth down to itself."""
 
 
+def _in_time(text: str, unit: str, frame: str = WORLD, **more: Any) -> Any:
+    """Describe a signal of three axes along a path."""
+    return about(text, "time", "axis", unit=unit, frame=frame, brief=False, **more)
+
+
 @result
 class Move:
     """A move of the path from rest to rest."""
@@ -71,9 +76,9 @@ class Excited:
     crest_factor: Array = about("peak over root mean square of the signal of each", "excited")
     signal: str = about("multisine, sweep-linear or sweep-logarithmic")
     band_hz: Array = about("lowest and highest frequency", "2", unit="Hz")
-    attitude: Array = about("roll, pitch, yaw that it adds", "time", "axis", unit="rad", frame=EULER, brief=False)
-    position: Array = about("position that it adds", "time", "axis", unit="m", frame=WORLD, brief=False)
-    acceleration: Array = about("acceleration that it adds", "time", "axis", unit="m/s^2", frame=WORLD, brief=False)
+    attitude: Array = _in_time("roll, pitch, yaw that it adds", "rad", EULER)
+    position: Array = _in_time("position that it adds", "m")
+    acceleration: Array = _in_time("acceleration that it adds", "m/s^2")
 
     @classmethod
     def of(cls, asked: ExciteSettings, flown: PlannedRotation, without: PlannedRotation, room: RoomLeft) -> Excited:
@@ -145,32 +150,20 @@ class PlannedPath:
     )
 
     time: Array = about("time from the first sample", "time", unit="s", ascends=True, brief=False)
-    position: Array | None = about("position", "time", "axis", unit="m", frame=WORLD, brief=False, default=None)
-    velocity: Array | None = about("velocity", "time", "axis", unit="m/s", frame=WORLD, brief=False, default=None)
-    acceleration: Array | None = about(
-        "acceleration", "time", "axis", unit="m/s^2", frame=WORLD, brief=False, default=None
-    )
-    jerk: Array | None = about(
-        "third derivative of position", "time", "axis", unit="m/s^3", frame=WORLD, brief=False, default=None
-    )
-    snap: Array | None = about(
-        "fourth derivative of position", "time", "axis", unit="m/s^4", frame=WORLD, brief=False, default=None
-    )
-    crackle: Array | None = about(
-        "fifth derivative of position", "time", "axis", unit="m/s^5", frame=WORLD, brief=False, default=None
-    )
-    pop: Array | None = about(
-        "sixth derivative of position", "time", "axis", unit="m/s^6", frame=WORLD, brief=False, default=None
-    )
+    position: Array | None = _in_time("position", "m", default=None)
+    velocity: Array | None = _in_time("velocity", "m/s", default=None)
+    acceleration: Array | None = _in_time("acceleration", "m/s^2", default=None)
+    jerk: Array | None = _in_time("third derivative of position", "m/s^3", default=None)
+    snap: Array | None = _in_time("fourth derivative of position", "m/s^4", default=None)
+    crackle: Array | None = _in_time("fifth derivative of position", "m/s^5", default=None)
+    pop: Array | None = _in_time("sixth derivative of position", "m/s^6", default=None)
     yaw: Array = about("planned yaw", "time", unit="rad", frame=EULER, brief=False)
     yaw_rate: Array = about("derivative of yaw", "time", unit="rad/s", frame=EULER, brief=False)
     yaw_acceleration: Array = about("second derivative of yaw", "time", unit="rad/s^2", frame=EULER, brief=False)
-    attitude: Array = about("roll, pitch, yaw q", "time", "axis", unit="rad", frame=EULER, brief=False)
-    attitude_rate: Array = about("Euler rates qd", "time", "axis", unit="rad/s", frame=EULER, brief=False)
-    attitude_acceleration: Array = about(
-        "Euler accelerations qdd", "time", "axis", unit="rad/s^2", frame=EULER, brief=False
-    )
-    body_rate: Array = about("body rates p, q, r", "time", "axis", unit="rad/s", frame=BODY, brief=False)
+    attitude: Array = _in_time("roll, pitch, yaw q", "rad", EULER)
+    attitude_rate: Array = _in_time("Euler rates qd", "rad/s", EULER)
+    attitude_acceleration: Array = _in_time("Euler accelerations qdd", "rad/s^2", EULER)
+    body_rate: Array = _in_time("body rates p, q, r", "rad/s", BODY)
     duration_s: float = about("duration of all runs", unit="s")
     max_thrust_n: float = about("largest thrust that it asks for, between samples too", unit="N")
     max_tilt_rad: float | None = about("largest tilt that it asks for", unit="rad", default=None)

@@ -231,6 +231,11 @@ _TIE, _ROUNDING = 0.01, 1e-12
 _MEASURES = ("mse", "max_error", "relative_error", "r2", "vaf", "r2_body")
 
 
+def _score(text: str, *, frame: str = EULER, **more: Any) -> Any:
+    """Describe scores by model, part and axis."""
+    return about(text, "judged_model", "part", "axis", frame=frame, brief=False, **more)
+
+
 @result
 class Judged:
     """Scores of the model and its baselines, by model, part of the data and axis."""
@@ -239,36 +244,12 @@ class Judged:
     parts: tuple[str, ...] = about("training, held-out rest, other flights", "part")
     samples: IntArray = about("samples judged", "part")
     outside: IntArray = about("of them outside the attitudes that training visited", "part")
-    mse: Array = about(
-        "mean squared torque error", "judged_model", "part", "axis", unit="(N m)^2", frame=EULER, brief=False
-    )
-    max_error: Array = about(
-        "largest torque error", "judged_model", "part", "axis", unit="N m", frame=EULER, brief=False
-    )
-    relative_error: Array = about(
-        "largest error over largest torque", "judged_model", "part", "axis", gaps=True, frame=EULER, brief=False
-    )
-    r2: Array = about(
-        "share of the torque's variance explained", "judged_model", "part", "axis", gaps=True, frame=EULER, brief=False
-    )
-    vaf: Array = about(
-        "the same without the mean of the error: variance accounted for",
-        "judged_model",
-        "part",
-        "axis",
-        gaps=True,
-        frame=EULER,
-        brief=False,
-    )
-    r2_body: Array = about(
-        "the same for body torque, not near a pitch of +-90 deg",
-        "judged_model",
-        "part",
-        "axis",
-        gaps=True,
-        frame=BODY,
-        brief=False,
-    )
+    mse: Array = _score("mean squared torque error", unit="(N m)^2")
+    max_error: Array = _score("largest torque error", unit="N m")
+    relative_error: Array = _score("largest error over largest torque", gaps=True)
+    r2: Array = _score("share of the torque's variance explained", gaps=True)
+    vaf: Array = _score("the same without the mean of the error: variance accounted for", gaps=True)
+    r2_body: Array = _score("the same for body torque, not near a pitch of +-90 deg", gaps=True, frame=BODY)
 
     @classmethod
     def of(cls, found: Identification) -> Self:

@@ -22,7 +22,7 @@ from cpfls_cli.report.content import ROUNDING, UNKNOWN, count, number, percent, 
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.rounding import less
 from cpfls_cli.validation.validate import Curves
-from cpfls_cli.words import joined
+from cpfls_cli.words import by_name, joined
 
 _OVERALL = (
     "Model",
@@ -186,15 +186,11 @@ def _axes(model: _Model, kind: str, part: str) -> tuple[tuple[float, ...], tuple
 
 
 COMPARISON_WORDS: Mapping[str, Any] = {
+    **by_name(_by_axis, compared_curves, compared_parts, _judged_alone, _overall),
     "FLOOR_TICK": FLOOR_TICK,
     "MOST_KEYS": _MOST_KEYS,
-    "by_axis": _by_axis,
-    "compared_curves": compared_curves,
-    "compared_parts": compared_parts,
     "differing_keys": lambda models: differences([model.config for model in models]),
     "hashes": _hashes_words,
-    "judged_alone": _judged_alone,
-    "overall": _overall,
 }
 """What the template of several identified models knows (`identify_compared.md.j2`)."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,13 +10,11 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over, logarithmic, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, Axes, Drawn, Figure, legend_over, logarithmic, style_of
 from cpfls_cli.report.content import UNKNOWN, number, printed, whole_percent, with_interval
+from cpfls_cli.words import by_name
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from cpfls_cli.gap.naming.results import Estimate, GapChange, NamedEffect
 
 
@@ -264,3 +262,10 @@ def _draw_row(axes: Axes, row: int, placed: Array) -> None:
     if np.isfinite(low) and np.isfinite(high):
         axes.hlines(row, np.clip(low, 0, 1), np.clip(high, 0, 1), color="black", linewidth=2.4, zorder=1)
     axes.plot([np.clip(value, 0.0, 1.0)], [row], "o", color=AFTER["color"], markersize=6, zorder=2)
+
+
+WORDS: Mapping[str, Any] = {
+    **by_name(channel_name, channel_unit, channel_words, effect_title, titles, unit_words, share_words, number_words),
+    **by_name(measured, possible, meaning, vehicle_number),
+}
+"""What templates know of channels, effects and their numbers."""

@@ -3,37 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.residual.repeated import OPEN, Repeatability
 from cpfls_cli.gap.settings import CLEAR
-from cpfls_cli.pages.gap import (
-    channel_name,
-    channel_unit,
-    channel_words,
-    effect_title,
-    meaning,
-    measured,
-    number_words,
-    possible,
-    share_words,
-    titles,
-    unit_words,
-    vehicle_number,
-)
+from cpfls_cli.pages.gap import WORDS, channel_words
 from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height
 from cpfls_cli.pages.playback import WORDS as PLAYBACK_WORDS
-from cpfls_cli.pages.trust import contradicted
-from cpfls_cli.report.canvas import GREY, Drawn, in_columns, legend_over
+from cpfls_cli.report.canvas import GREY, Axes, Drawn, Figure, in_columns, legend_over
 from cpfls_cli.report.content import plain, probability
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
+from cpfls_cli.words import by_name
 
 WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4 -o mission.h5"
 """Plans of flights that separate the vehicle from the loop, and a missing effect from gusts."""
@@ -132,25 +114,11 @@ def playback_drawn() -> Drawn:
 
 GAP_WORDS: Mapping[str, Any] = {
     **PLAYBACK_WORDS,
+    **WORDS,
+    **by_name(by_reason, plain, probability),
     "again_open": OPEN,
-    "by_reason": by_reason,
-    "channel_name": channel_name,
-    "channel_unit": channel_unit,
-    "channel_words": channel_words,
     "channels": CHANNELS,
     "clear": CLEAR,
-    "contradicted": contradicted,
-    "effect_title": effect_title,
-    "meaning": meaning,
-    "measured": measured,
     "not_split": NOT_SPLIT,
-    "number_words": number_words,
-    "plain": plain,
-    "possible": possible,
-    "probability": probability,
-    "share_words": share_words,
-    "titles": titles,
-    "unit_words": unit_words,
-    "vehicle_number": vehicle_number,
 }
 """Words, constants and filters, by the name that templates use."""

@@ -33,6 +33,7 @@ from cpfls_cli.validation.bands import band
 from cpfls_cli.validation.replay import StepErrors
 from cpfls_cli.validation.validate import Curves, RoundTrip
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.words import by_name
 
 _MODELS = {
     MODEL: "model",
@@ -218,27 +219,14 @@ def _chromosome(r: IdentifiedModel) -> list[list[str]]:
 WORDS: Mapping[str, Any] = {
     **MODEL_WORDS,
     **COMPARISON_WORDS,
+    **by_name(_chromosome, _followed, _inertia_bands, _same_as_rigid, _scores, _table_5, _whiteness, _winners),
+    **by_name(_with_axis, at_most, count, first_objective, has_partitions, r_squared, weight_words),
     "AXES": AXES,
     "MODEL": MODEL,
     "MODELS": _MODELS,
     "RIGID_BODY": RIGID_BODY,
     "TRAINING": TRAINING,
-    "at_most": at_most,
-    "chromosome": _chromosome,
-    "count": count,
-    "first_objective": first_objective,
-    "followed": _followed,
-    "has_partitions": has_partitions,
-    "inertia_bands": _inertia_bands,
-    "r_squared": r_squared,
     "round_trip_words": _round_trip,
-    "same_as_rigid": _same_as_rigid,
-    "scores": _scores,
     "steps_rows": _steps,
-    "table_5": _table_5,
-    "weight_words": weight_words,
-    "whiteness": _whiteness,
-    "winners": _winners,
-    "with_axis": _with_axis,
 }
 """What templates of identified models know, of one and of several."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from math import ceil
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,7 +20,9 @@ from cpfls_cli.report.canvas import (
     BASELINE,
     GREY,
     HELD,
+    Axes,
     Drawn,
+    Figure,
     band,
     in_columns,
     legend_above,
@@ -34,10 +36,6 @@ from cpfls_cli.report.content import number, plain
 from cpfls_cli.report.source import Source
 from cpfls_cli.validation.residuals import ResidualAnalysis
 from cpfls_cli.validation.validate import Curves
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PREDICTORS = {"rigid-body": "rigid body", "nothing-moves": "nothing moves"}
 """What a model is compared with where motion is predicted."""

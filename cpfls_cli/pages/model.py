@@ -14,18 +14,13 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.pages.gap import effect_title, unit_words
 from cpfls_cli.pages.trust import learned_words, model_words, stopped_words
 from cpfls_cli.report.content import Text, impossible, number, plain
-from cpfls_cli.words import joined
+from cpfls_cli.words import by_name, joined
 
 WORDS: Mapping[str, Any] = {
+    **by_name(impossible, learned_words, name_of, plain, stopped_words, unit_words),
     "FOUND_AS": FOUND_AS,
     "INERTIA_PARAMETERS": INERTIA_PARAMETERS,
     "effect_name": lambda name: "numbers refitted" if CATALOGUE[name].kind == "parameter" else effect_title(name),
-    "impossible": impossible,
-    "learned_words": learned_words,
-    "name_of": name_of,
-    "plain": plain,
-    "stopped_words": stopped_words,
-    "unit_words": unit_words,
     "words_of": model_words,
 }
 """What templates of models know (`model_parts.md.j2`)."""

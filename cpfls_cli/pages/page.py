@@ -44,6 +44,7 @@ from cpfls_cli.report.content import (
 )
 from cpfls_cli.report.source import Source, Sources
 from cpfls_cli.stage import stage_named
+from cpfls_cli.words import by_name
 
 
 def _summary_section(sources: Sources) -> Section:
@@ -160,12 +161,7 @@ def _range(values: Sequence[float]) -> str:
     return low if low == high else f"{low} … {high}"
 
 
-WORDS: Mapping[str, Any] = {
-    "BEYOND": BEYOND,
-    "compared_constants": compared_constants,
-    "model_words": model_words,
-    "vehicle_rows": _vehicle_rows,
-}
+WORDS: Mapping[str, Any] = {"BEYOND": BEYOND, **by_name(compared_constants, model_words, _vehicle_rows)}
 """What templates of several artifacts know."""
 
 _EXACT = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,14 +21,10 @@ from cpfls_cli.playback.errors import (
     ByHorizon,
 )
 from cpfls_cli.playback.gusts import GustAxis
-from cpfls_cli.report.canvas import BASELINE, GREY, HELD, legend_over, line, stacked, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, HELD, Figure, legend_over, line, stacked, style_of
 from cpfls_cli.report.content import number
 from cpfls_cli.rounding import less
-from cpfls_cli.words import joined
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+from cpfls_cli.words import by_name, joined
 
 WHO: Mapping[str, str] = {
     MODEL: "the model",
@@ -75,12 +71,10 @@ def spans(horizon: Array, better: BoolArray) -> str:
 
 
 WORDS: Mapping[str, Any] = {
-    "contradicted": contradicted,
-    "less": less,
+    **by_name(contradicted, less, spans),
     "moves": lambda signal, r: r.moves(signal),
     "signal_words": lambda signal: SIGNALS[signal][0],
     "signals": SIGNALS,
-    "spans": spans,
     "who": WHO,
     "wins": lambda signal, r: r.wins(signal),
 }

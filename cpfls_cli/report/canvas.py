@@ -23,11 +23,14 @@ from cpfls_cli.report.content import Picture, Plot, number, plain, power_of_ten
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
+    from matplotlib.axes import Axes as Axes
     from matplotlib.axis import Axis, Ticker
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
     from matplotlib.text import Text
     from matplotlib.ticker import Formatter, Locator
+else:
+    # What modules that draw write at their arguments.
+    Axes = Figure = Any
 
 # Matplotlib is loaded where something is drawn: the sentences of a page are also those of the terminal.
 WIDTH = 7.6

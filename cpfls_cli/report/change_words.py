@@ -13,7 +13,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.changes.results import Found, Shows
 from cpfls_cli.report.content import number
 from cpfls_cli.result import Estimate
-from cpfls_cli.words import joined
+from cpfls_cli.words import by_name, joined
 
 _HEAVY = 1000.0  # Grams that are written in kg.
 _SCALES: Mapping[str, Callable[[float], float]] = {
@@ -188,10 +188,7 @@ def natural_unit(name: str) -> str | None:
 
 
 WORDS = {
-    each.__name__: each
-    for each in (
-        *(cause_name, change_words, hover_words, smallest_words, is_within, checks, would_have_shown, most_moved),
-        *(number_meanings, natural_unit),
-    )
+    **by_name(cause_name, change_words, hover_words, smallest_words, is_within, checks, would_have_shown, most_moved),
+    **by_name(number_meanings, natural_unit),
 }
 """For templates."""

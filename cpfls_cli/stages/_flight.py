@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.flightlog.results import Flight
-from cpfls_cli.report.canvas import Drawn, legend_above, line, stacked, style_of
+from cpfls_cli.report.canvas import Drawn, Figure, legend_above, line, stacked, style_of
 from cpfls_cli.report.content import plain
 from cpfls_cli.simulation.inverse import Flyability, TooMuch
 from cpfls_cli.simulation.model import Infeasible
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 from cpfls_cli.units import SPEED_UNITS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 _TURN = 360.0
 STILL_AIR = "flown in still air; the model holds the gusts of its flights: --gusts plays them"

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -23,7 +23,7 @@ from cpfls_cli.changes.results import Changed
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.training import numbered_roles, once
 from cpfls_cli.logs.formats import formats_in_words
-from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over
+from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, legend_over
 from cpfls_cli.report.change_words import WORDS
 from cpfls_cli.report.source import unique_labels
 from cpfls_cli.result import column
@@ -42,9 +42,6 @@ from cpfls_cli.stages._flight_numbers import (
 )
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _NO_COLUMN = re.compile(r"import\.signals\.(?P<signal>\w+)\.columns: the log has no column '(?P<column>[^']+)'")
 _RATE = 0.01  # By which sampling rates differ that are another.

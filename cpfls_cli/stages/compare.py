@@ -33,16 +33,14 @@ from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.canvas import Drawn, in_columns, line, plain_ticks, stacked
+from cpfls_cli.report.canvas import Axes, Drawn, Figure, in_columns, line, plain_ticks, stacked
 from cpfls_cli.report.content import Command, plain
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, why_no_body_found, with_numbers
 from cpfls_cli.words import did_you_mean
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.collections import PatchCollection
-    from matplotlib.figure import Figure
 
 _STRETCHES, _SIGNALS, _COLUMNS, _LEVELS = 5, 4, 2, 8
 _BLUE, _SHADE = "#1b4f8a", "#f3d9b8"

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -43,22 +42,18 @@ from cpfls_cli.pages.gap import (
     wrong_numbers,
 )
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn
-from cpfls_cli.pages.playback import SIGNALS, WHO, axis_words, draw_errors, errors_height
+from cpfls_cli.pages.playback import SIGNALS, axis_words, draw_errors, errors_height
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.errors import AFTER
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.report.canvas import GREY, Drawn, legend_over, plain_ticks, stacked
+from cpfls_cli.report.canvas import GREY, Axes, Drawn, Figure, legend_over, plain_ticks, stacked
 from cpfls_cli.report.content import Command
 from cpfls_cli.report.source import Source
 from cpfls_cli.rounding import less
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.stages.compare import check_ignored, progress_of, to_correct
-from cpfls_cli.words import joined
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from cpfls_cli.words import by_name, joined
 
 _VISIBLE = 0.05  # Share of the error without a model by which a playback has to grow to be called worse.
 
@@ -174,16 +169,12 @@ FIGURES = {
 }
 WORDS = {
     **GAP_WORDS,
+    **by_name(_farther_off, hidden_gaps, _leaving),
     "axes": BODY_AXES,
-    "farther_off": _farther_off,
     "finite": np.isfinite,
     "gust_words": axis_words,
-    "hidden_gaps": hidden_gaps,
-    "leaving": _leaving,
     "of_guesses": is_of_guesses,
-    "signals": SIGNALS,
     "unplayed": lambda playback: [words for name, (words, *_) in SIGNALS.items() if name not in playback.signals],
-    "who": WHO,
     "wrong_numbers": _wrong,
 }
 

@@ -39,7 +39,7 @@ from cpfls_cli.simulators.study import VehicleOf, of_log
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, room
-from cpfls_cli.words import capitalised, joined
+from cpfls_cli.words import by_name, capitalised, joined
 
 _IMPORTED = 4
 """Logs that are imported one by one; more are taken as they are."""
@@ -248,16 +248,7 @@ def _asked_words(keys: Sequence[str]) -> str:
     return ", ".join([*others, *(f"{joined(list(own))} of {joined(rotors)}" for own, rotors in by_keys.items())])
 
 
-_WORDS = {
-    "by_topic": _by_topic,
-    "contradicted": contradicted,
-    "in_braces": _in_braces,
-    "unit": _unit,
-    "rotors_in_words": _rotors_in_words,
-}
-
-
-@stage(Proposed, words=_WORDS)
+@stage(Proposed, words=by_name(_by_topic, contradicted, _in_braces, _unit, _rotors_in_words))
 def init(
     run: Run,
     logs: MayLogsArgument = None,

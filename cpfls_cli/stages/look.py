@@ -8,7 +8,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -21,13 +21,9 @@ from cpfls_cli.look.flight import AXES
 from cpfls_cli.look.look import Look, look_at
 from cpfls_cli.look.loop import AxisLoop
 from cpfls_cli.look.vibration import Spectrum
-from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, band, legend_above, logarithmic, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, Axes, Drawn, Figure, band, legend_above, logarithmic, style_of
 from cpfls_cli.stage import Run, stage, unique_names
 from cpfls_cli.traces import traces
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _SEEN = 0.15
 """Coherence below which a point of a frequency response is left out."""

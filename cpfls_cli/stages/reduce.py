@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,13 +15,10 @@ from cpfls_cli.errors import ComputationError, ConfigError, about
 from cpfls_cli.flights.training import flight_roles, split_training, uniform_regressor
 from cpfls_cli.reduction.survey import survey
 from cpfls_cli.reduction.training_set import Selection, check_streamed, random_streamed, reduce_streamed
-from cpfls_cli.report.canvas import BASELINE, Drawn, legend_above, style_of
+from cpfls_cli.report.canvas import BASELINE, Drawn, Figure, legend_above, style_of
 from cpfls_cli.report.content import count
 from cpfls_cli.rounding import at_most, less
 from cpfls_cli.stage import Run, stage
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 RANDOM_DRAWS = 20
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,13 +25,9 @@ from cpfls_cli.playback.player import Observer, past_of
 from cpfls_cli.playback.replay import USUAL, Playback, Played, Replay, playback
 from cpfls_cli.playback.replay import replay as played_back
 from cpfls_cli.playback.settings import VEHICLE
-from cpfls_cli.report.canvas import HELD, Drawn, legend_over, line, plain_ticks, stacked, style_of
+from cpfls_cli.report.canvas import HELD, Axes, Drawn, Figure, legend_over, line, plain_ticks, stacked, style_of
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import with_numbers
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _FORECAST = "{}: its forecast along logged rotor speeds is played, loop included; its constants are a different model"
 _PLAYED: dict[str, Any] = {**style_of(1), "linestyle": "-", "zorder": 3}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -27,7 +27,9 @@ from cpfls_cli.report.canvas import (
     BASELINE,
     GREY,
     HELD,
+    Axes,
     Drawn,
+    Figure,
     band,
     legend_above,
     legend_over,
@@ -52,10 +54,7 @@ from cpfls_cli.response.spectra import (
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly, with_numbers
 from cpfls_cli.stages.compare import to_correct, to_gap
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from cpfls_cli.words import by_name
 
 _FOLLOWERS = (*(f"{axis} rate" for axis in ROTATION), *(f"{axis} angle" for axis in ROTATION[:2]))
 _KINDS = {
@@ -145,13 +144,7 @@ def _bode(name: str) -> Drawn:
     Responses,
     title="Frequency responses",
     figures={name.replace(" ", "-"): _bode(name) for name in _KINDS},
-    words={
-        "contradicted": contradicted,
-        "hz_behind": hz_behind,
-        "kinds": _KINDS.__getitem__,
-        "limits": (GOOD, ACCEPTABLE),
-        "median_of": median_of,
-    },
+    words={**by_name(contradicted, hz_behind, median_of), "kinds": _KINDS.__getitem__, "limits": (GOOD, ACCEPTABLE)},
     study=True,
 )
 def response(

@@ -8,7 +8,7 @@ from enum import StrEnum
 from importlib import import_module
 from math import inf, radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -22,7 +22,7 @@ from cpfls_cli.excitation import Excitation, optimised_rotation
 from cpfls_cli.flights.path import DERIVATIVES, Excited, PlannedPath
 from cpfls_cli.logs.csv_log import read_csv, row_lines
 from cpfls_cli.pages.gap import effect_title
-from cpfls_cli.report.canvas import BASELINE, Drawn, line, picture_of, stacked, style_of
+from cpfls_cli.report.canvas import BASELINE, Drawn, Figure, line, picture_of, stacked, style_of
 from cpfls_cli.report.content import plain
 from cpfls_cli.simulation.inverse import Flyability, RoomLeft, flyability, room_left, single_axis_torque
 from cpfls_cli.stage import Run, stage
@@ -34,9 +34,6 @@ from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory, held_rota
 from cpfls_cli.trajectory.rotation import RotationPath, full_rotation
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings, check_waypoints
 from cpfls_cli.words import did_you_mean, joined
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class Signal(StrEnum):

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -27,7 +27,7 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.flights.training import numbered_roles, once
 from cpfls_cli.logs.formats import formats_in_words, is_log
-from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, band, in_columns, legend_over
+from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, band, in_columns, legend_over
 from cpfls_cli.report.change_words import WORDS, natural_unit
 from cpfls_cli.report.source import unique_labels
 from cpfls_cli.result import column
@@ -45,9 +45,6 @@ from cpfls_cli.stages._flight_numbers import (
     without_voltage,
 )
 from cpfls_cli.workers.workforce import employ
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _FLIGHT = "cpfls/flight"
 _COMPARED, _BEFORE = 3, 5

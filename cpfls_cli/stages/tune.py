@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -38,7 +38,9 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import (
     BASELINE,
     GREY,
+    Axes,
     Drawn,
+    Figure,
     band,
     legend_over,
     line,
@@ -54,10 +56,6 @@ from cpfls_cli.tuning.gains import PROPOSED, AskedMargins, Gains, ParameterRow, 
 from cpfls_cli.tuning.plant import LEAST, Noise, Spread, noise_of, spread_of
 from cpfls_cli.validation.trust import Trust
 from cpfls_cli.words import joined
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _ASSUMED_LAG = (0.7, 1.3)
 _ASSUMED_GAIN = (0.8, 1.25)

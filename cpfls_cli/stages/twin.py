@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from cpfls_cli.report.canvas import (
     BASELINE,
     HELD,
     Drawn,
+    Figure,
     band,
     legend_over,
     line,
@@ -65,9 +66,7 @@ from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._flight import STILL_AIR
 from cpfls_cli.stages._numbers import with_numbers
 from cpfls_cli.stages.compare import to_gap
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cpfls_cli.words import by_name
 
 _CPFLS = "cpfls"
 _SHOWN_S = 6.0
@@ -198,13 +197,9 @@ def _is_judged(r: Twin) -> bool:
         "time": Drawn("Difference by second", 4.4, _seconds, _is_judged),
     },
     words={
-        "blown_of": blown_of,
-        "contradicted": contradicted,
+        **by_name(blown_of, contradicted, _named, stretch_of, _unit),
         "finite": np.isfinite,
         "law_of": lambda name: AUTOPILOTS[name].title if name in AUTOPILOTS else name,
-        "named": _named,
-        "stretch_of": stretch_of,
-        "unit": _unit,
     },
     study=True,
 )

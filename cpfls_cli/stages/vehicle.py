@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 from fnmatch import fnmatch
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +63,7 @@ from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
 from cpfls_cli.playback.vehicle import FoundVehicle, Share, find_vehicle
-from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, legend_over, line, style_of
+from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, legend_over, line, style_of
 from cpfls_cli.report.content import percent
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
 from cpfls_cli.response.spectra import ACCEPTABLE
@@ -73,10 +73,7 @@ from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._checkpoint import stop_note
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.validation.trust import Trust
-from cpfls_cli.words import did_you_mean, joined
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from cpfls_cli.words import by_name, did_you_mean, joined
 
 _KEPT_EVERY = 10
 """Structures after which the checkpoint is written again: what a killed search has to judge anew at most."""
@@ -168,6 +165,7 @@ def shares_in_words(shares: Sequence[Share], first: int) -> str:
 WORDS: Mapping[str, Any] = {
     **MODEL_WORDS,
     **PLAYBACK_WORDS,
+    **by_name(excess, gust_words, is_learned, known_bands, log_faster, shown_slowly, _to_know, too_heavy),
     "ACCEPTABLE": ACCEPTABLE,
     "ANY": ANY,
     "BY_HAND": BY_HAND,
@@ -184,16 +182,8 @@ WORDS: Mapping[str, Any] = {
     "WHAT_TO_FLY": WHAT_TO_FLY,
     "by_name": lambda rows: {each.name: each for each in rows},
     "clipped": lambda share: float(np.clip(share, 0.0, 1.0)),
-    "excess": excess,
-    "gust_words": gust_words,
-    "is_learned": is_learned,
-    "known_bands": known_bands,
-    "log_faster": log_faster,
     "section": lambda r: to_yaml({"vehicle": vehicle_section(r)}).rstrip(),
     "shares": shares_in_words,
-    "shown_slowly": shown_slowly,
-    "to_know": _to_know,
-    "too_heavy": too_heavy,
     "wanting": _reasons,
 }
 

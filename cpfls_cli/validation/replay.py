@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.dynamics import Predictor, RotationState, free_runs, turning_law
 from cpfls_cli.identification.data import TorqueSource, gathered, sample_times
 from cpfls_cli.playback.player import rotation_vectors
-from cpfls_cli.result import BODY, about
+from cpfls_cli.result import BODY, about, result
 from cpfls_cli.validation.residuals import sample_period, stretch_numbers
 
 # 40 MB of rotations, rates and torques at a time.
@@ -53,7 +53,12 @@ def _starts(stretch: IntArray, steep: BoolArray, horizon: int) -> IntArray:
     return np.asarray(first[clear], dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False)
+def _error(text: str, over: str, unit: str) -> Any:
+    """Describe errors of predictors over horizons or windows."""
+    return about(text, "predictor", over, "axis", unit=unit, frame=BODY, gaps=True, brief=False)
+
+
+@result
 class StepErrors:
     """Root mean square errors of attitude and body rate by horizon.
 
@@ -65,30 +70,10 @@ class StepErrors:
     samples: IntArray = about("samples replayed", "horizon", brief=False)
     horizon: Array = about("the same as time", "horizon", unit="s", brief=False)
     windows: int = about("windows replayed")
-    attitude: Array = about(
-        "root mean square error; not known from where on a window is lost",
-        "predictor",
-        "horizon",
-        "axis",
-        unit="rad",
-        frame=BODY,
-        gaps=True,
-        brief=False,
-    )
-    body_rate: Array = about(
-        "root mean square error", "predictor", "horizon", "axis", unit="rad/s", frame=BODY, gaps=True, brief=False
-    )
+    attitude: Array = _error("root mean square error; not known from where on a window is lost", "horizon", "rad")
+    body_rate: Array = _error("root mean square error", "horizon", "rad/s")
     lost: IntArray = about("windows in which a predictor ran away", "predictor", "horizon", brief=False)
-    window_error: Array = about(
-        "mean squared error of the body rate over a window",
-        "predictor",
-        "window",
-        "axis",
-        unit="(rad/s)^2",
-        frame=BODY,
-        gaps=True,
-        brief=False,
-    )
+    window_error: Array = _error("mean squared error of the body rate over a window", "window", "(rad/s)^2")
     start: IntArray = about("first sample of each window", "window", brief=False)
 
 

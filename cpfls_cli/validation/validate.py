@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from cpfls_cli.identification.identify import Identification, model_evaluator
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.structure import PITCH, ROLL
-from cpfls_cli.result import EULER, about
+from cpfls_cli.result import EULER, about, result
 from cpfls_cli.rotations import wrapped
 from cpfls_cli.validation.bands import Draws, Physics, bootstrap, definite_share, inertia_band, physical_sense
 from cpfls_cli.validation.evidence import (
@@ -71,7 +72,7 @@ def validate(
     learned: TorqueSource,
     held_out: Mapping[str, TorqueSource],
     settings: IdentificationSettings,
-    result: Identification,
+    found: Identification,
     rng: np.random.Generator,
     tell: Tell = lambda _: None,
 ) -> Validation:
@@ -90,27 +91,27 @@ def validate(
     tell : callable, optional
         Called with the name of each step.
     """
-    asked, model = settings.validation, result.model
+    asked, model = settings.validation, found.model
     part, source = next(iter(held_out.items()), (TRAINING, training))
     drawing, _, simulating = rng.spawn(3)
     tell("compares structures")
-    freed_data = source_of(result.freed, training, learned)
+    freed_data = source_of(found.freed, training, learned)
     structures = compare_structures(*freed_data, settings) if asked.structures else None
     tell("draws bands")
-    draws = bootstrap(model_evaluator(*freed_data, settings), freed_data[0], model, result.fit, asked, drawing)
-    drawn = curves(model, draws, result.rigid_body, training)
+    draws = bootstrap(model_evaluator(*freed_data, settings), freed_data[0], model, found.fit, asked, drawing)
+    drawn = curves(model, draws, found.rigid_body, training)
     tell("identifies its own simulation")
     again = round_trip(*freed_data, settings, model, drawn, simulating)
     tell("replays measured torques")
-    predictors: dict[str, Predictor] = {MODEL: model, RIGID_BODY: result.rigid_body}
+    predictors: dict[str, Predictor] = {MODEL: model, RIGID_BODY: found.rigid_body}
     steps = replay_steps(part, source, predictors, asked.horizon_samples, asked.windows)
     residuals = examine_residuals(part, source, model.torque, asked.lags)
     physics = physical_sense(model)
-    torques = {MODEL: model.torque, RIGID_BODY: result.baselines[0].torque}
+    torques = {MODEL: model.torque, RIGID_BODY: found.baselines[0].torque}
     missing = {name: mean_missing_torque(training, torque) for name, torque in torques.items()}
     ours, theirs = (with_constant(torques[name], missing[name]) for name in (MODEL, RIGID_BODY))
     evidence = Evidence(
-        identification=result,
+        identification=found,
         torque={name: compare_torque(judged, ours, theirs) for name, judged in held_out.items()},
         steps=steps,
         replayed={
@@ -123,7 +124,7 @@ def validate(
         band=drawn.relative_width,
         definite=definite_share(model, draws),
     )
-    judged = with_loop(verdict(evidence), result.loop, by_past=result.freed is not None)
+    judged = with_loop(verdict(evidence), found.loop, by_past=found.freed is not None)
     return Validation(structures, residuals, draws, drawn, again, steps, physics, judged)
 
 
@@ -142,7 +143,12 @@ _LOOKED_AT = 100_000
 _ROUNDING = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+def _along_curves(text: str) -> Any:
+    """Describe D(q) along the curves."""
+    return about(text, "curve", "point", "axis", "axis", unit="kg m^2", frame=EULER, brief=False)
+
+
+@result
 class Curves:
     """D(q) along two curves of attitudes, with its 95 % bands.
 
@@ -154,25 +160,10 @@ class Curves:
     attitude: Array = about(
         "attitudes along each curve", "curve", "point", "axis", unit="rad", frame=EULER, brief=False
     )
-    inertia: Array = about(
-        "D_ij(q) of the model", "curve", "point", "axis", "axis", unit="kg m^2", frame=EULER, brief=False
-    )
-    low: Array = about(
-        "lower end of its 95 % band", "curve", "point", "axis", "axis", unit="kg m^2", frame=EULER, brief=False
-    )
-    high: Array = about(
-        "upper end of its 95 % band", "curve", "point", "axis", "axis", unit="kg m^2", frame=EULER, brief=False
-    )
-    rigid_body: Array = about(
-        "D_ij(q) of the rigid body that fits best",
-        "curve",
-        "point",
-        "axis",
-        "axis",
-        unit="kg m^2",
-        frame=EULER,
-        brief=False,
-    )
+    inertia: Array = _along_curves("D_ij(q) of the model")
+    low: Array = _along_curves("lower end of its 95 % band")
+    high: Array = _along_curves("upper end of its 95 % band")
+    rigid_body: Array = _along_curves("D_ij(q) of the rigid body that fits best")
     outside: BoolArray = about("1 outside the attitudes that training visited", "curve", "point", brief=False)
 
     @property
@@ -232,20 +223,11 @@ def simulated_torque(source: TorqueSource, model: InertiaFunctions, blocks: Time
     return OtherTorque(source, simulated)
 
 
-@dataclass(frozen=True, eq=False)
+@result
 class RoundTrip:
     """D(q) identified again from torque that the model gave."""
 
-    inertia: Array = about(
-        "D_ij(q) identified from a simulation of the model",
-        "curve",
-        "point",
-        "axis",
-        "axis",
-        unit="kg m^2",
-        frame=EULER,
-        brief=False,
-    )
+    inertia: Array = _along_curves("D_ij(q) identified from a simulation of the model")
     inside: Array = about(
         "share of visited points within the band; not known of an entry that is zero",
         "axis",
@@ -277,7 +259,7 @@ def round_trip(
     """
     again = _identified_again(_simulated(training, learned, settings, model, rng), settings, model)
     inertia = again.inertia(curves.attitude.reshape(-1, 3)).value.reshape(curves.inertia.shape)
-    return RoundTrip(inertia, _inside(inertia, curves))
+    return RoundTrip(inertia=inertia, inside=_inside(inertia, curves))
 
 
 def _simulated(

@@ -26,7 +26,7 @@ from cpfls_cli.effects.scales import arm
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import Numbers, cross_order, numbers_of, places, spins, weights_of_model
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.text import comment_lines, in_json
+from cpfls_cli.export.text import commented, in_json
 from cpfls_cli.playback.flight import State
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Course, fly_body
@@ -121,8 +121,7 @@ def ardupilot_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) 
         "order": "ArduPilot's X" if crossed is not None else "the config, which the frame has to have too",
         "radius": "" if known else ", whose rotors are taken for half as long as the arm, for no config says",
     }
-    said = [*sheet.facts, "", *remarks, "", *(each.format(**words) for each in _USE)]
-    lines = [f"# {line}".rstrip() for line in comment_lines(said)]
+    lines = commented("# ", sheet.said(remarks, [each.format(**words) for each in _USE]))
     given = [f'  "{name}": {in_json(value)}' for name, value in _keys(sheet.model, held, order).items()]
     return "\n".join([*lines, "{", ",\n".join(given), "}", ""])
 

@@ -24,7 +24,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import Held, Holds, held_by
 from cpfls_cli.export.numbers import numbers_of
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.text import comment_lines, number
+from cpfls_cli.export.text import commented, number
 from cpfls_cli.playback.model import VehicleModel
 
 LACKS = "It states how motors share thrust and torques: no mass, inertia, size of thrust, lag or drag."
@@ -47,7 +47,7 @@ def betaflight_held(model: VehicleModel) -> tuple[Held, Holds]:
 
 def betaflight_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> str:
     """Write the mixer of a vehicle, with what it does not hold."""
-    lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *remarks, "", *_USE])]
+    lines = commented("#", sheet.said(remarks, _USE))
     mixers = [
         f"mmix {motor} {' '.join(number(share, '.6f') for share in shares)}"
         for motor, shares in enumerate(_mixer(held).tolist())

@@ -17,7 +17,7 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import ANY_ROTORS, Held, Holds, held_by
 from cpfls_cli.export.numbers import Numbers, cross_order, numbers_of, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.text import comment_lines, number
+from cpfls_cli.export.text import commented, number
 from cpfls_cli.playback.model import VehicleModel
 
 LACKS = (
@@ -60,16 +60,7 @@ def crazyflie_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) 
     }
     order = cross_order(sheet.model.vehicle, "crazyflie")
     motors = "" if order is None else ", ".join(f"motor {at} is rotor {own + 1}" for at, own in enumerate(order, 1))
-    said = [
-        f"{file}: a vehicle found in flights.",
-        "",
-        *sheet.facts,
-        "",
-        *remarks,
-        "",
-        *_USE,
-        f"Of the config {motors}.",
-    ]
-    lines = [f" *{line}".rstrip() for line in comment_lines(said)]
+    said = [f"{file}: a vehicle found in flights.", "", *sheet.said(remarks, _USE), f"Of the config {motors}."]
+    lines = commented(" *", said)
     defines = [f"#define {name} {number(value)}f // {unit}" for name, (value, unit) in given.items()]
     return "\n".join(["/*", *lines, " */", *defines, ""])

@@ -20,7 +20,7 @@ from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by, require_four
 from cpfls_cli.export.numbers import Numbers, numbers_of, places, spins
 from cpfls_cli.export.sheet import Sheet
-from cpfls_cli.export.text import comment_lines, in_json
+from cpfls_cli.export.text import commented, in_json
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.units import RPM
 from cpfls_cli.vehicle.motion import Instant, Wrench
@@ -86,7 +86,7 @@ def crazyflow_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str)
         "thrust_max": found["thrust_linear"] * most + found["thrust"] * most**2,
     }
     lag = () if rate else ("The rotors have no lag: give no rotor_vel, or commands and rotor_vel alike.",)
-    lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *remarks, "", _USE, *lag])]
+    lines = commented("#", sheet.said(remarks, [_USE, *lag]))
     return "\n".join(
         [*lines, "", f"[{sheet.name}]", *(f"{name} = {in_json(each)}" for name, each in given.items()), ""]
     )

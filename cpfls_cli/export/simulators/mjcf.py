@@ -65,7 +65,7 @@ def mjcf_held(model: VehicleModel) -> tuple[Held, Holds]:
 def mjcf_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> str:
     """Write a vehicle as MJCF, with what it does not hold."""
     root = ElementTree.Element("mujoco", model=sheet.name)
-    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *remarks, "", *_USE])))
+    root.append(ElementTree.Comment(xml_text(sheet.said(remarks, _USE))))
     drag = -float(held.weights[3, _DRAG[0], 0])
     option = {"timestep": number(STEP_S), "integrator": "RK4", "gravity": f"0 0 {number(-held.body.gravity)}"}
     ElementTree.SubElement(root, "option", option | ({"density": number(_DENSITY)} if drag else {}))

@@ -47,7 +47,7 @@ def pegasus_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) ->
     }
     words = {
         "source": comment_text(file),
-        "facts": comment_lines([*sheet.facts, "", *remarks]),
+        "facts": comment_lines(sheet.said(remarks)),
         "curve": curve,
         "drag": python_rows(-np.diag(held.weights[DRAG]), 0),
         "mass": number(held.body.mass),

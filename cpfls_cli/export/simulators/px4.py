@@ -19,7 +19,7 @@ from cpfls_cli.export.numbers import numbers_of, places, spins
 from cpfls_cli.export.parameter_files import QGROUNDCONTROL_HEAD, qgroundcontrol_line
 from cpfls_cli.export.sheet import Sheet
 from cpfls_cli.export.simulators.sdf import sdf_root, written
-from cpfls_cli.export.text import comment_lines, number
+from cpfls_cli.export.text import commented, number
 from cpfls_cli.playback.model import VehicleModel
 
 AIRFRAME = ".airframe"
@@ -40,6 +40,10 @@ _OF_GROUND = (
     "QGroundControl: Vehicle Configuration, Parameters, Tools, Load from file. Rotor N of the config is motor N, whose "
     "command of 0 to 1 is a share of the largest speed; set THR_MDL_FAC 1 with it. No gain is set here: cpfls tune "
     "--autopilot px4 finds them.",
+)
+_OF_AIRFRAME = (
+    "Commands of 0 to 1 are rotor speeds of 0 to the largest, so thrust goes with their square: THR_MDL_FAC 1. No gain "
+    "is set here: those of rc.mc_defaults were not made for this vehicle."
 )
 _HOVER = (0.1, 0.8)
 """Documented range of MPC_THR_HOVER."""
@@ -66,7 +70,7 @@ def px4_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str
 
 def px4_parameters(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> str:
     """Write the geometry of a vehicle as parameters that QGroundControl loads, with what they do not hold."""
-    lines = [f"#{line}".rstrip() for line in comment_lines([*sheet.facts, "", *remarks, "", *_OF_GROUND])]
+    lines = commented("#", sheet.said(remarks, _OF_GROUND))
     rows = [qgroundcontrol_line(name, value) for name, value in _geometry(sheet, held).items()]
     return "\n".join([*lines, QGROUNDCONTROL_HEAD, *rows, ""])
 
@@ -106,16 +110,7 @@ def _airframe(sheet: Sheet, held: Held, remarks: Sequence[str]) -> str:
     parameters |= {"THR_MDL_FAC": "1.0", "MPC_THR_HOVER": number(hover)}
     kind = _TYPES.get(len(thrust), "Multirotor")
     head = ["#!/bin/sh", "#", f"# @name {sheet.name}", "#", f"# @type {kind}", "#"]
-    said = [
-        *sheet.facts,
-        "",
-        *remarks,
-        "",
-        *((cut, "") if hover != hovers else ()),
-        "Commands of 0 to 1 are rotor speeds of 0 to the largest, so thrust goes with their square: THR_MDL_FAC 1. No "
-        "gain is set here: those of rc.mc_defaults were not made for this vehicle.",
-    ]
-    lines = [f"#{line}".rstrip() for line in comment_lines(said)]
+    lines = commented("#", sheet.said(remarks, [*((cut, "") if hover != hovers else ()), _OF_AIRFRAME]))
     begin = ["", ". ${R}etc/init.d/rc.mc_defaults", ""]
     begin += ["PX4_SIMULATOR=${PX4_SIMULATOR:=gz}", f"PX4_SIM_MODEL=${{PX4_SIM_MODEL:={sheet.name}}}", ""]
     return "\n".join([*head, *lines, *begin, *(f"param set-default {k} {v}" for k, v in parameters.items()), ""])

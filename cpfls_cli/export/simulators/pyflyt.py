@@ -58,7 +58,7 @@ def _order(vehicle: VehicleSettings) -> IntArray:
 def pyflyt_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> str:
     """Write a vehicle for PyFlyt, the URDF or by its ending the numbers of its motors, with what it does not hold."""
     path, order, found = Path(file), _order(sheet.model.vehicle), held.numbers
-    said = [*sheet.facts, "", *remarks, "", *_use(path.stem, sheet.model.vehicle, order)]
+    said = sheet.said(remarks, _use(path.stem, sheet.model.vehicle, order))
     if path.suffix != NUMBERS:
         root, hubs = ElementTree.Element("robot", name=path.stem), places(sheet.model, alike=True)
         root.append(ElementTree.Comment(xml_text(said)))

@@ -58,7 +58,7 @@ def rotorpy_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) ->
     }
     words = {
         "source": comment_text(file),
-        "facts": comment_lines([*sheet.facts, "", *remarks]),
+        "facts": comment_lines(sheet.said(remarks)),
         "lags": held.response.lag_s > 0.0,
         "numbers": {name: number(value) for name, value in given.items()},
         "positions": [python_rows(place, 0) for place in places(model, alike=True)],

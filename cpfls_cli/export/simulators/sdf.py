@@ -77,7 +77,7 @@ def sdf_root(
 ) -> ElementTree.Element:
     """Build the document of a vehicle; without a namespace the topics are those of whatever spawns it."""
     root = ElementTree.Element("sdf", version="1.9")
-    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *remarks, "", _spin_in_words(sheet, held), *use])))
+    root.append(ElementTree.Comment(xml_text(sheet.said(remarks, [_spin_in_words(sheet, held), *use]))))
     model = ElementTree.SubElement(root, "model", name=sheet.name)
     hubs = places(sheet.model, alike=False)
     rotor = _rotor_inertia(sheet, held)

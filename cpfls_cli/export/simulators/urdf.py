@@ -64,7 +64,7 @@ def urdf_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> s
     """Write a vehicle as URDF, with what it does not hold."""
     order, hubs = order_of(sheet.model.vehicle), places(sheet.model, alike=True)
     root = ElementTree.Element("robot", name=sheet.name)
-    root.append(ElementTree.Comment(xml_text([*sheet.facts, "", *remarks, "", *_use(order)])))
+    root.append(ElementTree.Comment(xml_text(sheet.said(remarks, _use(order)))))
     rotors = " ".join(str(rotor + 1) for rotor in order.tolist())
     ElementTree.SubElement(root, "properties", _properties(sheet, held) | {"rotors": rotors})
     add_body(root, held, arm(sheet.model.vehicle))

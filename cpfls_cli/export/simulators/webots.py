@@ -54,7 +54,7 @@ def webots_text(sheet: Sheet, held: Held, remarks: Sequence[str], file: str) -> 
     clockwise = [f"motor{index}" for index, way in enumerate(ways, 1) if way < 0]
     words = {
         "name": checked_identifier(Path(file).stem),
-        "facts": comment_lines([*sheet.facts, "", *remarks, "", *_use(clockwise)]),
+        "facts": comment_lines(sheet.said(remarks, _use(clockwise))),
         "rotors": rotors,
         "speed": number(most),
         "mass": number(held.body.mass),
