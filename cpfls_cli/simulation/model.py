@@ -31,19 +31,6 @@ class SimulatedEffect:
     effect: Effect
     values: Mapping[str, float]
 
-    @property
-    def linear(self) -> Array:
-        """Coefficients of the columns; 1 where everything is in the shape."""
-        if self.effect.unit_coefficient:
-            return np.ones(1)
-        physical = np.array([self.values[coefficient.name] for coefficient in self.effect.coefficients])
-        return physical if self.effect.physical is None else self.effect.physical.linear(physical)
-
-    @property
-    def shape(self) -> Mapping[str, float]:
-        """Values of the shapes."""
-        return {shape.name: self.values[shape.name] for shape in self.effect.shapes}
-
 
 @dataclass(frozen=True)
 class SimulatedEffects:

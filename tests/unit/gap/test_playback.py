@@ -39,9 +39,15 @@ EFFECTS = {
 
 def model_of(asked):
     """The true model of a simulated flight."""
-    flying = simulated_effects(asked, VEHICLE).listed
-    fitted = [FittedEffect(Candidate(one.effect, one.shape), np.asarray(one.linear)) for one in flying]
-    return whole(*fitted)
+    return whole(*(fitted(one.effect, one.values) for one in simulated_effects(asked, VEHICLE).listed))
+
+
+def fitted(effect, values):
+    """An effect of the catalogue with its values."""
+    physical = np.array([values[each.name] for each in effect.coefficients])
+    linear = physical if effect.physical is None else effect.physical.linear(physical)
+    shape = {each.name: values[each.name] for each in effect.shapes}
+    return FittedEffect(Candidate(effect, shape), np.ones(1) if effect.unit_coefficient else linear)
 
 
 def whole(*fitted, **numbers):
