@@ -11,7 +11,6 @@ gusts are larger than what is added. A dash: predicted unstable, no such crossin
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 

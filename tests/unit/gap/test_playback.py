@@ -18,7 +18,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import made_ready, player_of
 from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.simulation.model import simulated_effects
-from tests.builders.closed_loop_flights import VEHICLE, flown, signals_of
+from tests.builders.closed_loop_flights import VEHICLE, by_columns, flown, signals_of
 from tests.builders.playback_flights import mean_errors
 
 BIAS = np.array([0.0, 0.01, 0.05])
@@ -39,15 +39,10 @@ EFFECTS = {
 
 def model_of(asked):
     """The true model of a simulated flight."""
-    return whole(*(fitted(one.effect, one.values) for one in simulated_effects(asked, VEHICLE).listed))
-
-
-def fitted(effect, values):
-    """An effect of the catalogue with its values."""
-    physical = np.array([values[each.name] for each in effect.coefficients])
-    linear = physical if effect.physical is None else effect.physical.linear(physical)
-    shape = {each.name: values[each.name] for each in effect.shapes}
-    return FittedEffect(Candidate(effect, shape), np.ones(1) if effect.unit_coefficient else linear)
+    flying = simulated_effects(asked, VEHICLE).listed
+    return whole(
+        *(FittedEffect(Candidate(one.effect, shape), linear) for one in flying for shape, linear in [by_columns(one)])
+    )
 
 
 def whole(*fitted, **numbers):
