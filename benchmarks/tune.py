@@ -11,6 +11,7 @@ gusts are larger than what is added. A dash: predicted unstable, no such crossin
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def main(autopilots: list[str] | None = None) -> None:
 def flown(name: str, label: str) -> Iterator[list[str]]:
     (vehicle, lag), autopilot = VEHICLES[label], AUTOPILOTS[name]
     gusts = gusts_of(vehicle)
-    hover = hover_plant(autopilot.law(), vehicle, None, lag).spread((SPREAD,) * 3)
+    hover = replace(hover_plant(autopilot.law(), vehicle, None, lag), spreads=(SPREAD,) * 3)
     found = with_filters(autopilot, autopilot.defaults(), hover, AskedMargins()).proposals
     own = autopilot.defaults() | {each.parameter.name: each.value for each in found}
     for gains, values in (("default", autopilot.defaults()), ("tuned", own)):

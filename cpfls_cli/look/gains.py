@@ -276,7 +276,7 @@ class _Work:
             drawn: Sequence[tuple[LinearPlant, ...]],
             leads: Mapping[int, tuple[float, ...]],
         ) -> Tuned:
-            hover = HoverPlant((best[0], best[1], best[2]), _ANY_SHARE, _ANY_SHARE, tuple(drawn) or ((), (), ()))
+            hover = HoverPlant((best[0], best[1], best[2]), _ANY_SHARE, _ANY_SHARE, drawn=tuple(drawn))
             return tuned(autopilot, self.values, hover, self.asked, self.noise, leads=leads)
 
         middle = of(self.open, self.best, [], {axis: USUAL_LEADS[axis] for axis in self.axes})

@@ -466,7 +466,7 @@ def gains_for_vehicle(
     values = autopilot.of_log(today) if today else autopilot.defaults()
 
     def hover_of(whole: Mapping[str, float]) -> HoverPlant:
-        return hover_plant(autopilot.law(whole), model.vehicle, model, rotor_lag).spread(spreads)
+        return replace(hover_plant(autopilot.law(whole), model.vehicle, model, rotor_lag), spreads=spreads)
 
     others = [*_curve(autopilot, model)] if signals else []
     follows = noise is not None and bool(noise.lines) and _notch_follows(autopilot, today)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 
@@ -71,7 +71,8 @@ class Spread:
     delay: tuple[float, float] = (1.0, 1.0)
 
     def corners(self, plant: AxisPlant) -> Iterator[AxisPlant]:
-        """Give a plant with each choice of ends."""
+        """Give the plant as it was found, then with each choice of ends."""
+        yield plant
         for gain, lag, delay in product(*(dict.fromkeys(each) for each in (self.gain, self.lag, self.delay))):
             if (gain, lag, delay) != (1.0, 1.0, 1.0):
                 yield replace(
@@ -96,23 +97,21 @@ class HoverPlant:
         Of the full thrust that hovers, in the units of the law.
     signal : float
         Of the motors, from 0 to 1, mean over them.
-    possible : tuple of tuple of AxisPlant
-        About each axis, next to the plant that was found.
+    drawn : tuple of tuple of AxisPlant
+        Plants of each axis that are possible, in place of the ends of intervals; empty: those ends.
     """
 
     axes: tuple[AxisPlant, AxisPlant, AxisPlant]
     share: float
     signal: float
-    possible: tuple[tuple[AxisPlant, ...], ...] = ((), (), ())
-
-    def spread(self, spreads: Sequence[Spread]) -> HoverPlant:
-        """Take for possible what has the ends of intervals."""
-        pairs = zip(spreads, self.axes, strict=True)
-        return replace(self, possible=tuple(tuple(own.corners(plant)) for own, plant in pairs))
+    spreads: tuple[Spread, ...] = field(default=(Spread(), Spread(), Spread()))
+    drawn: tuple[tuple[AxisPlant, ...], ...] = ()
 
     def corners(self, axis: int) -> list[AxisPlant]:
         """Give the plants of an axis that flights leave possible, the one that was found first."""
-        return [self.axes[axis], *self.possible[axis]]
+        if self.drawn:
+            return [self.axes[axis], *self.drawn[axis]]
+        return list(self.spreads[axis].corners(self.axes[axis]))
 
 
 def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, rotor_lag: float) -> HoverPlant:

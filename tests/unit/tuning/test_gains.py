@@ -37,7 +37,7 @@ S = 2j * np.pi * FREQUENCY
 
 def found(name, spread=CERTAIN, asked=USUAL, lag=0.03):
     autopilot = AUTOPILOTS[name]
-    hover = hover_plant(autopilot.law(), CROSS, None, lag).spread((spread,) * 3)
+    hover = replace(hover_plant(autopilot.law(), CROSS, None, lag), spreads=(spread,) * 3)
     proposals = with_filters(autopilot, autopilot.defaults(), hover, asked).proposals
     values = autopilot.defaults() | {each.parameter.name: each.value for each in proposals}
     return {each.parameter.name: each for each in proposals}, evaluate(autopilot.law(values), hover)
