@@ -21,8 +21,9 @@ from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
 from cpfls_cli.playback.errors import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED, AlongFlights
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.player import Runs, apart, free_runs, made_ready
+from cpfls_cli.playback.player import apart, free_runs, made_ready
 from cpfls_cli.playback.replay import Played, Replay, drawn_runs, fading, replay
+from cpfls_cli.playback.windows import RunErrors
 from cpfls_cli.result import About, about, result
 from cpfls_cli.rounding import largest
 from cpfls_cli.weak_form.windows import Windows, common_windows
@@ -36,7 +37,7 @@ class PlayedPair(Played):
 
     logged: PlaybackFlight  # With the faults of the sensors, so that a fault shows.
 
-    def runs(self, prediction: str, starts: IntArray, horizon: int) -> Runs:
+    def runs(self, prediction: str, starts: IntArray, horizon: int) -> RunErrors:
         """Predict from samples of the flight."""
         if prediction == STATED:
             return free_runs(self.stated, self.logged, starts, horizon)

@@ -23,7 +23,7 @@ from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
 from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.gusts import GUST_AXES, RANGES, GustRanges, Gusts
+from cpfls_cli.playback.gusts import GUST_AXES, GustAxis, Gusts
 from cpfls_cli.playback.innovations import MOST_PREDICTED, PER_WINDOW, blows, residual_innovations
 from cpfls_cli.playback.instruments import InstrumentKind, Instruments
 from cpfls_cli.playback.lack import AxisLack, Lack, lack_of
@@ -59,8 +59,8 @@ _FAR, _NOISE, _AT_END = 12.0, 3.0, 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FoundGusts(GustRanges):
-    """Gusts in flights, and what separated them from what a model lacks; white noise as of `Gusts`.
+class FoundGusts:
+    """Gusts in flights by body axis, torque then force, with 95 % intervals; white noise as of `Gusts`.
 
     Attributes
     ----------
@@ -72,6 +72,17 @@ class FoundGusts(GustRanges):
 
     SHOWN: ClassVar = ("name",)
 
+    size: Array = about("standard deviation, N m or N; not finite where it is not known", "gust", unit="SI", gaps=True)
+    low: Array = about("lower end of its 95 % interval; 0 where it is not known", "gust", unit="SI", gaps=True)
+    high: Array = about(
+        "upper end; where no size is known that of all that is left, and not finite where the body is not known either",
+        "gust",
+        unit="SI",
+        gaps=True,
+    )
+    memory: Array = about("time in which a gust falls to 37 %", "gust", unit="s", gaps=True)
+    memory_low: Array = about("lower end of its 95 % interval", "gust", unit="s", gaps=True)
+    memory_high: Array = about("upper end of it", "gust", unit="s", gaps=True)
     instrument_kind: InstrumentKind = about(
         "what separates gusts from what a model lacks: repeats, setpoints, past, none"
     )
@@ -91,6 +102,13 @@ class FoundGusts(GustRanges):
         """Axes: roll, pitch, yaw, x, y, z."""
         return GUST_AXES[: len(self.size)]
 
+    def axes(self, inertia: Array, mass: float) -> tuple[GustAxis, ...]:
+        """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""
+        bodies = np.append(inertia[:3], [mass] * 3)[: len(self.size)]
+        sizes = (self.size / bodies, self.low / bodies, self.high / bodies)
+        columns = (*sizes, self.memory, self.memory_low, self.memory_high)
+        return tuple(map(GustAxis, GUST_AXES, *(column.tolist() for column in columns)))
+
     @property
     def predicted_error(self) -> Array:
         """Standard errors of the shares that are predicted, shape (axis,)."""
@@ -100,6 +118,10 @@ class FoundGusts(GustRanges):
     def gusts(self) -> Gusts | None:
         """The gusts that are known, none on other axes; None where no size is."""
         return Gusts.known(self.size, self.memory, self.white) if np.isfinite(self.size).any() else None
+
+
+RANGES = ("size", "low", "high", "memory", "memory_low", "memory_high")
+"""Sizes and memories with their intervals, by their names in `FoundGusts`."""
 
 
 class _Powers(NamedTuple):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.filters import recursion
-from cpfls_cli.result import About, about
+from cpfls_cli.result import About
 
 GUST_AXES = ("roll", "pitch", "yaw", "x", "y", "z")
 """Torque about the body axes, then force along them."""
@@ -89,31 +88,3 @@ class GustAxis(NamedTuple):
     def turns(self) -> bool:
         """Whether it is a torque."""
         return self.name in GUST_AXES[:3]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class GustRanges:
-    """Gusts by body axis, torque then force, with their 95 % intervals."""
-
-    size: Array = about("standard deviation, N m or N; not finite where it is not known", "gust", unit="SI", gaps=True)
-    low: Array = about("lower end of its 95 % interval; 0 where it is not known", "gust", unit="SI", gaps=True)
-    high: Array = about(
-        "upper end; where no size is known that of all that is left, and not finite where the body is not known either",
-        "gust",
-        unit="SI",
-        gaps=True,
-    )
-    memory: Array = about("time in which a gust falls to 37 %", "gust", unit="s", gaps=True)
-    memory_low: Array = about("lower end of its 95 % interval", "gust", unit="s", gaps=True)
-    memory_high: Array = about("upper end of it", "gust", unit="s", gaps=True)
-
-    def axes(self, inertia: Array, mass: float) -> tuple[GustAxis, ...]:
-        """Give each axis as the acceleration of a body of these inertia parameters, kg m^2, and this mass, kg."""
-        bodies = np.append(inertia[:3], [mass] * 3)[: len(self.size)]
-        sizes = (self.size / bodies, self.low / bodies, self.high / bodies)
-        columns = (*sizes, self.memory, self.memory_low, self.memory_high)
-        return tuple(map(GustAxis, GUST_AXES, *(column.tolist() for column in columns)))
-
-
-RANGES = tuple(each.name for each in fields(GustRanges))
-"""Names of the fields of `GustRanges`."""

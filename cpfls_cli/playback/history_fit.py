@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, IntArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.playback.evaluation import PRIOR, VehicleAt
@@ -31,10 +31,10 @@ from cpfls_cli.playback.fit import (
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.player import Observer, missed_before
+from cpfls_cli.playback.player import Observer, missed_before, player_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Judged
-from cpfls_cli.playback.windows import Leg, Runs, Steps, errors_of_runs, legs, losses_of, sums_of
+from cpfls_cli.playback.windows import Leg, Steps, legs, losses_of, sums_of
 
 _AXES = np.array([0, 0, 1, 2, 2, 3])
 """Which numbers an axis of torque and force has: roll and pitch share theirs, so do ahead and left."""
@@ -91,7 +91,7 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
     The forecast was fitted to the given ones, and misses less of them than of others: little would be left to observe.
     `past_s`: how much of the past is used, s.
     """
-    at = _vehicle(fitted)
+    at = fitted.free.at(fitted.values)
     begun = [_Begun.of(at, each, past_s) for each in side_by_side([_between(each) for each in windows])]
     ends = tuple(np.broadcast_to(end, _FIRST.shape).ravel() for end in _BOUNDS)
     point = partial(_point, at, begun, past_s)
@@ -102,7 +102,7 @@ def fit_observer(fitted: FittedNumbers, windows: Sequence[FitWindows], past_s: f
 
 def errors_with_past(fitted: FittedNumbers, observer: Observer, windows: FitWindows) -> Array:
     """Weigh the errors of windows as the fit does, shape (window,)."""
-    at = _vehicle(fitted)
+    at = fitted.free.at(fitted.values)
     (begun,) = (_Begun.of(at, each, observer.past_s) for each in side_by_side([windows]))
     return losses_of(begun.flown(at, begun.pushed(observer)), begun.windows.loss)
 
@@ -120,11 +120,6 @@ def _between(windows: FitWindows) -> FitWindows:
     return replace(windows, starts=known if len(known) else windows.starts)
 
 
-def _vehicle(fitted: FittedNumbers) -> VehicleAt:
-    base = fitted.free.base
-    return VehicleAt(base, fitted.values[: len(base.numbers)])
-
-
 class _Begun(NamedTuple):
     """Windows side by side, and what is missed before them.
 
@@ -139,7 +134,10 @@ class _Begun(NamedTuple):
     @classmethod
     def of(cls, at: VehicleAt, windows: SideBySide, past_s: float) -> _Begun:
         """Run a model along the measured samples before windows."""
-        missed = [_missed(at, each, past_s) for each in windows.windows]
+        model, missed = at.model, []
+        for each in windows.windows:
+            flight, samples = each.flight, round(past_s / each.flight.motion.period)
+            missed.append(missed_before(player_of(model, flight), flight, each.starts, samples))
         return cls(windows, windows.steps(at).terms, np.concatenate(missed))
 
     def pushed(self, observer: Observer) -> Array:
@@ -153,17 +151,6 @@ class _Begun(NamedTuple):
     def flown(self, at: VehicleAt, pushed: Array) -> Iterator[Leg]:
         """Fly all runs, pushed on top of what the model gives."""
         return legs(self.windows.flown(at, pushed=True), self.windows.runs, Steps(self.terms, pushed))
-
-
-def _missed(at: VehicleAt, window: FitWindows, past_s: float) -> Array:
-    flight = window.flight
-    flown = at.flown(flight.motion.period, translates=flight.translates)
-
-    def single_steps(samples: IntArray) -> Array:
-        terms = at.rotor_terms(flight, samples)
-        return errors_of_runs(flown, Runs(flight.motion, samples, flight.translates), Steps(terms[None]))[0][:, 0]
-
-    return missed_before(flight, window.starts, round(past_s / flight.motion.period), single_steps, flown.body)
 
 
 def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array) -> FitPoint:

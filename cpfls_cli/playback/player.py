@@ -8,26 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
-from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.playback.flight import (
-    FASTEST,
-    Body,
-    LoggedFlight,
-    MeasuredMotion,
-    PlaybackFlight,
-    State,
-    playback_flight,
-)
+from cpfls_cli.playback.flight import FASTEST, LoggedFlight, MeasuredMotion, PlaybackFlight, State, playback_flight
 from cpfls_cli.playback.model import VehicleModel, wrench_along
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.windows import MOST_RUNS, Flown, Steps, errors_of_runs, exponential, rotation_errors
-from cpfls_cli.playback.windows import Runs as FlownRuns
+from cpfls_cli.playback.windows import Flown, RunErrors, Runs, Steps, errors_of_runs, exponential, rotation_errors
 from cpfls_cli.result import about, result
 
 
@@ -89,26 +79,6 @@ def past_of(flight: PlaybackFlight, starts: IntArray, samples: int) -> tuple[Int
         begins[(starts >= stretch.start) & (starts < stretch.stop)] = stretch.start
     steps = starts[:, None] + np.arange(-samples, 0)
     return np.maximum(steps, begins[:, None]), (steps >= begins[:, None]).astype(float)
-
-
-def missed_before(
-    flight: PlaybackFlight, starts: IntArray, samples: int, single_steps: Callable[[IntArray], Array], body: Body
-) -> Array:
-    """Give what a model misses of the steps before each start, shape (run, samples, 6), N m and N, body frame.
-
-    0 where there is none. `single_steps` gives the errors of steps that begin at samples, shape (step, 4, 3), see
-    `errors_of_runs`.
-    """
-    steps, known = past_of(flight, starts, samples)
-    first = int(steps.min(initial=int(starts.min())))
-    taken = np.arange(first, int(starts.max()))
-    missed = np.zeros((len(taken) + 1, 6))
-    if len(taken):
-        errors, period, rotation = single_steps(taken), flight.motion.period, flight.motion.rotation[taken]
-        missed[:-1, :3] = -errors[:, 3] @ body.inertia / period
-        if flight.translates:
-            missed[:-1, 3:] = -body.mass / period * np.einsum("tji,tj->ti", rotation, errors[:, 1])
-    return np.asarray(missed[steps - first] * known[:, :, None])
 
 
 @dataclass(frozen=True)
@@ -221,7 +191,7 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
         after = one_step(still, state._replace(velocity=state.velocity - wind), rotor, period)
         return after._replace(position=after.position + period * wind, velocity=after.velocity + wind)
     count = len(state.rate)
-    path = FlownRuns(MeasuredMotion(*state, period), np.arange(count), translates=True).fly(
+    path = Runs(MeasuredMotion(*state, period), np.arange(count), translates=True).fly(
         model.flown, Steps(rotor[None, :count])
     )
     ends = (path.position[-1].T, path.velocity[-1].T, path.rotation[-1].transpose(2, 0, 1), path.rate[-1].T)
@@ -229,27 +199,12 @@ def one_step(model: VehicleModel, state: State, rotor: Array, period: float) -> 
     return State(*(np.where(stopped.reshape(-1, *[1] * (end.ndim - 1)), np.nan, end) for end in ends))
 
 
-class Runs(NamedTuple):
-    """Errors of free runs.
-
-    Attributes
-    ----------
-    errors : array, shape (run, horizon, 4, 3)
-        Predicted less measured position, velocity, rotation vector (body frame) and rate.
-    diverged : array of int, shape (run,)
-        Step at which a run was stopped; -1 for those that went on.
-    """
-
-    errors: Array
-    diverged: IntArray
-
-
-def apart(first: Runs, second: Runs) -> Array:
+def apart(first: RunErrors, second: RunErrors) -> Array:
     """Compute how far runs end from each other: mean norms of position, velocity, attitude and rate, shape (4,), SI."""
     return np.asarray(np.linalg.norm(second.errors[:, -1] - first.errors[:, -1], axis=2).mean(axis=0))
 
 
-def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon: int) -> Runs:
+def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon: int) -> RunErrors:
     """Play a model back from samples of a flight.
 
     Parameters
@@ -259,18 +214,29 @@ def free_runs(player: Player, flight: PlaybackFlight, starts: IntArray, horizon:
     horizon : int
         Samples.
     """
-    still = in_the_air(flight, player.wind)
-    pushes = None if player.observer is None else observed(player, flight, starts)
-    found = []
-    for first in range(0, len(starts), MOST_RUNS):
-        own = starts[first : first + MOST_RUNS]
-        push = None
-        if pushes is not None and player.observer is not None:
-            fading = player.observer.fading(still.motion.period, horizon)
-            push = pushes[first : first + MOST_RUNS] * fading[:, None]
-        runs = FlownRuns(still.motion, own, flight.translates)
-        found.append(errors_of_runs(player.flown, runs, player.steps(own + np.arange(horizon)[:, None], push)))
-    return Runs(*(np.concatenate(each) for each in zip(*found, strict=True)))
+    still, push = in_the_air(flight, player.wind), None
+    if player.observer is not None:
+        push = observed(player, flight, starts) * player.observer.fading(still.motion.period, horizon)[:, None]
+    steps = player.steps(starts + np.arange(horizon)[:, None], push)
+    return errors_of_runs(player.flown, Runs(still.motion, starts, flight.translates), steps)
+
+
+def missed_before(player: Player, flight: PlaybackFlight, starts: IntArray, samples: int) -> Array:
+    """Give what a model misses of the steps before each start, shape (run, samples, 6), N m and N, body frame.
+
+    0 where there is none.
+    """
+    steps, known = past_of(flight, starts, samples)
+    first = int(steps.min(initial=int(starts.min())))
+    taken = np.arange(first, int(starts.max()))
+    missed = np.zeros((len(taken) + 1, 6))
+    if len(taken):
+        errors = free_runs(replace(player, observer=None), flight, taken, 1).errors[:, 0]
+        body, period, rotation = player.flown.body, flight.motion.period, flight.motion.rotation[taken]
+        missed[:-1, :3] = -errors[:, 3] @ body.inertia / period
+        if flight.translates:
+            missed[:-1, 3:] = -body.mass / period * np.einsum("tji,tj->ti", rotation, errors[:, 1])
+    return np.asarray(missed[steps - first] * known[:, :, None])
 
 
 def observed(player: Player, flight: PlaybackFlight, starts: IntArray) -> Array:
@@ -280,11 +246,7 @@ def observed(player: Player, flight: PlaybackFlight, starts: IntArray) -> Array:
     """
     observer, period = player.observer, flight.motion.period
     assert observer is not None
-
-    def single_steps(samples: IntArray) -> Array:
-        return free_runs(replace(player, observer=None), flight, samples, 1).errors[:, 0]
-
-    missed = missed_before(flight, starts, observer.samples(period), single_steps, player.flown.body)
+    missed = missed_before(player, flight, starts, observer.samples(period))
     return np.asarray(np.einsum("rsa,sa->ra", missed, observer.weights(period)))
 
 
@@ -301,7 +263,7 @@ def in_the_air(flight: PlaybackFlight, wind: tuple[float, float, float]) -> Play
 
 def still_runs(
     flight: PlaybackFlight, starts: IntArray, horizon: int, *, moves: bool, fading_s: float = np.inf, every: int = 1
-) -> Runs:
+) -> RunErrors:
     """Predict that the whole state stays what it was, or that velocity does and rates stay or fade.
 
     `moves`: attitude and position follow rates and velocity; rates fade with the time constant `fading_s`; `every`:
@@ -319,7 +281,7 @@ def still_runs(
         held = held @ _turns(turned.reshape(-1, 3)).reshape(*rate.shape, 3)
     at = after[:, None] + starts
     errors = less_measured(State(position, begin.velocity, np.broadcast_to(held, (*rate.shape, 3)), rate), motion, at)
-    return Runs(errors.swapaxes(0, 1), np.full(len(starts), -1))
+    return RunErrors(errors.swapaxes(0, 1), np.full(len(starts), -1))
 
 
 def _turns(vector: Array) -> Array:
@@ -328,7 +290,7 @@ def _turns(vector: Array) -> Array:
 
 
 def less_measured(state: State, motion: MeasuredMotion, at: IntArray) -> Array:
-    """Compare states with what was measured at samples, shape (..., 4, 3): in the order and sense of `Runs.errors`."""
+    """Compare states with what was measured at samples, shape (..., 4, 3): in the order and sense of `RunErrors`."""
     turned = rotation_vectors(motion.rotation[at], state.rotation)
     position, velocity = state.position - motion.position[at], state.velocity - motion.velocity[at]
     return np.stack([position, velocity, turned, state.rate - motion.rate[at]], axis=-2)
@@ -429,7 +391,7 @@ class Course:
         return states
 
     def errors(self, states: State) -> Array:
-        """Compare runs with what was measured, shape (run, horizon, 4, 3), as `Runs` does."""
+        """Compare runs with what was measured, shape (run, horizon, 4, 3), as `RunErrors` does."""
         return less_measured(states, self.flight.motion, self.starts[:, None] + 1 + np.arange(self.horizon))
 
 

@@ -26,7 +26,8 @@ from cpfls_cli.playback.errors import (
     Region,
 )
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight, contradictions_of
-from cpfls_cli.playback.player import Player, Runs, free_runs, still_runs
+from cpfls_cli.playback.player import Player, free_runs, still_runs
+from cpfls_cli.playback.windows import RunErrors
 from cpfls_cli.result import BODY, WORLD, about, part, result
 
 SIGNALS = ("position", "velocity", "attitude", "body_rate")
@@ -60,7 +61,7 @@ class Played:
     with_past: Player | None = field(default=None, kw_only=True)
     fading_s: float | None = field(default=None, kw_only=True)
 
-    def runs(self, prediction: str, starts: IntArray, horizon: int) -> Runs:
+    def runs(self, prediction: str, starts: IntArray, horizon: int) -> RunErrors:
         """Predict from samples of the flight.
 
         Parameters
@@ -320,7 +321,7 @@ def _added(
     size = np.empty((len(sums.names), len(starts)))
     diverged = np.empty(size.shape, dtype=np.int64)
     knows = played.knows
-    model: Runs | None = None
+    model: RunErrors | None = None
     for row, prediction in enumerate(sums.names):
         again = model if prediction == STATED and played.stated is played.model else None
         runs = again or played.runs(prediction, starts, sums.horizon)

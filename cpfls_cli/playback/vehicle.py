@@ -26,7 +26,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Choice, Kept, Progress, TriedStructure, choose, fitted_to_all
+from cpfls_cli.playback.structure import Kept, Progress, TriedStructure, choose, fitted_to_all
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -126,10 +126,8 @@ class FoundVehicle:
     history: Observer | None = part(default=None)
     """By which the forecast uses the past; None where that is no better on flights kept aside, is not asked for, or the
     search was stopped."""
-    choice: Choice | None = None
-    """How it was chosen; in no file, as all that follows."""
     sources: Instruments | None = None
-    """All that identifies how the flights were moved, apart from gusts."""
+    """All that identifies how the flights were moved, apart from gusts; in no file, as what follows."""
     others: Mapping[str, VehicleModel] = field(default_factory=dict)
     """Other configurations, by name of the group."""
 
@@ -191,7 +189,6 @@ def find_vehicle(
         forecast=None if forecast is None else replace(forecast, vehicle=replace(forecast.vehicle, unknown=())),
         disturbance=gusts,
         history=find_history(chosen, fitted, own, settings) if past else None,
-        choice=choice,
         sources=given,
         others={group.name: fitted.free.at(fitted.values, group.name).model for group in groups},
     )

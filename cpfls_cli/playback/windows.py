@@ -505,24 +505,31 @@ class Runs:
         return np.asarray(self.starts + np.arange(1, horizon + 1)[:, None])
 
 
-def errors_of_runs(flown: Flown, runs: Runs, steps: Steps) -> tuple[Array, IntArray]:
-    """Fly runs and give their errors.
+class RunErrors(NamedTuple):
+    """Errors of free runs.
 
-    Returns
-    -------
+    Attributes
+    ----------
     errors : array, shape (run, horizon, 4, 3)
-        Predicted less measured position, velocity, rotation vector, rate. A run that diverges stays as it was before
-        the step in which it did.
+        Predicted less measured position, velocity, rotation vector (body frame) and rate. A run that diverges stays as
+        it was before the step in which it did.
     diverged : array of int, shape (run,)
-        Step at which a run diverged; -1 for those that did not.
+        Step at which a run was stopped; -1 for those that went on.
     """
+
+    errors: Array
+    diverged: IntArray
+
+
+def errors_of_runs(flown: Flown, runs: Runs, steps: Steps) -> RunErrors:
+    """Fly runs and give their errors."""
     errors, diverged = [], []
     for _, own, part in runs.blocks(steps, MOST_RUNS):
         path = own.fly(flown, part)
         away = path.position[1:] - runs.motion.position[own.samples(len(part.terms))].swapaxes(1, 2)
         errors.append(np.concatenate([away[None], own.errors(path)]).transpose(3, 1, 0, 2))
         diverged.append(path.diverged)
-    return np.concatenate(errors), np.concatenate(diverged)
+    return RunErrors(np.concatenate(errors), np.concatenate(diverged))
 
 
 class Leg(NamedTuple):

@@ -18,7 +18,7 @@ from cpfls_cli.simulation.settings import SimulationSettings
 from cpfls_cli.trajectory.excited import AddedMotion
 from cpfls_cli.trajectory.planning import Trajectory
 from cpfls_cli.trajectory.settings import TrajectorySettings
-from cpfls_cli.vehicle.rotors import RotorViolation, rotor_demand
+from cpfls_cli.vehicle.rotors import Infeasible, rotor_demand, violations
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -59,7 +59,7 @@ def simulate(
     signals, noise_std = noisy(exact, settings, rng)
     signals["torque"], signals["body_torque"] = _torques(signals, frozenset(noise_std))
     signals["body_rate"] = rotations.body_rate(signals["attitude"], signals["attitude_rate"])
-    return Simulated.of(time, signals, noise_std, demand.violations)
+    return Simulated.of(time, signals, noise_std, violations(demand.squared_speed, vehicle.rotor_speed_max_rad_s, time))
 
 
 @dataclass(frozen=True)
@@ -93,14 +93,14 @@ class Flyability:
         Angle between thrust and vertical.
     too_much : tuple of TooMuch
         Empty where thrust and tilt stay within their limits.
-    rotors : tuple of RotorViolation
+    rotors : tuple of Infeasible
         Empty where every rotor can do what is asked.
     """
 
     thrust: Array
     tilt: Array
     too_much: tuple[TooMuch, ...]
-    rotors: tuple[RotorViolation, ...]
+    rotors: tuple[Infeasible, ...]
 
 
 def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max: float | None) -> Flyability:
@@ -109,8 +109,8 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     Parameters
     ----------
     planned : mapping of str to array
-        `attitude`, `attitude_rate`, `attitude_acceleration` and, unless the vehicle is held at its centre of mass,
-        `acceleration`, shape (time, 3) each.
+        `time`, shape (time,); `attitude`, `attitude_rate`, `attitude_acceleration` and, unless the vehicle is held at
+        its centre of mass, `acceleration`, shape (time, 3) each.
     tilt_max : float or None, rad
         Largest tilt allowed; None for any.
 
@@ -128,7 +128,9 @@ def flyability(planned: Mapping[str, Array], vehicle: VehicleSettings, tilt_max:
     most = sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors) * vehicle.rotor_speed_max_rad_s**2
     limits = [("thrust, N", thrust, most)] + ([("tilt, rad", tilt, tilt_max)] if tilt_max else [])
     excesses = [too_much for name, values, limit in limits for too_much in _beyond(name, values, limit)]
-    return Flyability(thrust, tilt, tuple(excesses), rotor_demand(vehicle, thrust, about_body).violations)
+    squared = rotor_demand(vehicle, thrust, about_body).squared_speed
+    beyond = violations(squared, vehicle.rotor_speed_max_rad_s, planned["time"])
+    return Flyability(thrust, tilt, tuple(excesses), beyond)
 
 
 def tilt_of(attitude: Array) -> Array:

@@ -85,7 +85,7 @@ def measure(
     tracking = Tracking.of(
         motion.state[:, POSITION] - planned["position"], motion.state[:, ATTITUDE] - planned["attitude"]
     )
-    beyond = violations(motion.demand, vehicle.rotor_speed_max_rad_s)
+    beyond = violations(motion.demand, vehicle.rotor_speed_max_rad_s, time)
     return Simulated.of(time, signals, noise_std, beyond, effects=values_of(flown), tracking=tracking)
 
 

@@ -16,7 +16,7 @@ from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.results import Flight
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.result import about, part, result
-from cpfls_cli.vehicle.rotors import RotorViolation
+from cpfls_cli.vehicle.rotors import Infeasible
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
@@ -30,19 +30,6 @@ class SimulatedEffect:
 
     effect: Effect
     values: Mapping[str, float]
-
-    @property
-    def linear(self) -> Array:
-        """Coefficients of the columns; 1 where everything is in the shape."""
-        if self.effect.unit_coefficient:
-            return np.ones(1)
-        physical = np.array([self.values[coefficient.name] for coefficient in self.effect.coefficients])
-        return physical if self.effect.physical is None else self.effect.physical.linear(physical)
-
-    @property
-    def shape(self) -> Mapping[str, float]:
-        """Values of the shapes."""
-        return {shape.name: self.values[shape.name] for shape in self.effect.shapes}
 
 
 @dataclass(frozen=True)
@@ -93,30 +80,6 @@ class Tracking:
 
 
 @result
-class Infeasible:
-    """Samples at which a rotor was asked for what it cannot do."""
-
-    rotor: int = about("number of the rotor, from 1")
-    kind: str = about("``negative squared speed`` or ``above the limit``")
-    first_s: float = about("first of them", unit="s")
-    last_s: float = about("last of them", unit="s")
-    samples: int = about("how many, which need not be all between")
-    worst: float = about("squared speed that is farthest off", unit="rad^2/s^2")
-
-    @classmethod
-    def of(cls, violation: RotorViolation, time: Array) -> Self:
-        """Describe them by the times of samples."""
-        return cls(
-            rotor=violation.rotor + 1,
-            kind=violation.kind,
-            first_s=float(time[violation.first]),
-            last_s=float(time[violation.last]),
-            samples=violation.count,
-            worst=violation.worst,
-        )
-
-
-@result
 class Simulated(Flight):
     """A simulated flight, and what is known of its truth."""
 
@@ -133,7 +96,7 @@ class Simulated(Flight):
         time: Array,
         signals: Mapping[str, Array],
         noise_std: Mapping[str, Array],
-        violations: Sequence[RotorViolation],
+        infeasible: tuple[Infeasible, ...],
         **known: Any,
     ) -> Self:
         """Describe signals, the noise that was added to each channel, and what no rotor can do."""
@@ -141,7 +104,7 @@ class Simulated(Flight):
         return cls(
             time=time,
             noise_std={name: Noise(std=np.atleast_1d(std)) for name, std in noise_std.items()},
-            infeasible=tuple(Infeasible.of(one, time) for one in violations),
+            infeasible=infeasible,
             **given,
         )
 

@@ -20,8 +20,9 @@ from cpfls_cli.errors import install_command, visible
 from cpfls_cli.gap.before_after import PlaybackChange, PlayedPair, errors_by_horizon
 from cpfls_cli.playback.errors import MODEL, STATED
 from cpfls_cli.playback.flight import State
-from cpfls_cli.playback.player import Course, Flies, Runs
+from cpfls_cli.playback.player import Course, Flies
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.windows import RunErrors
 from cpfls_cli.simulators.formats import as_stated
 from cpfls_cli.simulators.in_mujoco import compiled, controls_of, fly_mujoco
 from cpfls_cli.simulators.in_pybullet import fly_pybullet, without_shapes
@@ -180,7 +181,7 @@ class _Flown(PlayedPair):
     rotors: IntArray = field(kw_only=True)
     lags: bool = field(kw_only=True)
 
-    def runs(self, prediction: str, starts: IntArray, horizon: int) -> Runs:
+    def runs(self, prediction: str, starts: IntArray, horizon: int) -> RunErrors:
         """Fly from samples of the flight."""
         if prediction not in self.flies:
             return super().runs(prediction, starts, horizon)
@@ -189,7 +190,7 @@ class _Flown(PlayedPair):
             return runs_of(course, self.flies[prediction](course, self.lags))
 
 
-def runs_of(course: Course, states: State) -> Runs:
+def runs_of(course: Course, states: State) -> RunErrors:
     """Compare states with a flight; a run that ran away stays as it was before."""
     gone: BoolArray = np.asarray(np.isnan(states.rate).any(axis=2))
     diverged = np.where(gone.any(axis=1), gone.argmax(axis=1), -1)
@@ -197,7 +198,7 @@ def runs_of(course: Course, states: State) -> Runs:
     kept = np.minimum(np.arange(1, course.horizon + 1), last[:, None])
     run = np.arange(len(kept))[:, None]
     paths = (np.concatenate([begin[:, None], path], axis=1) for begin, path in zip(course.start, states, strict=True))
-    return Runs(course.errors(State(*(path[run, kept] for path in paths))), diverged)
+    return RunErrors(course.errors(State(*(path[run, kept] for path in paths))), diverged)
 
 
 def in_simulator(

@@ -12,9 +12,9 @@ from cpfls_cli.flightlog.results import Flight
 from cpfls_cli.report.canvas import Drawn, Figure, legend_above, line, stacked, style_of
 from cpfls_cli.report.content import plain
 from cpfls_cli.simulation.inverse import Flyability, TooMuch
-from cpfls_cli.simulation.model import Infeasible
 from cpfls_cli.trajectory.planning import PlannedRotation, Trajectory
 from cpfls_cli.units import SPEED_UNITS
+from cpfls_cli.vehicle.rotors import Infeasible
 
 _TURN = 360.0
 STILL_AIR = "flown in still air; the model holds the gusts of its flights: --gusts plays them"
@@ -25,7 +25,10 @@ def demand_sentences(demand: Flyability, planned: PlannedRotation) -> tuple[str,
     """Say what a plan asks for beyond what the vehicle has, with its time and place; nothing where it can do it all."""
     return (
         *(_too_much(too_much, planned) for too_much in demand.too_much),
-        *(infeasible_sentence(Infeasible.of(one, planned.time)) + _place(one.first, planned) for one in demand.rotors),
+        *(
+            infeasible_sentence(one) + _place(int(np.searchsorted(planned.time, one.first_s)), planned)
+            for one in demand.rotors
+        ),
     )
 
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, require_columns
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.result import about, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle_limits import Figures, figures_of, figures_of_hubs
 
 AXES = ("thrust", "roll", "pitch", "yaw")
-ViolationKind = Literal["negative squared speed", "above the limit"]
 # Fraction of the largest squared speed that is rounding error of the allocation.
 _ROUNDING = 1e-12
 # Share of the arm by which hubs may miss each other and be opposite: digits of a config.
@@ -36,28 +36,16 @@ class BodyWrench(NamedTuple):
     body_torque: Array
 
 
-@dataclass(frozen=True, kw_only=True)
-class RotorViolation:
-    """Samples at which a rotor cannot reach the demanded squared speed.
+@result
+class Infeasible:
+    """Samples at which a rotor was asked for what it cannot do."""
 
-    Attributes
-    ----------
-    rotor : int
-        Index of the rotor, from 0.
-    kind : str
-        "negative squared speed" or "above the limit".
-    first, last, count : int
-        Indices of the first and the last sample, and the number of samples, which need not be all between.
-    worst : float, rad^2/s^2
-        The most negative, or the largest, squared speed.
-    """
-
-    rotor: int
-    kind: ViolationKind
-    first: int
-    last: int
-    count: int
-    worst: float
+    rotor: int = about("number of the rotor, from 1")
+    kind: str = about("``negative squared speed`` or ``above the limit``")
+    first_s: float = about("first of them", unit="s")
+    last_s: float = about("last of them", unit="s")
+    samples: int = about("how many, which need not be all between")
+    worst: float = about("squared speed that is farthest off", unit="rad^2/s^2")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +58,6 @@ class RotorDemand:
 
     squared_speed: Array
     speed: Array
-    violations: tuple[RotorViolation, ...]
 
 
 def allocation_matrix(vehicle: VehicleSettings) -> Array:
@@ -177,10 +164,9 @@ def rotor_demand(vehicle: VehicleSettings, thrust: Array, body_torque: Array) ->
         sample = int(np.flatnonzero(~np.isfinite(wrench).all(axis=1))[0])
         raise ComputationError(f"the demanded thrust or torque is not finite at sample {sample}")
     squared_speed = wrench @ _allocation_inverse(allocation_matrix(vehicle)).T
-    most = vehicle.rotor_speed_max_rad_s
-    impossible = _negative(squared_speed, most) | _above(squared_speed, most)
-    speed = np.sqrt(np.where(impossible, np.nan, np.maximum(squared_speed, 0.0)))
-    return RotorDemand(squared_speed=squared_speed, speed=speed, violations=violations(squared_speed, most))
+    negative, above = _impossible(squared_speed, vehicle.rotor_speed_max_rad_s)
+    speed = np.sqrt(np.where(negative | above, np.nan, np.maximum(squared_speed, 0.0)))
+    return RotorDemand(squared_speed=squared_speed, speed=speed)
 
 
 def _allocation_inverse(allocation: Array) -> Array:
@@ -200,41 +186,36 @@ def _allocation_inverse(allocation: Array) -> Array:
     return inverse
 
 
-def violations(squared_speed: Array, speed_max: float) -> tuple[RotorViolation, ...]:
+def violations(squared_speed: Array, speed_max: float, time: Array) -> tuple[Infeasible, ...]:
     """Summarise the squared speeds that cannot be reached, by rotor and kind.
 
     Parameters
     ----------
     squared_speed : array, shape (time, rotor), rad^2/s^2
     speed_max : float, rad/s
+    time : array, shape (time,), s
 
     Returns
     -------
-    tuple of RotorViolation
+    tuple of Infeasible
         At most two for each rotor, in the order of the rotors.
     """
-    negative, above = _negative(squared_speed, speed_max), _above(squared_speed, speed_max)
-    summaries: list[RotorViolation] = []
+    negative, above = _impossible(squared_speed, speed_max)
+    found = []
     for rotor, demand in enumerate(squared_speed.T):
-        if negative[:, rotor].any():
-            summaries.append(_summary(rotor, "negative squared speed", negative[:, rotor], float(demand.min())))
-        if above[:, rotor].any():
-            summaries.append(_summary(rotor, "above the limit", above[:, rotor], float(demand.max())))
-    return tuple(summaries)
+        kinds = ("negative squared speed", negative, demand.min), ("above the limit", above, demand.max)
+        for kind, beyond, worst in kinds:
+            when = time[beyond[:, rotor]].tolist()
+            if when:
+                ends = {"first_s": when[0], "last_s": when[-1]}
+                found.append(Infeasible(rotor=rotor + 1, kind=kind, **ends, samples=len(when), worst=float(worst())))
+    return tuple(found)
 
 
-def _negative(squared_speed: Array, speed_max: float) -> BoolArray:
-    return squared_speed < -_ROUNDING * speed_max**2
-
-
-def _above(squared_speed: Array, speed_max: float) -> BoolArray:
-    return squared_speed > (1 + _ROUNDING) * speed_max**2
-
-
-def _summary(rotor: int, kind: ViolationKind, where: BoolArray, worst: float) -> RotorViolation:
-    samples = np.flatnonzero(where)
-    first, last = int(samples[0]), int(samples[-1])
-    return RotorViolation(rotor=rotor, kind=kind, first=first, last=last, count=len(samples), worst=worst)
+def _impossible(squared_speed: Array, speed_max: float) -> tuple[BoolArray, BoolArray]:
+    """Mark squared speeds below 0, and those above the limit."""
+    share = squared_speed / speed_max**2
+    return share < -_ROUNDING, share > 1 + _ROUNDING
 
 
 def opposite_pairs(vehicle: VehicleSettings) -> tuple[tuple[int, int], ...]:

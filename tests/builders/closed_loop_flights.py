@@ -61,3 +61,11 @@ def signals_of(flight):
         voltage=logged.get("voltage"),
         **{name: logged[name] for name in names},
     )
+
+
+def by_columns(one):
+    """Give the shape and the linear coefficients of a simulated effect, as a fit has them."""
+    effect, values = one.effect, one.values
+    physical = np.array([values[each.name] for each in effect.coefficients])
+    linear = physical if effect.physical is None else effect.physical.linear(physical)
+    return {each.name: values[each.name] for each in effect.shapes}, np.ones(1) if effect.unit_coefficient else linear

@@ -15,9 +15,8 @@ from cpfls_cli.gap.balance.balance_system import System, floors, residual_along
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.residual.dependence import state_signals, without_actuation
 from cpfls_cli.gap.settings import ERRORS, RARE, GapSettings
-from cpfls_cli.playback.disturbance import FoundGusts, gusts_in
+from cpfls_cli.playback.disturbance import RANGES, FoundGusts, gusts_in
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.gusts import RANGES
 from cpfls_cli.playback.innovations import MOST_PREDICTED, ResidualInnovations, blows, residual_innovations
 from cpfls_cli.playback.instruments import (
     GivenKind,

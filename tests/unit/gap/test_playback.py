@@ -18,7 +18,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import made_ready, player_of
 from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.simulation.model import simulated_effects
-from tests.builders.closed_loop_flights import VEHICLE, flown, signals_of
+from tests.builders.closed_loop_flights import VEHICLE, by_columns, flown, signals_of
 from tests.builders.playback_flights import mean_errors
 
 BIAS = np.array([0.0, 0.01, 0.05])
@@ -40,8 +40,9 @@ EFFECTS = {
 def model_of(asked):
     """The true model of a simulated flight."""
     flying = simulated_effects(asked, VEHICLE).listed
-    fitted = [FittedEffect(Candidate(one.effect, one.shape), np.asarray(one.linear)) for one in flying]
-    return whole(*fitted)
+    return whole(
+        *(FittedEffect(Candidate(one.effect, shape), linear) for one in flying for shape, linear in [by_columns(one)])
+    )
 
 
 def whole(*fitted, **numbers):

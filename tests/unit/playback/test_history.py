@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.playback.fit import Fitted, fit, side_by_side, windows_of
-from cpfls_cli.playback.history_fit import _Begun, _point, _vehicle, errors_with_past, find_history, fit_observer
+from cpfls_cli.playback.history_fit import _Begun, _point, errors_with_past, find_history, fit_observer
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Observer, free_runs, observed, past_of, player_of
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -113,7 +113,7 @@ def gusty():
 
 def test_the_gradient_of_the_observer_is_the_difference_quotient(gusty):
     flights, fitted = gusty
-    at, windows = _vehicle(fitted), windows_of(flights[:1], 0.3, 1.0)
+    at, windows = fitted.free.at(fitted.values), windows_of(flights[:1], 0.3, 1.0)
     begun = [_Begun.of(at, each, 0.2) for each in side_by_side(windows)]
     values = np.log([[20.0, 0.2], [8.0, 0.4]] * 2).ravel()
     found = _point(at, begun, 0.2, values)

@@ -29,7 +29,7 @@ from cpfls_cli.vehicle.motion import Wrench
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.autopilots import CROSS
-from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, planned, signals_of
+from tests.builders.closed_loop_flights import PERIOD, VEHICLE, by_columns, flown, planned, signals_of
 
 USUAL = VehicleSettings()
 
@@ -85,13 +85,13 @@ def test_path_is_followed_and_no_rotor_is_clipped(plain):
 def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
     flight = flown(2.0, effects={name: typical(name)})
     (one,) = simulated_effects({name: typical(name)}, VEHICLE).listed
-    signals = signals_of(flight)
+    signals, (shape, linear) = signals_of(flight), by_columns(one)
     weak, left = balance(signals)
     if one.effect.kind == "actuator":
-        corrected = one.effect.apply(signals, one.shape)
+        corrected = one.effect.apply(signals, shape)
         expected = left - weak.averaged(weak.residual(corrected))
     else:
-        expected = weak.averaged(one.effect.columns(signals, one.shape)) @ one.linear
+        expected = weak.averaged(one.effect.columns(signals, shape)) @ linear
     assert rms(expected).max() > 2e-3
     # The log shows what is late only at its samples, with a straight line between them; a filter of samples is exact
     # at its own frequency.
@@ -208,7 +208,7 @@ def test_effects_add_up():
     signals = signals_of(flown(effects=chosen))
     weak, left = balance(signals)
     listed = simulated_effects(chosen, VEHICLE).listed
-    expected = sum(weak.averaged(one.effect.columns(signals, {})) @ one.linear for one in listed)
+    expected = sum(weak.averaged(one.effect.columns(signals, {})) @ by_columns(one)[1] for one in listed)
     np.testing.assert_array_less(rms(left - expected), [3e-5] * 3 + [2e-4] * 3)
 
 

@@ -237,7 +237,7 @@ def test_rotors_of_a_held_vehicle_give_its_torque():
 def asked(vehicle, tilt_max=None, **settings):
     straight = {"path": "straight", "direction": (0.0, 0.0, 1.0), "legs": 1, "duration_s": 16.0, "yaw_turn_rad": 0.0}
     trajectory = plan(TrajectorySettings(**(straight | settings)), vehicle.gravity_m_s2)
-    return flyability({name: getattr(trajectory, name) for name in PLANNED}, vehicle, tilt_max), trajectory
+    return flyability({name: getattr(trajectory, name) for name in ("time", *PLANNED)}, vehicle, tilt_max), trajectory
 
 
 def test_thrust_carries_and_accelerates_the_mass():
@@ -274,7 +274,7 @@ def test_a_held_vehicle_has_its_thrust_free():
     time = np.linspace(0, 3, 50)
     zero = np.zeros((50, 3))
     motion = {"attitude": np.outer(time, [2.0, 0, 0]), "attitude_rate": zero + np.array([2.0, 0, 0])}
-    found = flyability({**motion, "attitude_acceleration": zero}, VehicleSettings(), None)
+    found = flyability({"time": time, **motion, "attitude_acceleration": zero}, VehicleSettings(), None)
     np.testing.assert_array_equal(found.thrust, 0.0)
     assert found.tilt.max() > 3.0
 

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.vehicle.motion import Acting, Instant, Vehicle
-from cpfls_cli.vehicle.rotors import allocation_matrix, body_wrench, rotor_demand
+from cpfls_cli.vehicle.rotors import allocation_matrix, body_wrench, rotor_demand, violations
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.vehicle.stepping import Machine
 from cpfls_cli.vehicle.tracing import SYMBOLS, Graph, array_symbols, python_source, traced, traced_in_two
@@ -213,7 +213,7 @@ def test_demand_of_four_rotors_is_the_speed_that_was_flown():
     wrench = body_wrench(VehicleSettings(), speed)
     demand = rotor_demand(VehicleSettings(), wrench.thrust, wrench.body_torque)
     np.testing.assert_allclose(demand.speed, speed, rtol=1e-12)
-    assert demand.violations == ()
+    assert violations(demand.squared_speed, 1000.0, np.arange(50.0)) == ()
 
 
 def test_demand_of_six_rotors_gives_the_wrench_with_the_smallest_norm():
@@ -239,16 +239,17 @@ def test_what_rotors_cannot_do_is_reported_and_not_clipped():
     squared_2, squared_4 = demand.squared_speed[3, [1, 3]]
     assert squared_2 == pytest.approx(hover / THRUST * (1 / 4 - 3 / 2))
     assert squared_4 == pytest.approx(hover / THRUST * (1 / 4 + 3 / 2))
-    kinds = [(v.rotor, v.kind, v.first, v.last, v.count) for v in demand.violations]
-    assert kinds == [(1, "negative squared speed", 1, 3, 2), (3, "above the limit", 1, 3, 2)]
-    assert [v.worst for v in demand.violations] == [squared_2, squared_4]
+    found = violations(demand.squared_speed, 500.0, np.arange(5.0))
+    kinds = [(v.rotor, v.kind, v.first_s, v.last_s, v.samples) for v in found]
+    assert kinds == [(2, "negative squared speed", 1.0, 3.0, 2), (4, "above the limit", 1.0, 3.0, 2)]
+    assert [v.worst for v in found] == [squared_2, squared_4]
     np.testing.assert_array_equal(np.isnan(demand.speed), [[False, n, False, n] for n in (0, 1, 0, 1, 0)])
 
 
 def test_standing_still_and_the_limit_itself_are_no_violations():
     limit = body_wrench(VehicleSettings(), np.array([[0.0] * 4, [1000.0] * 4]))
     demand = rotor_demand(VehicleSettings(), limit.thrust, limit.body_torque)
-    assert demand.violations == ()
+    assert violations(demand.squared_speed, 1000.0, np.arange(2.0)) == ()
     np.testing.assert_allclose(demand.speed, [[0.0] * 4, [1000.0] * 4])
 
 
