@@ -347,14 +347,8 @@ def regular_stamps(time: Array, motion: Sequence[Array], of: str = "") -> tuple[
     steps = np.diff(time)
     if not motion or len(time) < _BLOCKS * _CURVE or not (steps > 0).all():
         return time, []
-    period = np.median(steps)
-    first, early, apart = 0, time - period * np.arange(len(time)), np.ones(len(steps))
-    for row in np.flatnonzero(steps > _LONG_STEP * period) + 1:
-        # What arrives late is followed by what does not.
-        missing = np.round((early[row : row + _NEAR].min() - early[max(first, row - _NEAR) : row].min()) / period)
-        if missing > 0:
-            first, apart[row - 1] = int(row), 1 + missing
-    rows = np.concatenate([[0], np.cumsum(apart)])
+    period = float(np.median(steps))
+    rows = _counted_rows(time, period)
     line = np.polyfit(rows, time, 1)
     late = time - np.polyval(line, rows)
     late -= uniform_filter1d(late, _WANDERS, mode="mirror")
@@ -372,6 +366,18 @@ def regular_stamps(time: Array, motion: Sequence[Array], of: str = "") -> tuple[
         return time, []
     words = f"stamps{of} scatter by {1e3 * late.std():.2g} ms about a regular clock of {1 / line[0]:.4g} Hz"
     return regular, [f"{words}, along which the motion is surely smoother: rows are put where that has them"]
+
+
+def _counted_rows(time: Array, period: float) -> Array:
+    """Count rows of a clock with that period, lost ones too, at stamps that may be late, shape (sample,)."""
+    steps = np.diff(time)
+    first, early, apart = 0, time - period * np.arange(len(time)), np.ones(len(steps))
+    for row in np.flatnonzero(steps > _LONG_STEP * period) + 1:
+        # What arrives late is followed by what does not.
+        missing = np.round((early[row : row + _NEAR].min() - early[max(first, row - _NEAR) : row].min()) / period)
+        if missing > 0:
+            first, apart[row - 1] = int(row), 1 + missing
+    return np.concatenate([[0.0], np.cumsum(apart)])
 
 
 def _beyond_cubic(time: Array, motion: Array) -> Array:
