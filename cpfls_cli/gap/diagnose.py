@@ -460,9 +460,10 @@ def _concluded(
     floor, differ = found.steps[-1].floor, found.differ
     # In gusts instruments identify the numbers, and a gap need not be clear.
     still = not hypothesis.gusty.any()
-    taken = held_out.removed_by_numbers(NOISE if still else 0.0)
-    known, unknown = {each.name: each.numbers for each in effects}, found.judge.unknown(held_out)
-    numbers = wrong_numbers(estimates, known, taken, unknown, hypothesis.vehicle)
+    taken, unknown = held_out.removed_by_numbers(NOISE if still else 0.0), found.judge.unknown(held_out)
+    numbers = wrong_numbers(
+        estimates, {each.name: each.numbers for each in effects}, taken, unknown, hypothesis.vehicle
+    )
     effects += [numbers] if numbers is not None else []
     # Where wrong numbers leave no gap, there is none that names could take a share of.
     removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)
