@@ -84,11 +84,7 @@ def read_signals(
     repaired = table if settings.spike_deviations is None else SignalTable(table.time, masked)
     present = np.isfinite(np.hstack(list(repaired.signals.values())))
     rows, incomplete_ends, beyond_gap = repair.longest_stretch(table.time, present, settings)
-    table, repaired = table.rows(rows), repaired.rows(rows)
-    # Those of topics are regular by now.
-    motion = [] if stamped_hz else [own for name, own in repaired.signals.items() if name in MOTION]
-    time, scattered = repair.regular_stamps(table.time, motion)
-    table, repaired = (replace(own, time=time) for own in (table, repaired))
+    table, repaired, scattered = _on_regular_stamps(table.rows(rows), repaired.rows(rows), flat=not stamped_hz)
     resting = stretches.rotors_at_rest(table, settings)
     slow = bandwidth.slow_signals(table, stamped_hz)
     spikes, updated_hz = {name: own[rows] for name, own in spikes.items()}, {own.name: own.rate_hz for own in slow}
@@ -128,6 +124,15 @@ def read_signals(
         parameters={},
         stated={},
     )
+
+
+def _on_regular_stamps(
+    table: SignalTable, repaired: SignalTable, *, flat: bool
+) -> tuple[SignalTable, SignalTable, list[str]]:
+    """Undo what the stamps of a flat log scatter by; those of topics are regular by now."""
+    motion = [own for name, own in repaired.signals.items() if flat and name in MOTION]
+    time, scattered = repair.regular_stamps(table.time, motion)
+    return replace(table, time=time), replace(repaired, time=time), scattered
 
 
 def _setpoints(

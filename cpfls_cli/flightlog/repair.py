@@ -350,7 +350,7 @@ def regular_stamps(time: Array, motion: Sequence[Array], of: str = "") -> tuple[
     from scipy.signal import savgol_filter
 
     steps = np.diff(time)
-    if not motion or len(time) < _BLOCKS * _CURVE or not (steps > 0).all():
+    if not motion or len(time) < _BLOCKS * _CURVE or not ((steps > 0) & np.isfinite(steps)).all():
         return time, []
     period, line = float(np.median(time[_FEW:] - time[:-_FEW])) / _FEW, np.empty(0)
     for _ in range(2):

@@ -173,3 +173,8 @@ def test_values_without_bound_decide_on_no_stamps():
     _, stamps = scattered(0)
     wild = np.where(np.arange(len(stamps))[:, None] % 7 == 0, [1e300, np.inf, np.nan], 0.0)
     assert repair.regular_stamps(stamps, [wild])[1] == []
+
+
+def test_a_stamp_without_bound_is_no_clock():
+    stamps = np.append(TICKS[:999], np.inf)
+    assert repair.regular_stamps(stamps, [turning(TICKS[:1000])]) == (stamps, [])
