@@ -6,7 +6,6 @@ from math import floor, log10, pi
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import uniform_filter1d
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray, runs
 from cpfls_cli.blocks import mean_error
@@ -25,11 +24,15 @@ _DEVIATION_OF_MEDIAN = 1.4826  # Standard deviation of normal noise over the med
 _LARGEST = {"rad": 1e6, "rad/s": 1e5, "m": 1e9, "m/s": 1e5, "m/s^2": 1e6, "N m": 1e6, "N": 1e8, "V": 1e5, "1": 1e9}
 _LARGEST |= {"s": 1e3}
 _LARGEST_SHARE_BROKEN = 0.01  # Of values up to which some are broken, and not the unit wrong.
-_LONG_STEP = 1.4  # Periods from which on rows may be missing between two.
-_NEAR = 3  # Rows before and behind a long step by which that is decided.
+_LONG_STEP = 1.2  # Periods from which on rows may be missing between two.
+_MISSING = 0.7  # Periods by which what comes behind a long step is later if a row is missing: the rest is waiting.
+_NEAR = 10  # Rows before a long step, and behind it and what waited there, by which that is decided.
+_FEW = 4  # Steps whose mean is a period though stamps are rounded, and among which few rows are missing.
 _WANDERS = 201  # Rows over which a clock may wander.
+_ONE_CLOCK = 100, 0.25  # Rows whose median follows one clock, and share of a period to which it does.
 _LEAST_SCATTER = 1e-3  # Of stamps, share of a period: less changes nothing.
 _CURVE = 5  # Rows of which the middle one is compared with the cubic through the others.
+_BOUNDLESS = 1e100  # Of no unit, and whose square is a number.
 _SURELY = 3.0  # Standard errors.
 _BLOCKS = 20  # Over which the mean is sure.
 
@@ -344,23 +347,34 @@ def regular_stamps(time: Array, motion: Sequence[Array], of: str = "") -> tuple[
     list of str
         A sentence where they are others.
     """
+    from scipy.signal import savgol_filter
+
     steps = np.diff(time)
-    if not motion or len(time) < _BLOCKS * _CURVE or not (steps > 0).all():
+    if not motion or len(time) < _BLOCKS * _CURVE or not ((steps > 0) & np.isfinite(steps)).all():
         return time, []
-    period = float(np.median(steps))
-    rows = _counted_rows(time, period)
-    line = np.polyfit(rows, time, 1)
+    period, line = float(np.median(time[_FEW:] - time[:-_FEW])) / _FEW, np.empty(0)
+    for _ in range(2):
+        rows = _counted_rows(time, period)
+        line = np.polyfit(rows, time, 1)
+        period = float(line[0])
     late = time - np.polyval(line, rows)
-    late -= uniform_filter1d(late, _WANDERS, mode="mirror")
+    block, share = _ONE_CLOCK
+    medians = np.median(late[: len(late) // block * block].reshape(-1, block), axis=1)
+    # Nor is it one clock whose rate changes, that begins anew behind a pause, or of which rows are miscounted.
+    if np.abs(np.diff(medians)).max(initial=0.0) > share * period:
+        return time, []
+    late -= savgol_filter(late, min(_WANDERS, len(late) - 1 + len(late) % 2), 1)
     regular = time - late
     if late.std() < _LEAST_SCATTER * period or not (np.diff(regular) > 0).all():
         return time, []
     whole = rows[_CURVE - 1 :] - rows[: 1 - _CURVE] == _CURVE - 1
-    given, other = (_beyond_cubic(stamps, np.column_stack(motion))[whole] ** 2 for stamps in (time, regular))
+    columns = np.column_stack(motion)
+    columns = np.where(np.abs(columns) < _BOUNDLESS, columns, np.nan)
+    given, other = (_beyond_cubic(stamps, columns)[whole] ** 2 for stamps in (time, regular))
+    if len(given) < _BLOCKS:
+        return time, []
     size = np.nan_to_num(given).mean(axis=0)
     gained = np.nan_to_num(given - other)[:, size > 0] @ (1 / size[size > 0])
-    if len(gained) < _BLOCKS:
-        return time, []
     blocks = np.array([own.mean() for own in np.array_split(gained, _BLOCKS)])
     if blocks.mean() <= _SURELY * mean_error(blocks):
         return time, []
@@ -369,15 +383,19 @@ def regular_stamps(time: Array, motion: Sequence[Array], of: str = "") -> tuple[
 
 
 def _counted_rows(time: Array, period: float) -> Array:
-    """Count rows of a clock with that period, lost ones too, at stamps that may be late, shape (sample,)."""
+    """Count the ticks before each row, of a clock of such a period, s: rows may be missing."""
     steps = np.diff(time)
-    first, early, apart = 0, time - period * np.arange(len(time)), np.ones(len(steps))
-    for row in np.flatnonzero(steps > _LONG_STEP * period) + 1:
-        # What arrives late is followed by what does not.
-        missing = np.round((early[row : row + _NEAR].min() - early[max(first, row - _NEAR) : row].min()) / period)
-        if missing > 0:
-            first, apart[row - 1] = int(row), 1 + missing
-    return np.concatenate([[0.0], np.cumsum(apart)])
+    early, missing = time - period * np.arange(len(time)), np.zeros(len(time))
+    on_time = np.append(np.flatnonzero(steps >= period / _LONG_STEP), len(time) - 1)
+    long, total = np.flatnonzero(steps > _LONG_STEP * period) + 1, 0.0
+    ends = on_time[np.searchsorted(on_time, long)] + _NEAR
+    for row, end, following in zip(long, ends, np.append(long, len(time))[1:], strict=True):
+        # What arrives late is followed by what waited for it, and that by what does not.
+        before = (early[max(0, row - _NEAR) : row] - period * missing[max(0, row - _NEAR) : row]).min()
+        found = np.floor((early[row:end].min() - period * total - before) / period + 1 - _MISSING)
+        total += max(0.0, found)
+        missing[row:following] = total
+    return np.asarray(np.arange(len(time)) + missing)
 
 
 def _beyond_cubic(time: Array, motion: Array) -> Array:

@@ -56,8 +56,9 @@ SETPOINTS: Final[Mapping[SignalName, SignalName]] = MappingProxyType(
 )
 """Signals that say what was asked of the autopilot and of its loops, and the name of each among the setpoints."""
 ROTORS: Final[tuple[SignalName, ...]] = ("rotor_speed", "rotor_command")  # Signals with a column for each rotor.
-# Signals that keep their value until the next one.
+# Signals that are smooth in time.
 MOTION: Final = ("position", "velocity", "attitude", "quaternion", "body_rate")
+# Signals that keep their value until the next one.
 COMMANDS: Final = ("torque", "body_torque", "thrust", "rotor_command")
 _COLUMNS_OF_SIGNAL: Final[Mapping[str, int]] = MappingProxyType(
     {"quaternion": 4, "thrust": 1, "voltage": 1, "setpoint_thrust": 1}

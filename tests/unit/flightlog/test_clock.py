@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog import repair
 from cpfls_cli.flightlog.importing import read_signals
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
@@ -115,3 +116,65 @@ def test_samples_that_were_taken_irregularly_stay_at_their_stamps():
 def test_motion_below_its_noise_decides_on_no_stamps():
     sent, stamps = scattered(0)
     assert not [each for each in rows_of(stamps, turning(sent), noise=3.0).warnings if "scatter" in each]
+
+
+def stamped(sent, stamps):
+    """Stamps as corrected, less when they were sent, in steps of 2.5 ms, and what is said."""
+    motion = turning(sent) + 0.002 * np.random.default_rng(9).standard_normal((len(sent), 3))
+    found, said = repair.regular_stamps(stamps, [motion])
+    return (found - sent) / 2.5e-3, said
+
+
+TICKS = 2.5e-3 * np.arange(12000)
+
+
+@pytest.mark.parametrize("waiting", [2, 4, 8])
+def test_messages_that_wait_for_each_other_are_not_taken_for_lost_ones(waiting):
+    stamps = TICKS.copy()
+    for first in range(500, 11900, 811):
+        stamps[first : first + waiting] = TICKS[first + waiting] - 1e-6 * np.arange(waiting, 0, -1)
+    off, said = stamped(TICKS, stamps)
+    assert said
+    assert np.ptp(off) < 0.5 < np.ptp((stamps - TICKS) / 2.5e-3)
+
+
+@pytest.mark.parametrize("rate", [1.01, 1.1, 2.0])
+def test_stamps_of_a_log_whose_rate_changes_stay(rate):
+    sent = np.concatenate([TICKS[:6000], TICKS[5999] + rate * TICKS[1:6001]])
+    waits = np.random.default_rng(0).exponential(0.75e-3, 12000)
+    off, said = stamped(sent, np.maximum.accumulate(sent + waits) + 1e-9 * np.arange(12000))
+    assert not said
+    assert off.min() >= 0
+
+
+@pytest.mark.parametrize("pause", [10.4, 1000.5])
+def test_stamps_of_a_clock_that_begins_anew_behind_a_pause_stay(pause):
+    sent = TICKS + np.where(np.arange(12000) > 6000, pause * 2.5e-3, 0.0)
+    waits = np.random.default_rng(0).exponential(0.75e-3, 12000)
+    assert not stamped(sent, np.maximum.accumulate(sent + waits) + 1e-9 * np.arange(12000))[1]
+
+
+@pytest.mark.parametrize(("rate_hz", "digit_s"), [(400.0, 1e-3), (400.0, 2e-3), (90.0, 5e-3), (300.0, 1e-3)])
+def test_rounded_stamps_are_put_back(rate_hz, digit_s):
+    sent = np.arange(12000) / rate_hz + 3.7e-4
+    motion = turning(sent) + 0.002 * np.random.default_rng(9).standard_normal((12000, 3))
+    found, said = repair.regular_stamps(np.floor(sent / digit_s + 1e-9) * digit_s, [motion])
+    assert said
+    assert np.ptp(found - sent) < 0.02 / rate_hz
+
+
+def test_rows_of_which_each_other_is_missing_have_no_curve_to_compare():
+    time = np.where(np.arange(3000) % 3 > 0, TICKS[:3000] + 1e-4 * np.sin(TICKS[:3000]), np.nan)
+    time = time[np.isfinite(time)]
+    assert repair.regular_stamps(time, [turning(time)])[1] == []
+
+
+def test_values_without_bound_decide_on_no_stamps():
+    _, stamps = scattered(0)
+    wild = np.where(np.arange(len(stamps))[:, None] % 7 == 0, [1e300, np.inf, np.nan], 0.0)
+    assert repair.regular_stamps(stamps, [wild])[1] == []
+
+
+def test_a_stamp_without_bound_is_no_clock():
+    stamps = np.append(TICKS[:999], np.inf)
+    assert repair.regular_stamps(stamps, [turning(TICKS[:1000])]) == (stamps, [])
