@@ -113,7 +113,8 @@ def _resampled(topics: Topics, settings: ImportSettings) -> tuple[dict[str, Arra
     used, warnings = {base}, list[str]()
     smooth = [_continuous(name, signal, topics) for name, signal in settings.signals.items() if name in MOTION]
     for topic, time in clocks.items():
-        motion = [own for each in smooth for column, own in each.items() if topic_and_field(column)[0] == topic]
+        own = [values for each in smooth for column, values in each.items() if topic_and_field(column)[0] == topic]
+        motion = [values for values in own if len(values) == len(time)]
         clocks[topic], scattered = regular_stamps(time, motion, f" of topic {topic}")
         warnings += scattered
     target = clocks[base]

@@ -182,7 +182,7 @@ class Judge:
     def unknown(self, unseen: HeldOut) -> Array:
         """Compute what effects leave of each channel where that is clear, relative to the motion, shape (6,)."""
         after, motion = unseen.size(unseen.after), system(self.repaired).by_flight(lambda flight, _: flight.motion)
-        return np.where(after.floors > CLEAR, after.value / channel_size(motion), 0.0)
+        return np.where(after.floors > CLEAR, after.value / known_size(motion, unseen.known), 0.0)
 
     def confirmed(self, first: Judgement) -> tuple[Judgement, list[Refusal]]:
         """Drop effects one by one that the held-out flights do not confirm: first what harms, then what is not needed.
