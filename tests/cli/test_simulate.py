@@ -59,6 +59,8 @@ def test_flight_is_logged_and_keeps_to_its_format(fly, cpfls):
     path, said = fly()
     assert "off the path by" in said
     assert "effects: none\nnext:\n" in said
+    assert "rotor_speed 0.5; rotor_command 0.5" in said
+    assert "body_rate 0.002" in said
     cpfls.done("check", path)
     speed, command, rate, torque = read(path, "rotor_speed", "rotor_command", "body_rate", "torque")
     assert speed.shape == command.shape == (301, 4)
