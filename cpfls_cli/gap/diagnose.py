@@ -51,6 +51,7 @@ from cpfls_cli.gap.naming.results import (
     Alternative,
     ByKind,
     Conclusion,
+    Estimate,
     GapChange,
     GapVerdict,
     NamedEffect,
@@ -376,12 +377,17 @@ def _at_stated_inertia(named: _Named, flights: _Flights, given: Instruments, acr
 
 def _wrong_inertia(named: _Named) -> bool:
     """Check whether a moment of inertia is among the numbers that are named as wrong."""
-    (hypothesis, estimates, *_), held_out = named.judgement
+    (hypothesis, estimates, *_), _ = named.judgement
     names = (each.effect.name for each in hypothesis.chosen)
-    numbers = dict(zip(names, estimates.effects, strict=True))
-    removed = held_out.removed_by_numbers(0.0)
-    wrong = wrong_numbers(estimates, numbers, removed, named.judge.unknown(held_out), hypothesis.vehicle)
+    wrong = _wrong_numbers(named, dict(zip(names, estimates.effects, strict=True)), 0.0)
     return wrong is not None and any(each.name.startswith("inertia") for each in wrong.numbers)
+
+
+def _wrong_numbers(named: _Named, effects: Mapping[str, Sequence[Estimate]], least: float) -> NamedEffect | None:
+    """Name the numbers of the vehicle that are wrong, where a gap is: a mean square of `least` squared floors."""
+    (hypothesis, estimates, *_), held_out = named.judgement
+    taken, unknown = held_out.removed_by_numbers(least), named.judge.unknown(held_out)
+    return wrong_numbers(estimates, effects, taken, unknown, hypothesis.vehicle)
 
 
 def _doubts(
@@ -460,10 +466,7 @@ def _concluded(
     floor, differ = found.steps[-1].floor, found.differ
     # In gusts instruments identify the numbers, and a gap need not be clear.
     still = not hypothesis.gusty.any()
-    taken, unknown = held_out.removed_by_numbers(NOISE if still else 0.0), found.judge.unknown(held_out)
-    numbers = wrong_numbers(
-        estimates, {each.name: each.numbers for each in effects}, taken, unknown, hypothesis.vehicle
-    )
+    numbers = _wrong_numbers(found, {each.name: each.numbers for each in effects}, NOISE if still else 0.0)
     effects += [numbers] if numbers is not None else []
     # Where wrong numbers leave no gap, there is none that names could take a share of.
     removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)
