@@ -189,7 +189,8 @@ def searched(
     true: Mapping[str, float],
 ) -> list[tuple[str, ...]]:
     result = find_vehicle(vehicle, flights, SEARCH, lambda *_: None)
-    chosen, flew = result.choice.chosen.structure.blocks, [block for block in blocks if block not in vehicle.unknown]
+    chosen = next(each.blocks for each in result.structures if each.name == "chosen")
+    flew = [block for block in blocks if block not in vehicle.unknown]
     more, missed = ([b for b in one if b not in other] for one, other in ((chosen, flew), (flew, chosen)))
     about, errors = (", ".join(more) or "none", ", ".join(missed) or "none"), compared(result.numbers, true)
     rows = [(number, errors[number]) for number in ASKED if number in errors]

@@ -11,8 +11,7 @@ import numpy as np
 
 from benchmarks.shared.gusty_sets import KINDS, LEVELS, VEHICLES, flown_sets, instruments_of, words
 from benchmarks.shared.measure import count, mean_and_ends, program, table
-from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
-from cpfls_cli.playback.gusts import RANGES
+from cpfls_cli.playback.disturbance import RANGES, FoundGusts, find_gusts
 from cpfls_cli.playback.model import VehicleModel
 from tests.builders.gusty_flights import CALM, MEMORY_S, Flight
 

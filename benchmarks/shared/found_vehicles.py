@@ -38,27 +38,30 @@ def learned(
     vehicle: VehicleSettings, training: Sequence[PlaybackFlight], baselines: bool = True
 ) -> dict[str, VehicleModel]:
     """Find a vehicle with the program's settings, and fit the baselines of the choice; what was found is printed."""
-    used, start = PlaybackSettings(), perf_counter()
-    found = find_vehicle(vehicle, training, used, _shown)
-    choice = found.choice
-    print(f"\nfound in {perf_counter() - start:.0f} s, {choice.evaluated} structures judged on flights kept aside:")
+    used, start, judged = PlaybackSettings(), perf_counter(), list[Judged]()
+
+    def progress(known: Sequence[Judged], total: int) -> None:
+        judged[:] = known
+        _shown(known, total)
+
+    found = find_vehicle(vehicle, training, used, progress)
+    tried = {each.name: each for each in found.structures}
+    print(f"\nfound in {perf_counter() - start:.0f} s, {found.evaluated} structures judged on flights kept aside:")
     for name in BASELINES:
-        judged = getattr(choice, name)
-        worse, uncertain = judged.worse_than(choice.best)
-        blocks = " ".join(judged.structure.blocks)
-        size = f"{judged.error:.4f} ({worse:+.4f} +- {uncertain:.4f})"
-        print(f"  {name}: error {size}, {judged.numbers} parameters: {blocks}")
+        row = tried[name]
+        size = f"{row.error:.4f} ({row.worse:+.4f} +- {row.uncertain:.4f})"
+        print(f"  {name}: error {size}, {row.numbers} parameters: {' '.join(row.blocks)}")
     for number in found.numbers:
         weak = ", on a bound" if number.at_bound else "" if number.determined else ", not determined"
         print(f"  {number.name} = {number.value:.4g} ({number.low:.4g} to {number.high:.4g}) {number.unit}{weak}")
     # Where flights repeat each other the model is the constants, and no forecast.
-    models = {f"vehicle, {choice.chosen.numbers} parameters": found.forecast or found.model}
+    models = {f"vehicle, {tried['chosen'].numbers} parameters": found.forecast or found.model}
     for name in ("added", "everything") if baselines else ():
-        judged = getattr(choice, name)
-        clock = perf_counter()
-        fitted, _ = fitted_to_all(judged.structure, vehicle, training, used, judged.fit)
+        of, clock = tried[name], perf_counter()
+        own = next(each for each in judged if (each.structure.blocks, each.error) == (of.blocks, of.error))
+        fitted, _ = fitted_to_all(own.structure, vehicle, training, used, own.fit)
         print(f"  {name} fitted to all in {perf_counter() - clock:.1f} s")
-        models[f"{name}, {judged.numbers} parameters"] = fitted.model
+        models[f"{name}, {own.numbers} parameters"] = fitted.model
     return models
 
 

@@ -1,6 +1,7 @@
 """`cpfls simulate` in closed loop, and what was asked of an autopilot, from the log to the playback."""
 
 import json
+import re
 
 import h5py
 import numpy as np
@@ -59,6 +60,8 @@ def test_flight_is_logged_and_keeps_to_its_format(fly, cpfls):
     path, said = fly()
     assert "off the path by" in said
     assert "effects: none\nnext:\n" in said
+    assert "rotor_speed 0.5; rotor_command 0.5" in said
+    assert "body_rate 0.002" in said
     cpfls.done("check", path)
     speed, command, rate, torque = read(path, "rotor_speed", "rotor_command", "body_rate", "torque")
     assert speed.shape == command.shape == (301, 4)
@@ -66,6 +69,13 @@ def test_flight_is_logged_and_keeps_to_its_format(fly, cpfls):
     with h5py.File(path) as file:
         assert file["effects"].attrs["rows"] == 0
         assert "voltage" not in file
+
+
+def test_noise_that_differs_by_axis_is_listed_by_axis(fly):
+    _, said = fly("--set", "simulation.relative_noise={position: 0.01}")
+    by_axis = re.search(r"position ([\d.e-]+) ([\d.e-]+) ([\d.e-]+);", said)
+    assert by_axis is not None
+    assert len({*by_axis.groups()}) > 1
 
 
 def test_a_flight_says_what_its_autopilot_followed(fly, short):

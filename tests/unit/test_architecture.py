@@ -3,6 +3,8 @@
 import ast
 import re
 import tomllib
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 from tests.builders.sources import nodes, syntax
@@ -41,6 +43,26 @@ def own_imports_in_functions(path):
         for node in ast.walk(function):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cpfls_cli"):
                 yield f"{path.relative_to(PACKAGE)}: {function.name}: {node.module}"
+
+
+def has(module, name):
+    """Whether a module has a name, or a package a module of that name."""
+    own = import_module(module)
+    return hasattr(own, name) or (hasattr(own, "__path__") and find_spec(f"{module}.{name}") is not None)
+
+
+def test_what_is_outside_of_the_package_takes_only_names_that_it_has():
+    """Benchmarks and examples are run by hand."""
+    files = [file for folder in ("benchmarks", "docs", "examples") for file in sorted((ROOT / folder).rglob("*.py"))]
+    taken = [
+        (file.relative_to(ROOT).as_posix(), node.module, own.name)
+        for file in files
+        for node in nodes(file)
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "cpfls_cli"
+        for own in node.names
+    ]
+    assert len(taken) > 100
+    assert [each for each in taken if not has(*each[1:])] == []
 
 
 # These load what they are asked for: a command, what an object of the Python interface does, Dask, what is drawn.

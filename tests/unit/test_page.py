@@ -100,6 +100,52 @@ def test_what_a_macro_gives_stays_markdown(tmp_path):
     assert "<strong>*x*</strong> and <strong>*x*</strong> and y" in page.html("t", text, {})
 
 
+TEXTS = [
+    [],
+    ["one"],
+    ["one", HOSTILE, "'a' | \"b\" {warning}", "> c", "::: d", "- e", "<b>&amp;"],
+    [1, None, "f"],
+    [page.code("`g`")],
+]
+
+
+@pytest.mark.parametrize("texts", TEXTS)
+@pytest.mark.parametrize(
+    ("tag", "loop"),
+    [
+        ("{% notes r %}", "> {{ each }}"),
+        ('{% notes r, "warning" %}', "> {{ each }} {warning}"),
+        ("{% paragraphs r %}", "{{ each }}"),
+        ('{% paragraphs r | map("string"), "note" %}', "{{ each | string }} {note}"),
+    ],
+)
+def test_several_at_once_are_what_a_loop_over_them_gives(tmp_path, tag, loop, texts):
+    (tmp_path / "tag.md.j2").write_text(f"# Begins\n\n{tag}\nEnds.\n")
+    (tmp_path / "loop.md.j2").write_text(f"# Begins\n\n{{% for each in r %}}\n{loop}\n\n{{% endfor %}}\nEnds.\n")
+    shown = [page.words(name, texts, folder=tmp_path) for name in ("tag", "loop")]
+    assert shown[0] == shown[1]
+
+
+def test_a_list_is_what_a_loop_appends(tmp_path):
+    text = """\
+{% list whole = "%s%s" | format(name, loop.index0) for name, size in r.items() if size %}
+{% list sums = (x + y if x else y) for x, y in zip([0, 1, 2], [3, 4, 5]) %}
+{% for own in ["a", "b"] %}{% list each = own ~ x for x in [1, 2] %}{{ each | join("+") }} {% endfor %}
+{% macro of(xs) %}{% list twice = 2 * x for x in xs %}{{ twice | join(",") }}{% endmacro %}
+{{ whole | join(",") }} {{ sums | join(",") }} {{ of([1, 2]) }} {% list none_ = x for x in [] %}{{ none_ | length }}
+"""
+    (tmp_path / "a.md.j2").write_text(text)
+    said = page.words("a", {"p": 1, "q": 0, "s": 2}, folder=tmp_path)
+    assert said.split() == ["a1+a2", "b1+b2", "p0,s1", "3,5,7", "2,4", "0"]
+
+
+@pytest.mark.parametrize("text", ["{% notes nothing %}", "{% paragraphs [nothing] %}"])
+def test_a_name_that_nothing_gives_is_an_error_in_several_at_once_too(tmp_path, text):
+    (tmp_path / "a.md.j2").write_text(text)
+    with pytest.raises(UndefinedError, match="'nothing' is undefined"):
+        page.words("a", None, folder=tmp_path)
+
+
 def test_a_name_that_a_result_lacks_is_an_error(tmp_path):
     with pytest.raises(UndefinedError):
         worded(tmp_path, "{{ r.none }}", estimate(1.0, 0.0, 2.0))

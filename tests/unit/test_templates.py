@@ -140,9 +140,28 @@ def test_a_name_that_does_not_exist_is_found():
     own = environment(TEMPLATES, {})
     with pytest.raises(AssertionError, match="has no selektion"):
         Walk(kind)(own.parse("{{ r.selektion }}"))
+    for text in (
+        "{% notes r.selektion %}",
+        '{% paragraphs [r.selektion] | map("string"), "note" %}',
+        "{% list x = r.selektion for y in [1] %}",
+        "{% list x = y for y in r.selektion if y %}",
+        "{% list x = y for y in [1] if r.selektion %}",
+    ):
+        with pytest.raises(AssertionError, match="has no selektion"):
+            Walk(kind)(own.parse(text))
     with pytest.raises(AssertionError, match="nothing writes sentense"):
         Walk(keys_of(loaded("effects")))(own.parse("{% for each in r.effects %}{{ each.sentense }}{% endfor %}"))
     look = loaded("look").kind
     field = next(each for each in described_fields(look) if each.table)
     with pytest.raises(AssertionError, match="has no nothing"):
         Walk(look)(own.parse(f"{{% for row in r.{field.name} %}}{{{{ row.nothing }}}}{{% endfor %}}"))
+    with pytest.raises(AssertionError, match="has no nothing"):
+        Walk(look)(own.parse(f"{{% list x = row.nothing for row in r.{field.name} %}}"))
+
+
+def test_what_loops_leave_out_does_not_depend_on_places():
+    """There ``loop`` is the loop around."""
+    own = environment(TEMPLATES, {})
+    for file in sorted(TEMPLATES.glob("*.md.j2")):
+        tests = [each.test for each in own.parse(file.read_text("utf-8")).find_all(nodes.For) if each.test is not None]
+        assert "loop" not in {name.name for test in tests for name in test.find_all(nodes.Name)}, file.name
