@@ -181,8 +181,9 @@ class Judge:
 
     def unknown(self, unseen: HeldOut) -> Array:
         """Compute what effects leave of each channel where that is clear, relative to the motion, shape (6,)."""
-        after, motion = unseen.size(unseen.after), system(self.repaired).by_flight(lambda flight, _: flight.motion)
-        return np.where(after.floors > CLEAR, after.value / known_size(motion, unseen.known), 0.0)
+        after, moved = unseen.size(unseen.after), system(self.repaired).by_flight(lambda flight, _: flight.motion)
+        motion = known_size(moved, unseen.known)
+        return np.where(after.floors > CLEAR, after.value / np.where(motion > 0, motion, 1e-12), 0.0)
 
     def confirmed(self, first: Judgement) -> tuple[Judgement, list[Refusal]]:
         """Drop effects one by one that the held-out flights do not confirm: first what harms, then what is not needed.
