@@ -28,7 +28,7 @@ _LONG_STEP = 1.2  # Periods from which on rows may be missing between two.
 _MISSING = 0.7  # Periods by which what comes behind a long step is later if a row is missing: the rest is waiting.
 _NEAR = 10  # Rows before a long step, and behind it and what waited there, by which that is decided.
 _FEW = 4  # Steps whose mean is a period though stamps are rounded, and among which few rows are missing.
-_WANDERS = 201  # Rows over which a clock may wander.
+_WANDERS = 201  # Rows over which a clock may drift.
 _ONE_CLOCK = 100, 0.25  # Rows whose median follows one clock, and share of a period to which it does.
 _LEAST_SCATTER = 0.07  # Of stamps, share of a period: real logs whose stamps scatter by 0.05 show no harm.
 _CURVE = 5  # Rows of which the middle one is compared with the cubic through the others.
@@ -329,8 +329,8 @@ def align_quaternion_signs(quaternion: Array) -> Array:
 def regular_stamps(time: Array, motion: Sequence[Array], of: str = "") -> tuple[Array, list[str]]:
     """Take the regular clock about which stamps scatter, where the motion is surely smoother along it, and say so.
 
-    Messages wait for a bus or a disk, and are stamped as they arrive, though a sensor is read regularly. A row is put
-    where the regular clock has it; steps without rows stay, and so does what the clock wanders by in long.
+    Messages wait for a bus or a disk, and are stamped as they arrive, though a sensor is read regularly. A row is placed
+    on the regular clock; gaps of lost rows stay, and so does a slow drift of the clock.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def regular_stamps(time: Array, motion: Sequence[Array], of: str = "") -> tuple[
     if blocks.mean() <= _SURELY * mean_error(blocks):
         return time, []
     words = f"stamps{of} scatter by {1e3 * late.std():.2g} ms about a regular clock of {1 / line[0]:.4g} Hz"
-    return regular, [f"{words}, along which the motion is surely smoother: rows are put where that has them"]
+    return regular, [f"{words}, along which the motion is surely smoother: rows are placed on that clock"]
 
 
 def _counted_rows(time: Array, period: float) -> Array:
