@@ -329,8 +329,8 @@ def align_quaternion_signs(quaternion: Array) -> Array:
 def regular_stamps(time: Array, motion: Sequence[Array], of: str = "") -> tuple[Array, list[str]]:
     """Take the regular clock about which stamps scatter, where the motion is surely smoother along it, and say so.
 
-    Messages wait for a bus or a disk, and are stamped as they arrive, though a sensor is read regularly. A row is placed
-    on the regular clock; gaps of lost rows stay, and so does a slow drift of the clock.
+    Messages wait for a bus or a disk, and are stamped as they arrive, though a sensor is read regularly. A row is
+    placed on the regular clock; gaps of lost rows stay, and so does a slow drift of the clock.
 
     Parameters
     ----------
