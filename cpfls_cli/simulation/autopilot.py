@@ -38,6 +38,7 @@ from cpfls_cli.vehicle.values import (
 
 PLANNED = 16
 """Numbers of a `Planned`."""
+_PLANNED = ("position", "velocity", "acceleration", "attitude", "attitude_rate", "attitude_acceleration")
 
 
 class Planned(NamedTuple):
@@ -60,11 +61,15 @@ def plan_of(planned: Mapping[str, Array], time: Array, at: Array) -> list[Flat]:
     """Interpolate a planned motion (as `fly` takes it) by cubic splines, as `Planned` arranges it."""
     from scipy.interpolate import CubicSpline
 
-    names = ("position", "velocity", "acceleration", "attitude", "attitude_rate", "attitude_acceleration")
-    splines = CubicSpline(time, np.stack([planned[name] for name in names], axis=1))
-    position, velocity, acceleration, q, qd, qdd = np.moveaxis(splines(at), 1, 0)
+    splines = CubicSpline(time, np.stack([planned[name] for name in _PLANNED], axis=1))
+    return list(map(tuple, _plan(*np.moveaxis(splines(at), 1, 0)).tolist()))
+
+
+def _plan(*signals: Array) -> Array:
+    """Arrange signals of a plan, in the order of `_PLANNED`, as `Planned` does, time first."""
+    position, velocity, acceleration, q, qd, qdd = signals
     rates = rotations.body_rate(q, qd), rotations.body_acceleration(q, qd, qdd)
-    return list(map(tuple, np.column_stack([position, velocity, acceleration, *rates, q[:, 2]]).tolist()))
+    return np.column_stack([position, velocity, acceleration, *rates, q[:, 2]])
 
 
 class Autopilot:
@@ -314,21 +319,24 @@ def integration_rate(law: Law | None, rate: float) -> float:
 
 
 def asked(
-    time: Array, planned: Mapping[str, Array], vehicle: VehicleSettings, settings: ClosedLoopSettings, state: Array
+    planned: Mapping[str, Array], vehicle: VehicleSettings, settings: ClosedLoopSettings, state: Array
 ) -> dict[str, Array]:
     """Give what the autopilot asked for along a flight: of its position loop the plan, of its attitude loop the target.
 
     By name, at the samples of the plan: position and velocity in the world frame, m and m/s; attitude as roll, pitch,
     yaw, rad, within half a turn of those that are flown; of an autopilot's own law thrust too, N.
     """
-    autopilot = Autopilot(vehicle, settings)
-    plan = [Planned.of(row) for row in plan_of(planned, time, time)]
-    flew = list(zip(plan, map(tuple, state.tolist()), strict=True))
-    targets = [autopilot.target(own, at) for own, at in flew]
-    flown = state[:, ATTITUDE]
-    attitude = flown + rotations.wrapped(rotations.euler_angles(np.array(targets)) - flown)
-    found = {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude}
-    if settings.law is not None:
-        thrust = (autopilot.wrench(own, at, rotation_rows(at[ATTITUDE], SYMBOLS))[0] for own, at in flew)
-        found["thrust"] = np.array(list(thrust))
-    return found
+    autopilot, thrusts = Autopilot(vehicle, settings), settings.law is not None
+
+    def build(_memory: Memory, given: tuple[Symbol, ...]) -> Vector:
+        plan, at = Planned.of(given[:PLANNED]), given[PLANNED:]
+        rows = [x for row in autopilot.target(plan, at) for x in row]
+        return (*rows, autopilot.wrench(plan, at, rotation_rows(at[ATTITUDE], SYMBOLS))[0]) if thrusts else tuple(rows)
+
+    machine = Machine.of(build, PLANNED + VEHICLE_STATES)
+    along = np.column_stack([_plan(*(planned[name] for name in _PLANNED)), state[:, :VEHICLE_STATES]])
+    found = np.array([machine.advance(tuple(row)) for row in along.tolist()])
+    flown, targets = state[:, ATTITUDE], found[:, :9].reshape(-1, 3, 3)
+    attitude = flown + rotations.wrapped(rotations.euler_angles(targets) - flown)
+    thrust = {"thrust": found[:, 9]} if thrusts else {}
+    return {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude, **thrust}

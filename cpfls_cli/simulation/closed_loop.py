@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from math import ceil, cos, isfinite, prod
+from math import ceil, cos, dist, isfinite, prod
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -423,11 +423,11 @@ def fly(
         motors = Motors.of(settings.law.mixer, settings.law.curve, vehicle)
         asked = along_path(planned_pilot, motors, vehicle)
         pilot = law_pilot(settings.law, motors, asked, clock.step, speed, noise)
-    flight = _integration(loop, pilot, state, speed, clock, push)
+    flight, path = _integration(loop, pilot, state, speed, clock, push), planned["position"].tolist()
 
     def check(sample: int, state: Flat) -> None:
         _refuse_lost(state, time, sample)
-        _refuse_far(state, planned["position"][sample], time[sample], settings.deviation_max_m)
+        _refuse_far(dist(state[POSITION], path[sample]), time[sample], settings.deviation_max_m)
 
     return flown(flight, check, progress)
 
@@ -541,8 +541,7 @@ def _refuse_lost(state: Flat, time: Array, sample: int) -> None:
         raise LostVehicleError(f"the vehicle tilts beyond 90 degrees at t = {time[sample]:g} s: {_REMEDY}", sample)
 
 
-def _refuse_far(state: Flat, planned: Array, time: float, limit: float) -> None:
-    away = float(np.linalg.norm(np.array(state[POSITION]) - planned))
+def _refuse_far(away: float, time: float, limit: float) -> None:
     if away > limit:
         raise ComputationError(
             f"the vehicle is {away:.3g} m away from the path at t = {time:g} s (limit "

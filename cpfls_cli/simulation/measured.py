@@ -79,7 +79,7 @@ def measure(
     loop = ClosedLoop(vehicle, settings.closed_loop, held, effects)
     motion = fly(loop, time, planned, progress, push, noise)
     signals, noise_std = _logged(time, motion, vehicle, settings, effects, rng)
-    setpoints = asked(time, planned, vehicle, settings.closed_loop, motion.state)
+    setpoints = asked(planned, vehicle, settings.closed_loop, motion.state)
     signals |= {f"setpoint_{name}": values for name, values in setpoints.items()}
     flown = effects if held is None else SimulatedEffects((*in_table(held).listed, *effects.listed))
     tracking = Tracking.of(
