@@ -47,7 +47,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import rotation_vectors
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.spread import drawn
-from cpfls_cli.playback.vehicle import FoundVehicle, bodily, estimate_correlation, found_numbers
+from cpfls_cli.playback.vehicle import VehicleFit, bodily, estimate_correlation, found_numbers
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.exported_vehicles import sheet_of_vehicle
@@ -74,7 +74,7 @@ class Found(NamedTuple):
     """What flights tell: a model with its gusts, and how sure its numbers are."""
 
     model: VehicleModel
-    known: FoundVehicle
+    known: VehicleFit
     lack: Lack | None
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.result import Estimate, about, part, result
 
-CANNOT_TELL = "CANNOT TELL"  # The verdict where no change would have shown, or a log is wrong.
+CANNOT_TELL = "CANNOT TELL"  # The verdict where no change could have been detected, or a log is wrong.
 _BY_CHANCE = ("delay", "lag", "unbalance", "swing", "battery")  # Kinds of which a good flight can hold too little.
 _OF_THRUST = ("rotor ", "mass", "centre of mass")
 """Changes one of which has to have a size where shares of thrust are compared, by the beginnings of their names."""
@@ -80,14 +80,14 @@ class Compared:
 
     @property
     def thrust_shows(self) -> bool:
-        """Whether a rotor, a mass or its centre would have shown, where shares of thrust are compared."""
+        """Whether a rotor, a mass or its centre has a detection limit, where shares of thrust are compared."""
         if not any(each.name.startswith("thrust ") for each in self.numbers):
             return True
         return any(each.cause.startswith(_OF_THRUST) and np.isfinite(each.smallest) for each in self.shows)
 
     @property
     def has_size(self) -> bool:
-        """Whether what is looked for would have shown: where shares of thrust are compared, a change of these."""
+        """Whether what is looked for has a detection limit: where shares of thrust are compared, a change of these."""
         return self.thrust_shows and any(np.isfinite(each.smallest) for each in self.shows)
 
 
@@ -160,7 +160,7 @@ class Changed(Compared):
 
     @property
     def verdict(self) -> str:
-        """What is said first: that nothing changed only of good logs, and where a change would have shown."""
+        """What is said first: that nothing changed only of good logs, and where a change could have been detected."""
         if self.changed:
             return "CHANGED"
         if self.contradictions or self.undetermined or not self.has_size:
@@ -240,7 +240,7 @@ class Trend(Compared):
 
     @property
     def verdict(self) -> str:
-        """What is said first: that nothing changed only of good logs, and where a change would have shown."""
+        """What is said first: that nothing changed only of good logs, and where a change could have been detected."""
         if self.changed:
             return "CHANGED"
         return CANNOT_TELL if self.contradictions or self.other_ranges or not self.has_size else "NO CHANGE"

@@ -94,7 +94,7 @@ def rotors_on_clock(flights: Sequence[Signals], windows: Windows) -> ChannelRepa
     """Put measured rotor speeds that are late or early against the gyroscope onto its clock.
 
     Telemetry of speed controllers comes late. Every half of a flight has to say the same about roll and about pitch,
-    and a shift has to halve what is left at least: on real flights whose clocks agree, drag and damping explain the
+    and a shift has to halve the residual at least: on real flights whose clocks agree, drag and damping explain the
     torque as well with any shift. Yaw says nothing, because rotors that speed up turn the vehicle ahead of their drag.
 
     None where nothing is wrong, or nobody knows.

@@ -95,7 +95,7 @@ def json_text(sheet: Sheet, remarks: Sequence[str] = ()) -> str:
         "verdict": None if sheet.verdict is None else {"label": sheet.verdict},
         "cautions": list(sheet.cautions),
         "findings": [],
-        "worth": [*sheet.usage, *remarks],
+        "usage": [*sheet.usage, *remarks],
         "conventions": _CONVENTIONS if found is None else _CONVENTIONS | _ON_ATTITUDE,
         "how_to_evaluate": HOW_TO_EVALUATE if found is None else (*HOW_TO_EVALUATE_INERTIA, *HOW_TO_EVALUATE),
         "mass_kg": vehicle.mass_kg,

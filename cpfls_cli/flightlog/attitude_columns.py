@@ -400,7 +400,7 @@ def _take_quaternion(seen: Seen, named: Named, verdict: TakenReading) -> None:
         words = "in the other order, more columns would have to differ from their names"
     else:
         words, sure = "the more usual one", "guess"
-        why = "the vehicle stays level in both, and no gyroscope tells them apart"
+        why = "the vehicle stays level in both, and no gyroscope distinguishes them"
         rivals = (Rival(f"quaternion_order: {'xyzw' if order == 'wxyz' else 'wxyz'}", why),)
     seen.choose("quaternion_order", order, words, sure, *rivals)
 

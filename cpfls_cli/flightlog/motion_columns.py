@@ -36,7 +36,7 @@ _BY_NAME, _WEIGHT = 2.0, 1.15
 # Up to where a rate is compared with the attitude's derivative, and the share from which on it may be nothing else: of
 # a gyroscope with motion capture it is 0.1 to 0.4.
 _FAST_HZ, _DERIVED = 10.0, 0.8
-# What is left of a velocity in body axes, as a share of what is left in those of the world, that shows the former.
+# Residual of a velocity in body axes, as a share of that in those of the world, that shows the former.
 _CLOSER = 0.4
 # Correlations of one axis: below the first a column follows nothing, below the second it runs the other way.
 _ALONG, _AGAINST = 0.3, -0.6

@@ -15,7 +15,7 @@ from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import block_length
 from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
 from cpfls_cli.inertia import INERTIA_PARAMETERS
-from cpfls_cli.playback.evaluation import DRAG_OVER_THRUST, TIMES, VehicleAt, acting_numbers, inertia_entries
+from cpfls_cli.playback.evaluation import DRAG_OVER_THRUST, TIMES, ParameterPoint, acting_numbers, inertia_entries
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.innovations import innovations
 from cpfls_cli.playback.instruments import Instruments, past_setpoints
@@ -85,7 +85,7 @@ class Equations:
     They are evaluated as polynomials of the numbers, so that they follow at other values too.
     """
 
-    at: VehicleAt
+    at: ParameterPoint
 
     def hold(self, other: Equations) -> bool:
         """Check whether those of another vehicle follow: its rotors respond alike, and it has no other numbers."""
@@ -252,7 +252,7 @@ class Rows(NamedTuple):
     middles: IntArray
 
 
-class _Laid(NamedTuple):
+class _WindowedBalances(NamedTuple):
     """Equations that were evaluated along all flights, and what is kept of their balances of torque, and of force."""
 
     equations: Equations
@@ -270,9 +270,9 @@ class Balances:
 
     flights: Sequence[PlaybackFlight]
     given: Instruments
-    _laid: _Laid | None = field(default=None, init=False)
+    _laid: _WindowedBalances | None = field(default=None, init=False)
     of_past: ClassVar[bool] = False
-    """Whether they are of what is new, which is another thing at other values."""
+    """Whether they are of innovations, which are others at other values."""
 
     @cached_property
     def bands_hz(self) -> tuple[tuple[float, float], ...]:
@@ -345,7 +345,7 @@ class Balances:
         Sums
             First column: the residual; then derivatives by each number; last what the motion takes.
         """
-        equations = Equations(VehicleAt(free, values))
+        equations = Equations(ParameterPoint(free, values))
         if self._laid is None or not self._laid.equations.hold(equations):
             self._laid = self._lay(equations)
         kinds = [
@@ -356,7 +356,7 @@ class Balances:
         seen = sums.windows.any(axis=1)
         return Sums(*(each[seen] for each in sums))
 
-    def _lay(self, equations: Equations) -> _Laid:
+    def _lay(self, equations: Equations) -> _WindowedBalances:
         """Evaluate the vehicle along all flights, and reduce what is balanced to what is kept."""
         forms: list[Form] = []
         along: dict[int, list[Balanced]] = {}
@@ -367,7 +367,7 @@ class Balances:
             self._reduced(bands, form, {number: each.pop(0) for number, each in along.items()})
             for form, bands in zip(forms, (self.bands[:turning], self.bands[turning:]), strict=False)
         ]
-        return _Laid(equations, forms, kept)
+        return _WindowedBalances(equations, forms, kept)
 
     def _reduced(self, bands: Sequence[Windows], form: Form, signals: Mapping[int, Balanced]) -> Any:
         """Sum products of all columns, by axis."""

@@ -49,7 +49,7 @@ _EDGE = 1.02
 _BLOCKS = 16
 """Into which flights are cut, unless blocks get longer than pieces or shorter than what a piece mostly sees."""
 _KNOWN, _SEEN = 3.0, 0.1
-"""Ratio of the ends of an interval up to which a size is known, and the least share of what is left that it has."""
+"""Ratio of the ends of an interval up to which a size is known, and the least share of the residual that it has."""
 _LAG_S, _LAGS, _RIDGE = 0.1, 5, 1e-6
 """What was asked for is answered within half a second."""
 _NEW_S, _RARE = 0.4, 0.01
@@ -363,9 +363,9 @@ def _sides(model: VehicleModel, flight: PlaybackFlight) -> Array:
 
 
 def _expected(given: Instruments, left: Sequence[Array], band: _Band) -> list[Array]:
-    """Predict what is left from what was asked for, each part of the flights by a fit to the others; NaN elsewhere.
+    """Predict the residual from the setpoints, each part of the flights by a fit to the others; NaN elsewhere.
 
-    A delay of what was asked for is a turn of its phase.
+    A delay of the setpoints is a turn of its phase.
     """
     late = np.exp(-1j * _LAG_S * np.outer(np.arange(_LAGS), band.turns))
     numbers = [number for number, own in enumerate(left) if given.setpoints[number] is not None and len(own)]
@@ -433,7 +433,7 @@ class _Axis:
         return float(np.sqrt(np.exp(self._fit[0][2]) * self._period))
 
     def lack(self, power: Array, parts: _Complex) -> AxisLack:
-        """Find what the model lacks, in power of what is left by piece and its parts as they are predicted."""
+        """Find what the model lacks, in power of the residual by piece and its parts as they are predicted."""
         known = self._expected(self._fit[0])[0]
         both = np.where(np.arange(parts.shape[2]) > 0, 2.0, 1.0)
         squares = np.abs(parts) ** 2 @ both / (len(self._process.lags) * self._noise[0, 0])

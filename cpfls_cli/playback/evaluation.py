@@ -63,7 +63,7 @@ DRAG_OVER_THRUST = "drag_over_thrust"
 
 
 @dataclass(frozen=True)
-class VehicleAt:
+class ParameterPoint:
     """The vehicle that values of its free numbers make."""
 
     free: FreeNumbers
@@ -472,9 +472,9 @@ class JointNumbers:
             return self.index[name.replace(COUNTED, INERTIA)]
         return self.index[own if (own := f"{group}: {name}") in self.index else name]
 
-    def at(self, values: Array, group: str = "") -> VehicleAt:
+    def at(self, values: Array, group: str = "") -> ParameterPoint:
         """Give the vehicle of a configuration at values of all numbers."""
-        return VehicleAt(self._by_group[group], values[self._places[group]])
+        return ParameterPoint(self._by_group[group], values[self._places[group]])
 
     def physical(self, values: Array) -> dict[str, Physical]:
         """Give all numbers as people know them, in order."""

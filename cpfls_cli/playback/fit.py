@@ -15,7 +15,7 @@ from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.gauss_newton import damped_step
-from cpfls_cli.playback.evaluation import JointNumbers, VehicleAt
+from cpfls_cli.playback.evaluation import JointNumbers, ParameterPoint
 from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight, motion_at
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import SLOW
@@ -71,7 +71,7 @@ class FitWindows:
         motion = self.flight.motion
         return motion_at(motion, self.samples)._replace(period=self.every * motion.period)
 
-    def rotor_terms(self, at: VehicleAt, by: str = "") -> Array:
+    def rotor_terms(self, at: ParameterPoint, by: str = "") -> Array:
         """Average the terms of the rotors, or their derivatives by a number, over steps, shape (step, run, column).
 
         The speed of several samples is the root of their mean square, which gives the mean thrust.
@@ -367,12 +367,12 @@ class SideBySide:
             *(np.stack(each, axis=2)[:, :, self.owner] for each in zip(*(w.loss for w in self.windows), strict=True))
         )
 
-    def steps(self, at: VehicleAt, numbers: Iterable[str] = ()) -> Steps:
+    def steps(self, at: ParameterPoint, numbers: Iterable[str] = ()) -> Steps:
         """Give the rotors over all steps, with derivatives by numbers of their response."""
         by = {at.free.index[name]: self._terms(at, name) for name in numbers}
         return Steps(self._terms(at), terms_by=by)
 
-    def _terms(self, at: VehicleAt, by: str = "") -> Array:
+    def _terms(self, at: ParameterPoint, by: str = "") -> Array:
         """Give the terms of the rotors, or as last given: most vehicles respond alike."""
         key = by, *at.times_of_response
         if self._last.get("response") != key or by:
@@ -383,19 +383,19 @@ class SideBySide:
         terms: Array = self._last["terms"]
         return terms
 
-    def losses(self, at: VehicleAt) -> Array:
+    def losses(self, at: ParameterPoint) -> Array:
         """Weigh the errors of each run."""
         return losses_of(self._legs(at), self.loss)
 
-    def sums(self, at: VehicleAt, groups: IntArray) -> tuple[Array, Array]:
+    def sums(self, at: ParameterPoint, groups: IntArray) -> tuple[Array, Array]:
         """Sum gradient and Hessian by the numbers, by group of each run."""
         return sums_of(self._legs(at), at.slopes(), self.steps(at, at.times), self.loss, groups)
 
-    def flown(self, at: VehicleAt, *, pushed: bool = False) -> Flown:
+    def flown(self, at: ParameterPoint, *, pushed: bool = False) -> Flown:
         """Give a vehicle as these runs fly it, maybe pushed on top."""
         return at.flown(self.runs.motion.period, translates=self.runs.translates, pushed=pushed)
 
-    def _legs(self, at: VehicleAt) -> Iterable[Leg]:
+    def _legs(self, at: ParameterPoint) -> Iterable[Leg]:
         """Fly all runs, or give them as last flown where there are not many: derivatives follow the loss."""
         flown = legs(self.flown(at), self.runs, self.steps(at))
         if len(self.owner) > MOST_RUNS:
@@ -440,9 +440,9 @@ class WindowSet:
         """Flight of each piece."""
         return np.repeat(np.arange(len(self.pieces)), [int(own[-1]) + 1 for own in self.pieces])
 
-    def _of_group(self, free: JointNumbers, values: Array, each: SideBySide) -> tuple[VehicleAt, IntArray]:
+    def _of_group(self, free: JointNumbers, values: Array, each: SideBySide) -> tuple[ParameterPoint, IntArray]:
         own, places = free.of_flight(each.windows[0].flight)
-        return VehicleAt(own, values[places]), places
+        return ParameterPoint(own, values[places]), places
 
     def errors(self, free: JointNumbers, values: Array) -> list[Array]:
         """Weigh the errors of each run, flight by flight, shapes (run,)."""

@@ -16,7 +16,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.estimation.estimate import Prior
-from cpfls_cli.playback.evaluation import PRIOR, VehicleAt
+from cpfls_cli.playback.evaluation import PRIOR, ParameterPoint
 from cpfls_cli.playback.fit import (
     FitPoint,
     Fitted,
@@ -132,7 +132,7 @@ class _Begun(NamedTuple):
     missed: Array
 
     @classmethod
-    def of(cls, at: VehicleAt, windows: SideBySide, past_s: float) -> _Begun:
+    def of(cls, at: ParameterPoint, windows: SideBySide, past_s: float) -> _Begun:
         """Run a model along the measured samples before windows."""
         model, missed = at.model, []
         for each in windows.windows:
@@ -148,12 +148,12 @@ class _Begun(NamedTuple):
         fading = observer.fading(period, window.every * window.horizon).reshape(*steps, 1, -1)
         return np.asarray(begun * fading.mean(axis=1))
 
-    def flown(self, at: VehicleAt, pushed: Array) -> Iterator[Leg]:
+    def flown(self, at: ParameterPoint, pushed: Array) -> Iterator[Leg]:
         """Fly all runs, pushed on top of what the model gives."""
         return legs(self.windows.flown(at, pushed=True), self.windows.runs, Steps(self.terms, pushed))
 
 
-def _point(at: VehicleAt, begun: Sequence[_Begun], past_s: float, values: Array) -> FitPoint:
+def _point(at: ParameterPoint, begun: Sequence[_Begun], past_s: float, values: Array) -> FitPoint:
     """Take the mean loss over windows, with its derivatives by the logarithms."""
     count = len(values)
     moved = [_observer(values + step, past_s) for step in _STEP * np.eye(count)]

@@ -42,7 +42,7 @@ ROW_S = 0.01
 STRETCH = 40
 """Rows that errors are taken over: longer than the filter."""
 _PAST = (2, 4, 8, 16, 32, 64)
-"""Rows ago between which the past is averaged; the nearest one has no sample of what is new."""
+"""Rows ago between which the past is averaged; the nearest one has no sample of the innovations."""
 _AHEAD = 20
 """Rows that the filter looks ahead: beyond, noise of usual sensors shows no more; and over which a memory is taken."""
 _TINY = 1e-9

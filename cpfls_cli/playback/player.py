@@ -54,7 +54,7 @@ class Observer:
         return np.asarray(keep * gain * (keep * (1.0 - gain)) ** later)
 
     def fading(self, period: float, horizon: int) -> Array:
-        """Tell what is left of the disturbance over each step of a run, shape (horizon, 6)."""
+        """Give the share of the disturbance that lasts, over each step of a run, shape (horizon, 6)."""
         return np.asarray(np.exp(-period * np.arange(horizon)[:, None] / self.memory_s))
 
 

@@ -17,7 +17,7 @@ from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
 from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
-from cpfls_cli.playback.vehicle import FoundNumber, FoundVehicle, bodily
+from cpfls_cli.playback.vehicle import FoundNumber, VehicleFit, bodily
 from cpfls_cli.vehicle.rotors import figures_of_vehicle, with_factors
 from cpfls_cli.vehicle_limits import broken_limits
 
@@ -75,7 +75,7 @@ class Spread:
     lack: Lack | None = None
 
 
-def drawn(model: VehicleModel, found: FoundVehicle, count: int, rng: np.random.Generator) -> Spread:
+def drawn(model: VehicleModel, found: VehicleFit, count: int, rng: np.random.Generator) -> Spread:
     """Draw vehicles that the flights allow: by a multivariate t, each number within its interval in 95 % of draws.
 
     What is positive is drawn by factors. An interval that is longer on one side is two halves of the distribution. A
@@ -136,7 +136,7 @@ def drawn(model: VehicleModel, found: FoundVehicle, count: int, rng: np.random.G
     )
 
 
-def require_sure(found: FoundVehicle) -> None:
+def require_sure(found: VehicleFit) -> None:
     """Refuse numbers that one block alone identifies."""
     if found.blocks < 2:
         raise InputError("its flights are too short to show how sure its numbers are; find it in longer ones")
@@ -165,7 +165,7 @@ def _root(correlation: Array) -> Array:
 
 
 def _numbers_drawn(
-    numbers: Sequence[FoundNumber], found: FoundVehicle, root: Array, rng: np.random.Generator, count: int
+    numbers: Sequence[FoundNumber], found: VehicleFit, root: Array, rng: np.random.Generator, count: int
 ) -> Array:
     """Draw numbers, possible or not, shape (count, number)."""
     # By which factors the loop may have misled the fit; where instruments identify the constants no loop has.
@@ -276,7 +276,7 @@ def _remainder_at(remainder: Remainder, values: Mapping[str, float]) -> Remainde
 
 
 def _gusts_drawn(
-    found: FoundVehicle, model: VehicleModel, heavier: Array, rng: np.random.Generator
+    found: VehicleFit, model: VehicleModel, heavier: Array, rng: np.random.Generator
 ) -> Iterator[Gusts | None]:
     """Draw the gusts of each vehicle."""
     gusts = found.disturbance

@@ -94,7 +94,7 @@ class Share(NamedTuple):
 
 
 @result
-class FoundVehicle:
+class VehicleFit:
     """What was found."""
 
     model: VehicleModel = part()
@@ -138,7 +138,7 @@ def find_vehicle(
     settings: PlaybackSettings,
     progress: Progress,
     kept: Kept = MappingProxyType({}),
-) -> FoundVehicle:
+) -> VehicleFit:
     """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`."""
     own = [flight for flight in flights if not flight.group]
     begun, sensed = carrying_weight(vehicle, own)
@@ -170,7 +170,7 @@ def find_vehicle(
     correlation = estimate_correlation(solved, spread)
     used = None if forecast is None or constants is None else constants.used
     past = choice.complete and settings.history_s and not settings.quick
-    return FoundVehicle(
+    return VehicleFit(
         model=replace(model, gusts=None if gusts is None else gusts.gusts),
         numbers=numbers,
         shares=shares,

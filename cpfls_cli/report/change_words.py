@@ -28,9 +28,9 @@ _SCALES: Mapping[str, Callable[[float], float]] = {
 """From the unit of a change to what the table writes: of logarithms of squares the root, or near 0 half of it."""
 _UNITS = {"root": " %", "half": " %", "ln": " %", "times": " times"}
 _SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "delay", "gusts")
-"""Of what would have shown, as much as a first screen has room for; of rotors the one that shows least."""
+"""Detection limits, as many as a first screen has room for; of rotors the largest one."""
 
-_OTHERS = 3  # Of what would have shown, where nothing of that does.
+_OTHERS = 3  # Detection limits, where there is none of those.
 _CHECKED = 2
 MOST_MOVED = 3  # Numbers that are named where no known change explains them.
 _NATURAL = {
@@ -121,7 +121,7 @@ def change_words(found: Found, mass_kg: float, names: Iterable[str]) -> str:
 
 
 def smallest_words(cause: str, size: float, mass_kg: float) -> str:
-    """Say how large a change is that would have shown."""
+    """Say what the detection limit of a change is."""
     return _said(cause, "shows", least=_Amount([size], mass_kg)) or f"{cause}: {number(size, 2)}"
 
 
@@ -159,8 +159,8 @@ def checks(found: Sequence[Found]) -> Iterator[tuple[str, str]]:
     yield from ((check, name if len(looked) > 1 else "") for check, name in list(looked.items())[:_CHECKED])
 
 
-def would_have_shown(shows: Sequence[Shows], mass_kg: float) -> list[str]:
-    """Say how large changes are that would have shown."""
+def detection_limits(shows: Sequence[Shows], mass_kg: float) -> list[str]:
+    """Say what the detection limits of changes are."""
     smallest = {each.cause: each.smallest for each in shows}
     smallest["rotor M1"] = max((size for name, size in smallest.items() if name.startswith("rotor ")), default=np.nan)
     known = [name for name, size in smallest.items() if np.isfinite(size)]
@@ -188,7 +188,7 @@ def natural_unit(name: str) -> str | None:
 
 
 WORDS = {
-    **by_name(cause_name, change_words, hover_words, smallest_words, is_within, checks, would_have_shown, most_moved),
+    **by_name(cause_name, change_words, hover_words, smallest_words, is_within, checks, detection_limits, most_moved),
     **by_name(number_meanings, natural_unit),
 }
 """For templates."""

@@ -62,7 +62,7 @@ from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
-from cpfls_cli.playback.vehicle import FoundVehicle, Share, find_vehicle
+from cpfls_cli.playback.vehicle import Share, VehicleFit, find_vehicle
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, legend_over, line, style_of
 from cpfls_cli.report.content import percent
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
@@ -374,7 +374,7 @@ def _require_rotors(flight: LoggedFlight) -> None:
 
 def _found(
     run: Run, flights: Sequence[LoggedFlight], settings: PlaybackSettings, checkpoint: VehicleCheckpoint, kept: Kept
-) -> tuple[FoundVehicle, int | None]:
+) -> tuple[VehicleFit, int | None]:
     """Search; an interrupt ends the search, and its number is given with what has been found until then."""
     study, watch = run.study, Watch(run, None)
 
@@ -395,7 +395,7 @@ def _found(
 
 def _judged(
     run: Run,
-    found: FoundVehicle,
+    found: VehicleFit,
     flights: Sequence[LoggedFlight],
     learned: Sequence[LearnedFlight],
     warnings: Iterable[str],
@@ -422,7 +422,7 @@ def _judged(
     )
 
 
-def _held_out(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], run: Run, fading_s: float) -> AlongFlights:
+def _held_out(vehicle: VehicleFit, flights: Sequence[LoggedFlight], run: Run, fading_s: float) -> AlongFlights:
     """Play a vehicle back along flights that it was not found in, from every sample."""
     models = {"": vehicle.forecast or vehicle.model, **vehicle.others}
     pairs = [replace(played(models[flight.group], flight, run.study.vehicle), fading_s=fading_s) for flight in flights]
@@ -434,7 +434,7 @@ def _held_out(vehicle: FoundVehicle, flights: Sequence[LoggedFlight], run: Run, 
     return errors.along(pairs)
 
 
-def _responses(vehicle: FoundVehicle, flights: Sequence[LoggedFlight]) -> Mapping[str, VehicleResponse]:
+def _responses(vehicle: VehicleFit, flights: Sequence[LoggedFlight]) -> Mapping[str, VehicleResponse]:
     """Estimate frequency responses with those of the model; none where the flights show the loop alone."""
     own = [flight for flight in flights if not flight.group]
     if vehicle.instruments is None and vehicle.loop.unexplained:

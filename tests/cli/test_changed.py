@@ -46,12 +46,12 @@ def test_of_few_reference_flights_it_is_said_that_what_they_differ_by_is_assumed
     assert "NO CHANGE SEEN" in (folder / "out" / "report.html").read_text()
 
 
-def test_where_no_load_would_have_shown_it_cannot_be_said(changed):
-    """That far more vibration would have shown says nothing of rotors and weights."""
+def test_where_no_load_could_be_detected_it_cannot_be_said(changed):
+    """That far more vibration could have been detected says nothing of rotors and weights."""
     result = changed("same.csv", before=(1,), options=["--fail-on-change"])
     said = " ".join(result.stdout.split())
     assert result.exit_code == 3
-    assert said.startswith("CANNOT TELL: no weak rotor, mass or centre of mass of any size that is looked for would")
+    assert said.startswith("CANNOT TELL: no weak rotor, mass or centre of mass of any size that is looked for could")
     assert "1 reference flight is too few; give 2 more" in said
     assert "times the vibration" in said
     assert "a rotor that pulls" not in said.lower()

@@ -171,7 +171,7 @@ class _Products:
     def tested(self, effect: Effect, own: IntArray, others: Sequence[IntArray]) -> _Test:
         """Test an effect jointly with others; numbers beyond a bound at 0 are 0, and beyond another is no effect."""
         slope, score = self._adjusted(own, others)
-        # What is left of a column that others are a multiple of is the ridge's.
+        # The residual of a column that others are a multiple of is the ridge's.
         kept = np.diagonal(slope.sum(axis=0)) > 10 * RIDGE * np.abs(self._whole[own, own])
         while kept.any():
             found = self._test(slope, score, kept)

@@ -132,7 +132,7 @@ def wrong_numbers(
 
     `effects`: the numbers of those that are named.
     `removed`, shape (6,): part of each channel's gap on unseen flights that refitting the numbers takes off.
-    `unknown`, shape (6,): what is left of each channel where that is clear, relative to the motion: if all of it went
+    `unknown`, shape (6,): residual of each channel where that is clear, relative to the motion: if all of it went
     with the motion, as where a loop answers it, the number of that channel would be off by so much.
     """
     # Each shows in a channel of its own.

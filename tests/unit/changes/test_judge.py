@@ -314,7 +314,7 @@ def test_a_lag_that_makes_the_loop_answer_gusts_otherwise_is_no_second_change():
 @pytest.mark.parametrize("names", [LOADS, NAMES])
 def test_a_number_beyond_its_limit_is_never_unchanged(names, monkeypatch):
     """In whatever numbers flights are off, alone or with others, and however many flights tell what they differ by."""
-    # Which change it is, and what would have shown, is most of the work and not asked here.
+    # Which change it is, and the detection limits, is most of the work and not asked here.
     monkeypatch.setattr("cpfls_cli.changes.judge._found", lambda *_: [])
     monkeypatch.setattr(_Space, "shows", lambda *_: np.nan)
     rng = np.random.default_rng(16)

@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.playback.balances import Balances, PastBalances
-from cpfls_cli.playback.evaluation import VehicleAt
+from cpfls_cli.playback.evaluation import ParameterPoint
 from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, Rules, blocks_of
@@ -97,7 +97,7 @@ def test_the_residual_is_what_the_model_leaves_of_the_motion(flights):
     """By the model of the numbers, flight by flight and window by window."""
     balances, values = balances_of(flights[2:]), somewhere(3)
     sums = balances.sums(FREE, values)
-    at, (flight,) = VehicleAt(FREE, values), balances.flights
+    at, (flight,) = ParameterPoint(FREE, values), balances.flights
     motion, model, stretches = flight.motion, at.model, flight.stretches
     terms = np.concatenate(
         [model.response.terms_at_samples(flight.speed[part], motion.period, flight.hold) for part in stretches]

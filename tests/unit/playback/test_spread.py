@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import symmetric
-from cpfls_cli.playback.evaluation import VehicleAt
+from cpfls_cli.playback.evaluation import ParameterPoint
 from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.parameters import FreeNumbers
 from cpfls_cli.playback.spread import POSITIVE, drawn, model_at
@@ -65,7 +65,7 @@ def test_the_model_of_a_fit_is_made_again_from_what_people_know_of_its_numbers()
     steps = np.random.default_rng(0).uniform(0.05, 0.2, (2, len(free.numbers)))
     scales = np.array([number.scale for number in free.numbers])
     starts = np.array([number.start for number in free.numbers])
-    first, second = (VehicleAt(free, starts + step * scales) for step in steps)
+    first, second = (ParameterPoint(free, starts + step * scales) for step in steps)
     numbers = [
         FoundNumber(name, each.unit, each.value, each.value, each.value, np.nan, True, False)
         for name, each in first.physical.items()

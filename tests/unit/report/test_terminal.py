@@ -221,7 +221,7 @@ def test_names_and_checks():
         (NOTHING, "NO CHANGE", "nothing beyond what flights of this vehicle differ by; unchanged within", "good"),
         (NOTHING | {"missing": ("thrust M4",)}, "NO CHANGE SEEN", "nothing beyond", "warning"),
         (NOTHING | {"fewest": 6}, "NO CHANGE SEEN", "nothing beyond what is usual of vehicles; unchanged", "warning"),
-        (NOTHING | {"shows": ()}, "CANNOT TELL", "no change of any size that is looked for would have", "unsure"),
+        (NOTHING | {"shows": ()}, "CANNOT TELL", "no change of any size that is looked for could have", "unsure"),
         (NOTHING | {"undetermined": ("scale z",)}, "CANNOT TELL", "scale z may be zero or reversed today", "unsure"),
         (NOTHING | {"contradictions": ("a.csv: odd", "a.csv: more")}, "CANNOT TELL", "a.csv", "unsure"),
     ],
