@@ -156,10 +156,7 @@ def past_setpoints(asked: Array, period: float, apart: int) -> Array:
 def _runs(flight: PlaybackFlight) -> list[slice]:
     """Cut a flight where what was asked of it begins again; one that is asked its path once stays whole."""
     part, step = _longest(flight), _step(flight.motion.period)
-    again = 0
-    if "position" in flight.setpoints:
-        asked = _coarse(flight.setpoints["position"][part], step)
-        again = step * _again(asked - asked.mean(axis=0), flight.motion.period * step)
+    again = step * _again(_asked(flight), flight.motion.period * step) if "position" in flight.setpoints else 0
     if not again:
         return [slice(0, len(flight))]
     begins = [*range(part.start, part.stop - again // 2, again), part.stop]
@@ -353,10 +350,16 @@ def _changes(flight: PlaybackFlight) -> Array:
 
 
 def _asked(flight: PlaybackFlight) -> Array:
-    """Give the positions that were asked for, at the coarse rate; all 0 where none were, or one all the time."""
-    asked = flight.setpoints.get("position", np.zeros((len(flight), 3)))
-    coarse = _coarse(asked[_longest(flight)], _step(flight.motion.period))
-    return np.asarray(coarse - coarse.mean(axis=0))
+    """Give the positions that were asked for and the heading as flown, as wide as these, at the coarse rate.
+
+    All 0 where no positions were asked for, or one all the time. A body that is turned otherwise moves otherwise.
+    """
+    asked, part = flight.setpoints.get("position", np.zeros((len(flight), 3))), _longest(flight)
+    ahead = flight.motion.rotation[part, :2, 0]
+    both = _coarse(np.hstack([asked[part], ahead]), _step(flight.motion.period))
+    both -= both.mean(axis=0)
+    both[:, 3:] *= np.sqrt((both[:, :3] ** 2).sum(axis=1).mean())
+    return np.asarray(both)
 
 
 def _coarse(values: Array, step: int) -> Array:

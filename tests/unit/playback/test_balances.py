@@ -11,6 +11,7 @@ from cpfls_cli.playback.evaluation import ParameterPoint
 from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight
 from cpfls_cli.playback.instruments import instruments
 from cpfls_cli.playback.parameters import LEARNED, FreeNumbers, Rules, blocks_of
+from cpfls_cli.rotations import rotation_matrix
 from tests.builders.playback_flights import STATED, flown, truth
 
 FREE = FreeNumbers(STATED, blocks_of(STATED), Rules(1, 0))
@@ -178,6 +179,19 @@ def test_a_flight_that_is_asked_its_path_again_is_cut_into_its_runs():
     known = np.isfinite(beside[:, 0])
     assert known.mean() > 0.9
     assert np.corrcoef(beside[known, 0], flight.motion.rate[known, 0])[0, 1] > 0.95
+
+
+def test_a_path_flown_again_with_another_heading_is_no_run_of_it():
+    """About its own axes a body moves otherwise then, and what its model lacks in yaw is not repeatable there."""
+    whole = _flown(1, seconds=60.0)
+    position, velocity, rotation, rate, *_ = ([values[:1500]] * 4 for values in whole.motion[:-1])
+    turn = np.linspace(0.0, 8.0 * np.pi / 3.0, 6000)
+    turned = rotation_matrix(np.column_stack([0.0 * turn, 0.0 * turn, turn])) @ np.concatenate(rotation)
+    motion = whole.motion._replace(
+        position=np.concatenate(position), velocity=np.concatenate(velocity), rotation=turned, rate=np.concatenate(rate)
+    )
+    flight = replace(whole, motion=motion, setpoints={"position": motion.position})
+    assert len(instruments([flight]).runs) == 1
 
 
 def test_what_other_runs_have_at_the_same_place_is_averaged():
