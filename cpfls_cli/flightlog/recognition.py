@@ -38,6 +38,7 @@ from cpfls_cli.flightlog.stated_vehicle import (
     Parameters,
     VehicleKind,
     forward_flight,
+    refuse_disarmed,
     refuse_other_vehicle,
 )
 from cpfls_cli.flightlog.stretches import live_rows
@@ -112,6 +113,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         names = [unlike[name] if name in ROTORS else name.replace("_", " ") for name in candidates]
         held = f"holds {joined(names)} alone: "
         raise InputError(held * (signs.rotors is signs.height is signs.rate is None) + flown.reasons[0])
+    refuse_disarmed(topics)
     carried = flown if kind is None else _hover_of(log, kind, flown)
     winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
