@@ -96,6 +96,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     log, candidates, ended = _live_part(log, candidates)
     recognised.make_grid(log, candidates)
     candidates = motion_columns.without_other_axes(log, candidates)
+    candidates = motion_columns.without_euler_rates(log, candidates)
     rotors = find_rotors(_of_rotors(log, candidates), parameters, system)
     rotors = rotors if rotors.driving else find_mixed(log) or rotors
     if rotors.driving is None and log.flat and (only := only_of_airplanes(log.topics[""])):
