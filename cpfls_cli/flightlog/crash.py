@@ -44,6 +44,8 @@ _STRAINED_RAD_S, _STRAINED_RAD, _AT_LIMIT = 1.0, 0.5, 0.95
 _TURN_S, _NOT_FOLLOWED = 0.1, 0.7
 # Force in gravity that a vehicle feels in free fall at most, for how long, and the height that it loses in a second, m.
 _FALLS, _FALL_S, _DROP_M = 0.3, 0.2, 1.0
+# Share of its weight in flight, below which what it feels to the end of a log is no ground.
+_HARDLY_CARRIED = 0.7
 # Descent that is no flight, and for how long: 75 m.
 _PLUNGES_M_S, _PLUNGE_S = 25.0, 3.0
 
@@ -404,13 +406,24 @@ def _stops_in_the_air(signs: Signs, after: int) -> bool:
         return False
     second = slice(after, after + max(1, round(1.0 / signs.period)))
     if signs.level[second].min() >= ALIVE:
-        return False
+        return _falls_to_the_end(signs, after)
     if signs.height is not None and float(signs.height[after] - signs.height[second].min()) > _DROP_M:
         return True
     if signs.felt is not None:
         light = np.linalg.norm(signs.felt[second], axis=1) < _FALLS
         return any((b - a) * signs.period >= _FALL_S for a, b in runs(light))
     return False
+
+
+def _falls_to_the_end(signs: Signs, after: int) -> bool:
+    """Tell whether a vehicle whose rotors idle feels much less than its weight until the log ends: nothing carries it.
+
+    Its drag and rotors that idle give it some of its weight back.
+    """
+    if signs.felt is None or (len(signs.felt) - after) * signs.period < _FALL_S:
+        return False
+    size = np.linalg.norm(signs.felt, axis=1)
+    return bool(size[after:].mean() < _HARDLY_CARRIED * np.median(size[:after]))
 
 
 def _falls(signs: Signs) -> list[tuple[int, int]]:

@@ -20,6 +20,7 @@ from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, LogTable, Rival, Seen, Sure, called
 from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.flightlog.vocabulary import Row, sizes
+from cpfls_cli.rotations import body_rate
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 
@@ -38,6 +39,9 @@ _BY_NAME, _WEIGHT = 2.0, 1.15
 _FAST_HZ, _DERIVED = 10.0, 0.8
 # Residual of a velocity in body axes, as a share of that in those of the world, that shows the former.
 _CLOSER = 0.4
+# What names a derivative; difference of Euler and body rates, as a share of them, that matters to nothing; and what is
+# left of rates by the ones, as a share of what is left by the others, that shows the former.
+_DERIVATIVE, _ALIKE, _CLEARLY = ("dot",), 0.02, 0.8
 # Correlations of one axis: below the first a column follows nothing, below the second it runs the other way.
 _ALONG, _AGAINST = 0.3, -0.6
 
@@ -168,6 +172,41 @@ def without_other_axes(log: LogTable, candidates: Mapping[SignalName, list[Named
 
     places = [own for own in candidates.get("position", ()) if not own.by_axes or moves(own)]
     return {name: found for name, own in candidates.items() if (found := places if name == "position" else own)}
+
+
+def without_euler_rates(log: LogTable, candidates: Mapping[SignalName, list[Named]]) -> dict[SignalName, list[Named]]:
+    """Leave out derivatives of roll, pitch and yaw, but where they follow the attitude as rates of the body do."""
+    angles = next(iter(candidates.get("attitude", ())), None)
+    rates = [
+        own
+        for own in candidates.get("body_rate", ())
+        if own.group.words[-1:] != _DERIVATIVE or (angles is not None and _turns_as_body(log, angles, own))
+    ]
+    kept = {name: own for name, own in candidates.items() if name != "body_rate"}
+    return kept | ({"body_rate": rates} if rates else {})
+
+
+def _turns_as_body(log: LogTable, angles: Named, rates: Named) -> bool:
+    rate_hz = 1 / float(log.grid[1] - log.grid[0])
+    time, values = log.values(angles.group.columns)
+    degrees = angles.unit == "deg" or float(np.abs(values).max()) > 2 * np.pi
+    # Between two samples on either side of a full turn lies no angle.
+    turned = np.unwrap(np.radians(values) if degrees else values, axis=0)
+    attitude = np.column_stack([np.interp(log.grid, time, column) for column in turned.T])
+    measured, derived = slow(log.on_grid(rates.group.columns), rate_hz), first_derivative(attitude, rate_hz)
+    # A pitch may count the other way than roll and yaw do.
+    ways = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, 1.0])
+    euler, *bodies = (
+        slow(own, rate_hz) for own in (derived, *(body_rate(attitude * way, derived * way) * way for way in ways))
+    )
+
+    def left(turning: Array) -> float:
+        gain = float((measured * turning).sum()) / max(float((turning**2).sum()), 1e-12)
+        return float(((measured - gain * turning) ** 2).sum())
+
+    body = min(bodies, key=left)
+    alike = float(((body - euler) ** 2).sum()) < _ALIKE**2 * float((euler**2).sum())
+    return alike or left(body) < _CLEARLY * left(euler)
 
 
 def position_by_velocity(seen: Seen) -> None:

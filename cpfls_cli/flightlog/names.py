@@ -281,7 +281,7 @@ def _by_words(group: ColumnGroup, *, wished: bool = False) -> Iterator[Named]:
         named = _SETPOINT_OF.get(signal) if wished else None if squared and signal in ROTORS else signal
         if named is None or other or not _suits(meaning, group) or (NOT_MEASURED - allowed) & {*words}:
             continue
-        if signal == "body_rate" if wished and group.pqr else _means(meaning, group, words):
+        if signal == "body_rate" and not meaning.last if wished and group.pqr else _means(meaning, group, words):
             fast = not wished and any(signal in vocabulary.IN_RADIANS.get(word, ()) for word in words)
             usual: UnitName | None = "rad/s" if fast else "1" if signal == "quaternion" else None
             place = signal != "position" or group.kind == "numbers" or _is_called_place(meaning, group)
@@ -354,6 +354,8 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
         return _has_axes_of_places(group)
     if group.kind == "angles" and signal in ("attitude", "body_rate"):
         turns = ends_in_speed or bool(own & (RATE_WORDS | {"speed"}))
+        if signal == "body_rate" and meaning.last:
+            return not group.pqr and bool({*words[-meaning.last :]} & meaning.words)
         if signal == "body_rate":
             return turns or group.pqr
         # What is asked about an axis is no angle, but a structure of outputs may hold some; letters need a word.

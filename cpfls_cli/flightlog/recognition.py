@@ -38,6 +38,7 @@ from cpfls_cli.flightlog.stated_vehicle import (
     Parameters,
     VehicleKind,
     forward_flight,
+    refuse_disarmed,
     refuse_other_vehicle,
 )
 from cpfls_cli.flightlog.stretches import live_rows
@@ -95,6 +96,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     log, candidates, ended = _live_part(log, candidates)
     recognised.make_grid(log, candidates)
     candidates = motion_columns.without_other_axes(log, candidates)
+    candidates = motion_columns.without_euler_rates(log, candidates)
     rotors = find_rotors(_of_rotors(log, candidates), parameters, system)
     rotors = rotors if rotors.driving else find_mixed(log) or rotors
     if rotors.driving is None and log.flat and (only := only_of_airplanes(log.topics[""])):
@@ -112,6 +114,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
         names = [unlike[name] if name in ROTORS else name.replace("_", " ") for name in candidates]
         held = f"holds {joined(names)} alone: "
         raise InputError(held * (signs.rotors is signs.height is signs.rate is None) + flown.reasons[0])
+    refuse_disarmed(topics)
     carried = flown if kind is None else _hover_of(log, kind, flown)
     winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))

@@ -157,6 +157,11 @@ _STATES: Final = (
 )
 
 
+# What PX4 says of its arming, and what of that lets its rotors turn: armed, and on its way back from a fault.
+_ARMING: Final = (("actuator_armed", "armed", (1,)), ("vehicle_status", "arming_state", (2, 3, 6)))
+_SAID_S: Final = 3.0  # From the ends of a log it is said at most.
+
+
 class VehicleKind(NamedTuple):
     """What flies, and how a log says so."""
 
@@ -170,6 +175,18 @@ def refuse_other_vehicle(topics: Topics, parameters: Parameters, system: str) ->
     if found is not None and found.what != VTOL:
         raise InputError(f"a log of {found.what} ({found.reason}), {NO_MULTIROTOR}")
     return found
+
+
+def refuse_disarmed(topics: Topics) -> None:
+    """Refuse a log in which PX4 says from begin to end that no rotor may turn: a vehicle that is carried moves too."""
+    stamps = {topic: own[STAMP] for topic, own in topics.items() if len(own.get(STAMP, ()))}
+    for topic, name, armed in _ARMING:
+        states, said = np.asarray(topics.get(topic, {}).get(name, ()), dtype=float), stamps.get(topic, np.empty(0))
+        if not len(states) or len(states) != len(said) or np.isin(states, armed).any():
+            continue
+        begin, end = min(float(own[0]) for own in stamps.values()), max(float(own[-1]) for own in stamps.values())
+        if said[0] - begin < _SAID_S and end - said[-1] < _SAID_S:
+            raise InputError(f"no flight in it: PX4 is not armed throughout ({topic}.{name})")
 
 
 def _evidence(topics: Topics, parameters: Parameters, system: str) -> Iterator[VehicleKind]:

@@ -331,8 +331,13 @@ _TEXTS: Final = (
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )
-# A line of three numbers or more, or its beginning.
-_NUMBERS: Final = re.compile(rb"([-+]?\d[\d.]*(e[-+]?\d+)?[ \t,;]+){3,}[-+\d.e \t,;]*(\r?\n|\Z)")
+# A line of three numbers or more, or its beginning, also as Python prints a tuple; or two lines of two numbers.
+_NUMBER: Final = rb"[-+]?\d[\d.]*(e[-+]?\d+)?"
+_NUMBERS: Final = re.compile(
+    rb"\(?(%b[ \t,;]+){3,}[-+\d.e \t,;]*\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]+%b[ \t]*\r?\n){2}" % ((_NUMBER,) * 3)
+)
+# A line that says before each of its numbers what it is: `Power= 31 FLYMODE Yaw= 261.9 Roll= 2.2`.
+_NAMED_NUMBERS: Final = re.compile(rb"([a-z_][\w. \t]*[=:][ \t]*%b[ \t,;]*){3}" % _NUMBER)
 _SPREADSHEET, _NPY = (b"xl/", b"[Content_Types].xml"), b".npy"
 # A MAVLink frame begins with one of these; before it a telemetry log has its stamp in eight bytes, of 2001 to 2100.
 _TELEMETRY: Final = (".tlog", ".rlog", ".raw", ".mavlink")
@@ -353,5 +358,8 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
         return "telemetry of MAVLink", _CONVERT_TLOG
     text = first.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
     if suffix != ".csv" and _NUMBERS.match(text):
-        return "a table of numbers without names", f"{NAME_COLUMNS}, and let its name end in .csv"
+        bare = "take the brackets around each line away, " if text.startswith(b"(") else ""
+        return "a table of numbers without names", f"{bare}{NAME_COLUMNS}, and let its name end in .csv"
+    if suffix != ".csv" and _NAMED_NUMBERS.match(text):
+        return "text that names each number in each line", _AS_CSV
     return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)

@@ -430,6 +430,16 @@ def stops(time):
     return {"rotors": inside(time, 0, 30, 0.5), "rate": inside(time, 0, 30, 0.3), "force": force, "shakes": 0.02}
 
 
+def cut_at_the_end(felt, until):
+    """Its rotors fall to idling 0.6 s before the log ends, and it feels so many weights from then on, or later one."""
+
+    def made(time):
+        force = np.outer(inside(time, 29.4, 29.4 + until, felt, 1.0), UP)
+        return {"rotors": inside(time, 0, 29.4, 0.5, 0.08), "rate": 0.3, "force": force, "shakes": 0.02}
+
+    return made
+
+
 def tumbles(known):
     """Its rotors stop at 40 s, 30 m up; or it is hit there, and nothing is known of rotors and height."""
 
@@ -625,6 +635,9 @@ READ = {
         for known in (("lean",), ("force", "lean"))
     },
     "rotors that stop": (40, stops, ((0, 30),), ("rotors stop in the air", "impact")),
+    "idling that falls until the log ends": (30, cut_at_the_end(0.4, 0.6), ((0, 29.4),), ("rotors stop in the air",)),
+    "idling that touches the ground": (30, cut_at_the_end(0.4, 0.2), ((0, 29.4),)),
+    "idling on the ground until the log ends": (30, cut_at_the_end(0.9, 0.6), ((0, 29.4),)),
     "rotors that stop high up, and a tumble": (60, tumbles(True), ((5, 40),), ("rotors stop in the air", "impact")),
     "likewise without its rotors": (60, tumbles(False), ((5, 40),), ("impact",)),
     "a throttle cut": (

@@ -232,6 +232,28 @@ def test_an_acceleration_of_the_world_in_thousandths_is_said_by_the_motion(own):
     assert any("an acceleration in world axes that includes gravity" in words for words in recognition.left_out)
 
 
+DOTS = ("roll_dot", "pitch_dot", "yaw_dot")
+
+
+@pytest.mark.parametrize("unit", [1.0, np.degrees(1)])
+@pytest.mark.parametrize("way", [(1, 1, 1), (1, -1, 1)])
+def test_derivatives_of_angles_are_body_rates_where_they_follow_the_attitude_as_such(own, unit, way):
+    """As they lean and turn, they differ from derivatives; a yaw jumps by full turns."""
+    log = flat_log(own, rate=named(own.rate * way * unit, *DOTS))
+    angles = own.rotation.as_euler("ZYX")[:, ::-1] * way
+    log.topics[""] |= dict(zip(("roll", "pitch", "yaw"), angles.T, strict=True))
+    found = seen(log).signal("body_rate")
+    assert found.columns.columns == DOTS
+    assert known_unit(found.columns.unit).factor * found.columns.scale == pytest.approx(1 / unit)
+
+
+def test_derivatives_of_angles_that_are_no_body_rates_are_left_out(own):
+    angles = own.rotation.as_euler("ZYX")[:, ::-1]
+    rates = np.gradient(np.unwrap(angles, axis=0), 0.01, axis=0)
+    log = flat_log(own, rate=named(rates, *DOTS))
+    assert "body_rate" not in [guess.signal for guess in seen(log).signals]
+
+
 def test_a_gyroscope_is_taken_before_what_is_derived_of_the_attitude(own):
     """Motion capture is full of noise where that is fast, and so is its derivative, whatever it is called."""
     jitter = np.random.default_rng(1).normal(size=(len(own.time), 3))

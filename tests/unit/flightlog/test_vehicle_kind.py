@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.stated_vehicle import VTOL, forward_flight, refuse_other_vehicle
+from cpfls_cli.flightlog.stated_vehicle import VTOL, forward_flight, refuse_disarmed, refuse_other_vehicle
 
 SURFACES = {"SERVO1_FUNCTION": 4.0, "SERVO2_FUNCTION": 19.0, "SERVO3_FUNCTION": 70.0, "SERVO4_FUNCTION": 21.0}
 MOTORS = {f"SERVO{output}_FUNCTION": 32.0 + output for output in range(1, 5)}
@@ -86,3 +86,28 @@ def test_forward_flight_is_said_by_states_and_modes():
     by_mode = forward_flight({"MODE": {"timestamp": np.arange(3.0), "Mode": np.array([18.0, 5.0, 19.0])}}, grid)
     assert by_mode.tolist() == [False, True, False]
     assert forward_flight({}, grid) is None
+
+
+@pytest.mark.parametrize(
+    ("topics", "refused"),
+    [
+        (status(arming_state=[1, 1, 1, 1]), True),
+        (status(arming_state=[0, 1, 1, 1]), True),
+        ({"actuator_armed": {"timestamp": np.arange(4.0), "armed": np.zeros(4)}}, True),
+        (status(arming_state=[1, 1, 2, 1]), False),
+        (status(arming_state=[1, 6, 6, 6]), False),
+        (status(nav_state=[0, 0, 0, 0]), False),
+        # Of another length than its stamps it says nothing, and what ends early or begins late not all.
+        ({"vehicle_status": {"timestamp": np.arange(4.0), "arming_state": np.ones(3)}}, False),
+        (status(arming_state=[1, 1]) | {"sensor_gyro": {"timestamp": np.array([0.0, 60.0])}}, False),
+        (status(arming_state=[1, 1]) | {"sensor_gyro": {"timestamp": np.array([-60.0, 1.0])}}, False),
+        ({}, False),
+    ],
+)
+def test_a_log_that_is_never_armed_is_no_flight(topics, refused):
+    """What is carried by hand turns and rises as what flies does."""
+    if refused:
+        with pytest.raises(InputError, match="no flight in it: PX4 is not armed throughout"):
+            refuse_disarmed(topics)
+    else:
+        refuse_disarmed(topics)
