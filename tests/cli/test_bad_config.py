@@ -179,8 +179,6 @@ def test_missing_config_and_folder_as_config(refuse, tmp_path):
     ("override", "message"),
     [
         ("vehicle", "--set vehicle: write section.key=value"),
-        ("=3", "--set =3: write section.key=value"),
-        ("vehicle..mass_kg=3", "--set vehicle..mass_kg=3: write section.key=value"),
         ("vehicle.mass=3", "FILE: vehicle.mass = 3: unknown key (did you mean 'mass_kg'?)"),
         ("vehicle.mass_kg=x", 'FILE: vehicle.mass_kg = "x": must be a number'),
         ("vehicle.mass_kg=[", "--set vehicle.mass_kg:1:2: not valid YAML: "),

@@ -232,19 +232,6 @@ def test_search_that_is_refused_keeps_the_checkpoint(refuse, words, stopped, tmp
     refuse(*words, "-o", stopped, "--resume", "--validate", tmp_path / "none.h5")
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (("--seed", 2), "seed = 1 there, 2 here"),
-        (("--set", "identification.population=18"), "identification.population = 16 there, 18 here"),
-        (("--set", "identification.generations=0"), "identification.generations = 0, but it has reached generation"),
-    ],
-)
-def test_other_config(refuse, words, stopped, options, said):
-    (line,) = refuse(*words, "-o", stopped, "--resume", *options)
-    assert line.startswith(f"{stopped}.checkpoint: belongs to another search: {said}")
-
-
 def test_other_selection_and_other_flight(cpfls, refuse, search, pipeline, stopped, tmp_path):
     (line,) = refuse("identify", search, pipeline.flight, "-o", stopped, "--resume")
     assert "selection = selection.h5 (" in line

@@ -201,23 +201,12 @@ def test_merge_keys_and_anchors_are_plain_yaml():
     assert parse_yaml("a: &a {x: 1}\nb: {<<: *a, y: 2}\n", "file") == {"a": {"x": 1}, "b": {"x": 1, "y": 2}}
 
 
-def test_messages_name_line_and_column():
-    with pytest.raises(ConfigError, match=r"^file:2:1: not valid YAML: key 'a' appears twice$"):
-        parse_yaml("a: 1\na: 2\n", "file")
-
-
 def study(name):
     return load_study(FOLDER / f"{name}.yaml")
 
 
 def torque(name, speed=SPEED):
     return body_wrench(study(name).vehicle, speed).body_torque[0]
-
-
-def test_every_config_is_looked_at():
-    crazyflies = {"arpl", "crazyswarm2", "crazyswarm2_card", "crazypad", "crazypad_usd", "nanodrone"}
-    known = crazyflies | {"rotorpy", "sixkg", "neurobem"}
-    assert known <= {path.stem for path in FOLDER.glob("*.yaml")}
 
 
 def test_the_hummingbird_has_the_torques_of_its_origin():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import FUZZY, Missing, Off, of_a_body, probe_flight, sized
+from cpfls_cli.export.holding import FUZZY, of_a_body, probe_flight
 from cpfls_cli.export.registry import exported
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of
@@ -108,21 +108,6 @@ def test_sizes_are_those_of_what_is_missing():
     assert smaller.torque == pytest.approx(0.5 * missing.torque)
     assert smaller.off.rate < missing.off.rate
     assert np.isnan(smaller.floors)
-
-
-def test_an_effect_outside_the_weights_is_named():
-    outside = (
-        Missing("payload", np.nan, np.nan, np.nan, None),
-        sized("sag", np.array([0.0, 0.2, 0.1, 0.0, 0.0, 3.0]), np.full(6, 0.1), Off.of(np.arange(1.0, 5.0)), "here"),
-    )
-    made = exported(sheet_of_vehicle(truth(), outside=outside), "casadi", "v.py")
-    assert made.missing == outside
-    assert made.remarks == (
-        "Not held: payload; its size depends on the flight and was not measured along one.",
-        "Not held, or only in part: sag: 0.2 N m and 3 N here, 30 noise floors; half a second without it ends 4 rad/s, "
-        "172 degrees, 2 m/s and 1 m off.",
-    )
-    assert "Not held: payload" in made.text
 
 
 @pytest.mark.parametrize("form", ["sdf", "mjcf", "casadi"])

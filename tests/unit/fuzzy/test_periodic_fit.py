@@ -145,12 +145,6 @@ def test_what_cannot_be_fitted_is_refused_in_words(angles, values, message):
         fit_periodic(angles, values)
 
 
-def test_a_fitted_system_refuses_another_number_of_inputs():
-    system = fit_periodic(GOOD, np.zeros(100))
-    with pytest.raises(ValueError, match=r"angles: expected shape \(samples, 2\), or \(2,\) for one point, got \(5,\)"):
-        system(np.zeros(5))
-
-
 def test_more_coefficients_than_samples_need_a_weight():
     with pytest.raises(ValueError, match=r"100 samples do not determine the 324 coefficients.*ridge_weight above 0"):
         fit_periodic(GOOD, surface(GOOD), PeriodicSettings(membership_functions=7))

@@ -7,13 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.weak_flight import rotation_balance
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.extended import ExtendedModel, extend, plain
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle
+from cpfls_cli.gap.whole_vehicle import whole_vehicle
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.gap_artifacts import named_effect
@@ -148,12 +148,6 @@ def test_refitted_inertia_changes_the_inertial_torque_in_proportion():
     )
     assert heavier[:, 0] == pytest.approx(1.1 * stated[:, 0])
     assert model.body.inertia == pytest.approx(np.diag([0.66, 0.6, 1.2]))
-
-
-def test_a_missing_signal_is_named():
-    model = with_effect("rotor_drag", 1e-3)
-    with pytest.raises(InputError, match=r"lacks rotor speed and velocity, which the model of the whole vehicle needs"):
-        of_vehicle([recording_of_sines(1)], model)
 
 
 def named(name):
