@@ -391,11 +391,8 @@ def test_mean_and_variance():
     assert found.standard_deviation == pytest.approx(statistics.stdev(VALUES))
 
 
-def test_what_is_not_known_does_not_count():
+def test_what_is_not_known_does_not_count_and_too_few_have_no_spread():
     assert plain(spread(np.array([*VALUES, np.nan, np.inf]))) == plain(spread(np.array(VALUES)))
-
-
-def test_too_few():
     one, none = spread(np.array([3.0])), spread(np.array([]))
     assert (one.count, one.mean) == (1, 3.0)
     assert np.isnan([one.variance, one.standard_deviation, none.mean, none.variance]).all()

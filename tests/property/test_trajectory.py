@@ -212,14 +212,11 @@ def peaks_upward(batch):
     return np.vstack([peaks[:, smooth], pop]), smooth
 
 
-def test_a_move_is_found_wherever_anything_limits_it(batch):
+def test_a_move_is_found_wherever_anything_limits_it_and_nothing_is_not_a_number(batch):
     limited = np.isfinite(batch.limits).any(axis=0) | (batch.period is not None)
     expected = np.where(limited, MoveOutcome.SOLVED, MoveOutcome.NO_LIMIT)
     np.testing.assert_array_equal(batch.moves.outcome, expected)
     assert np.isfinite(batch.moves.duration[limited]).all()
-
-
-def test_nothing_is_not_a_number(batch):
     for values in (batch.moves.duration, batch.moves.peaks, batch.moves.holds, batch.moves.period):
         assert not np.isnan(values).any()
 

@@ -240,14 +240,11 @@ def test_a_flight_without_rotors_is_refused(refused, shifted, tmp_path):
     )
 
 
-def test_a_horizon_longer_than_the_flight_is_refused(refused, shifted):
+def test_a_horizon_longer_than_the_flight_or_shorter_than_a_sample_is_refused(refused, shifted):
     message = refused("vehicle", shifted[0], options=("--horizon", "30"))
     assert message.startswith(
         "flight_1.csv: a horizon of 30 s is longer than its longest stretch without a pause, 23.99 s"
     )
-
-
-def test_a_horizon_shorter_than_a_sample_is_refused(refused, shifted):
     message = refused("vehicle", shifted[0], options=("--horizon", "0.001"))
     assert message == "--horizon 0.001 s is shorter than a sample of flight_1.csv, 0.01 s"
 

@@ -34,19 +34,13 @@ def all_keys(settings, prefix=""):
             yield from all_keys(key.section, f"{prefix}{key.name}.")
 
 
-def test_every_key_has_one_line_of_documentation():
+def test_every_key_has_one_line_of_documentation_which_the_commented_default_shows():
     undocumented = [path for path, key in all_keys(Study) if not key.doc.strip() or "\n" in key.doc]
     assert undocumented == []
-
-
-def test_the_commented_default_shows_every_line():
     comments = {line.split("#", 1)[1].strip() for line in commented_default().splitlines() if "#" in line}
     entries = {comment.split(": ", 1)[-1] for comment in comments}
     missing = [path for path, key in all_keys(Study) if key.doc not in comments | entries]
     assert missing == []
-
-
-def test_sections_are_those_of_the_study():
     assert [key.name for key in keys_of(Study) if key.section is not None] == list(SECTIONS)
 
 
@@ -209,13 +203,10 @@ def torque(name, speed=SPEED):
     return body_wrench(study(name).vehicle, speed).body_torque[0]
 
 
-def test_the_hummingbird_has_the_torques_of_its_origin():
+def test_craft_have_the_torques_of_their_origin():
     k, b, d = 5.57e-6, 1.36e-7, 0.1202081528
     expected = [k * d * (O1 - O2 - O3 + O4), k * d * (-O1 - O2 + O3 + O4), b * (O1 - O2 + O3 - O4)]
     np.testing.assert_allclose(torque("rotorpy"), expected, rtol=1e-12)
-
-
-def test_the_six_kilogram_craft_has_the_torques_of_the_plus_layout():
     k, b, arm = 121.5e-6, 2.7e-6, 0.3
     expected = [arm * k * (O4 - O2), arm * k * (O3 - O1), b * (-O1 + O2 - O3 + O4)]
     np.testing.assert_allclose(torque("sixkg"), expected, rtol=1e-12)
@@ -309,12 +300,9 @@ def test_the_other_values_would_be_noticed():
         assert value not in (yaml.safe_load(text) for text in PAGE[key].values())
 
 
-def test_a_resolved_preset_reads_back_the_same():
+def test_a_resolved_preset_reads_back_the_same_and_names_every_key_of_the_search():
     study = validate({"identification": {"preset": "paper", "population": 20}}, "study.yaml")
     assert validate(resolved(study), "study.yaml") == study
-
-
-def test_the_paper_names_every_key_of_the_search():
     # How small an improvement counts is never asked where no search is stopped for it.
     assert {key.name for key in fields(EvolutionSettings)} - set(PRESETS["paper"]) == {"stall_improvement"}
 

@@ -83,13 +83,10 @@ def integrated(signals):
     return replace(signals, attitude=np.unwrap(Rotation.concatenate(turned).as_euler("ZYX")[:, ::-1], axis=0))
 
 
-def test_an_attitude_integrated_from_the_gyroscope_shows_no_scale(turning):
+def test_an_attitude_integrated_from_the_gyroscope_shows_its_bias_and_no_scale(turning):
     found = audit([integrated(turning)], WINDOWS)
     assert {"gyro_scale", "imu_misalignment"} <= set(found.untested)
     assert found.named == ()
-
-
-def test_an_attitude_integrated_from_the_corrected_gyroscope_still_shows_the_bias(turning):
     estimated = integrated(turning)
     found = audit([replace(estimated, body_rate=estimated.body_rate + np.array([0.02, 0, 0]))], WINDOWS)
     assert [finding.name for finding in found.named] == ["gyro_bias"]
@@ -268,17 +265,11 @@ def test_a_wrong_sign_is_found_about_its_axis_alone(axis, words):
     assert result.size == pytest.approx(-1.0, abs=0.05)
 
 
-def test_an_attitude_in_other_axes_than_the_gyroscope_is_found():
+def test_an_attitude_and_a_gyroscope_that_disagree_are_found_where_they_move():
     """An attitude in FRD against NED of a gyroscope in FLU: pitch and yaw have the other sign."""
     signals = log()
     assert len(found(replace(signals, attitude=signals.attitude * [1.0, -1.0, -1.0]))) == 2
-
-
-def test_a_gyroscope_that_stands_still_in_a_flight_that_moves_is_found():
     assert len(found(turned(log(), [1.0, 0.0, 1.0]))) == 1
-
-
-def test_an_axis_that_hardly_turns_is_not_judged():
     assert found(log(sizes=(0.001, 0.001, 0.001), noise=0.05)) == []
     still = turned(log(sizes=(0.01, 0.9, 0.001)), [1.0, 1.0, 0.0])
     assert not any("yaw" in each.what for each in found(still))

@@ -241,13 +241,10 @@ def test_cable_pulls_along_gravity_where_the_velocity_is_constant(columns, fligh
     np.testing.assert_allclose(found @ [0.06, -0.01, -0.02, 0.6], [expected] * len(level), atol=1e-8)
 
 
-def test_cable_rights_a_tilted_vehicle(columns, flight, with_velocity):
+def test_a_cable_rights_a_tilted_vehicle_and_pulls_harder_in_a_climb(columns, flight, with_velocity):
     tilted = replace(with_velocity(flight, [0.0, 0.0, 0.0]), attitude=np.full_like(flight.attitude, [0.2, 0.0, 0.0]))
     torque = columns("payload", tilted, **LEVEL).direct[:, :3, 0]
     np.testing.assert_allclose(torque, [[-9.81 * np.sin(0.2), 0.0, 0.0]] * len(tilted), atol=1e-9)
-
-
-def test_climbing_harder_pulls_harder(columns, flight, with_velocity):
     rising = replace(with_velocity(flight, [0.0, 0.0, 0.0]), acceleration=np.tile([0.0, 0.0, 2.0], (len(flight), 1)))
     force = columns("payload", replace(rising, rotor_speed=None), **LEVEL).direct[:, 3:, 3]
     np.testing.assert_allclose(np.linalg.norm(force, axis=1), 11.81)

@@ -23,13 +23,10 @@ def level(flight, height, roll=0.0):
     return replace(flight, attitude=attitude, position=np.full_like(flight.position, [0.0, 0.0, height]))
 
 
-def test_ground_effect_of_a_level_vehicle_is_cheeseman_and_bennett(columns, flight):
+def test_ground_effect_is_cheeseman_and_bennett_and_levels_a_tilted_vehicle(columns, flight):
     near = level(flight, 0.25)
     found = columns("ground_effect", near, G=1.0).direct[:, 5, 0]
     np.testing.assert_allclose(found, near.thrust * (1 / (1 - (0.2 / (4 * 0.30)) ** 2) - 1))
-
-
-def test_ground_levels_a_tilted_vehicle(columns, flight):
     hovering = replace(flight, rotor_speed=np.full_like(flight.rotor_speed, 348.0))
     torque = columns("ground_effect", level(hovering, 0.3, roll=0.2), G=2.0).direct[:, :3, 0]
     assert (torque[:, 0] < -0.01).all()

@@ -20,13 +20,10 @@ RANKS = np.random.default_rng(1).permutation(54)
 GENES = np.arange(54)[:, np.newaxis]
 
 
-def test_three_bit_code_is_the_published_table():
+def test_the_code_is_the_published_table_gene_after_gene():
     table = ["000", "001", "011", "010", "110", "111", "101", "100"]
     bits = gray_encode(np.arange(8)[:, np.newaxis], bits_per_gene=3)
     assert ["".join(str(int(bit)) for bit in row) for row in bits] == table
-
-
-def test_genes_lie_one_after_another_most_significant_bit_first():
     bits = gray_encode(np.array([[65535, 0]]))
     assert np.flatnonzero(bits[0]).tolist() == [0]
     assert gray_decode(bits).tolist() == [[65535, 0]]
@@ -66,9 +63,6 @@ def test_crossover_rate_is_the_share_of_crossed_pairs():
     offspring = single_point_crossover(bits, 0.8, np.random.default_rng(4))
     crossed = np.any(offspring != bits, axis=1)[::2]
     assert abs(crossed.mean() - 0.8) < 0.025
-
-
-def test_a_single_bit_has_no_point_to_cross_at():
     bits = alternating(4, 1)
     np.testing.assert_array_equal(single_point_crossover(bits, 1.0, np.random.default_rng(6)), bits)
 

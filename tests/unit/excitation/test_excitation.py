@@ -172,12 +172,9 @@ def test_never_worse_than_the_random_path_it_began_with(monkeypatch):
     assert found.condition_number == pytest.approx(found.random.min(), rel=0.1)
 
 
-def test_without_iterations_the_best_random_path_remains():
+def test_without_iterations_the_best_random_path_remains_and_its_turns_are_within_limits():
     found = optimised(iterations=0)
     assert found.condition_number == pytest.approx(found.random.min(), rel=0.1)
-
-
-def test_turns_beyond_the_limits_are_refused():
     with pytest.raises(SettingError, match="complete turns"):
         optimised(turns=(20, 1, 1))
 

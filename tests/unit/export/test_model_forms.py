@@ -206,14 +206,11 @@ def test_comment_text(text, safe):
     assert comment_text(text) == safe
 
 
-def test_comment_lines_are_short_and_keep_empty_paragraphs():
+def test_comment_lines_are_short_and_literals_hold_no_quotes():
     lines = comment_lines(["word " * 100, "", "x" * 300])
     assert "" in lines
     assert all(len(line) <= 115 for line in lines)
     assert all(line == "" or line.startswith(" ") for line in lines)
-
-
-def test_literals_hold_no_quotes_and_no_escapes():
     assert literal_text('good" "\\n%s??/') == "good_ __n_s___"
 
 

@@ -142,20 +142,14 @@ def test_zero_widths_are_finite_steps(weights):
     np.testing.assert_allclose(degrees.value.sum(axis=1), 1.0, atol=1e-15)
 
 
-def test_a_function_between_two_empty_intervals_never_fires_inside():
+def test_functions_hold_at_their_ends_and_never_fire_between_two_empty_intervals():
     """b = 0, 1/2, 1/2, 1/2, 1: the middle function has no width on either side."""
     b = breakpoints(np.array([1.0, 0.0, 0.0, 1.0]))
     inside = np.setdiff1d(np.linspace(0, 1, 101), [0.5])
     np.testing.assert_array_equal(memberships(inside, b).value[:, 2], 0.0)
-
-
-def test_one_function_is_everywhere_one():
     degrees = memberships(np.linspace(-1, 2, 7), breakpoints(np.empty(0)))
     np.testing.assert_array_equal(degrees.value, np.ones((7, 1)))
     np.testing.assert_array_equal(degrees.slope, np.zeros((7, 1)))
-
-
-def test_beyond_the_ends_the_outer_functions_stay_at_one():
     degrees = memberships(np.array([-0.3, 1.3]), np.array([0.0, 0.4, 1.0]))
     np.testing.assert_array_equal(degrees.value, [[1, 0, 0], [0, 0, 1]])
     np.testing.assert_array_equal(degrees.slope, np.zeros((2, 3)))

@@ -117,11 +117,8 @@ def test_formulas_are_off_by_what_is_left_above_the_floor_and_a_tenth_at_most(ex
     assert off_by(explained, left, above) == pytest.approx(off)
 
 
-def test_alone_a_set_is_certain():
+def test_a_set_alone_is_certain_and_two_that_predict_alike_are_as_likely():
     assert likely([]).tolist() == [1.0]
-
-
-def test_what_predicts_every_block_alike_is_as_likely():
     assert likely([np.zeros(12), np.zeros(12)]) == pytest.approx([1 / 3] * 3)
 
 
@@ -154,13 +151,10 @@ def test_a_centre_of_mass_lies_inside_four_tenths_of_the_arm(length, admissible)
     assert keep.all()
 
 
-def test_what_the_data_leave_open_is_no_reason_to_refuse():
+def test_a_damping_beyond_all_bodies_is_refused_and_one_that_is_open_is_not():
     far = np.array([0.15, 0.0])
     assert within_bounds(OFFSET, far, np.array([0.02, 0.02]), VEHICLE)[1]
     assert not within_bounds(OFFSET, far, np.array([0.01, 0.02]), VEHICLE)[1]
-
-
-def test_a_damping_beyond_all_bodies_is_refused():
     assert within_bounds(DAMPING, np.array([1.7, 0.0, 0.0]), SURE, VEHICLE)[1]
     assert not within_bounds(DAMPING, np.array([1.9, 0.0, 0.0]), SURE, VEHICLE)[1]
 

@@ -61,13 +61,10 @@ def test_torque_and_force_are_judged_each(shares, expected):
     assert verdict_of([BIG], [], False, shares, True, GapSettings()) is expected
 
 
-def test_shares_of_the_settings_decide():
+def test_shares_of_the_settings_decide_and_a_gap_that_remains_is_not_all_explained():
     strict = GapSettings(named_share=0.99, partial_share=0.97)
     assert verdict_of([BIG], [], False, (0.98,), True, strict) is GapVerdict.PARTIAL
     assert verdict_of([BIG], [], False, (0.96,), True, strict) is GapVerdict.UNEXPLAINED
-
-
-def test_a_gap_that_remains_is_not_all_explained():
     assert verdict_of([BIG], [], True, (0.99,), True, GapSettings()) is GapVerdict.PARTIAL
 
 

@@ -29,15 +29,9 @@ def scores(model, rigid, zero=(1.0, 1.0, 1.0)):
     return Judged(models=names, parts=parts, samples=samples, outside=0 * samples, **measures)
 
 
-def test_the_smaller_mean_squared_error_wins_axis_by_axis():
+def test_the_smaller_mean_squared_error_wins_axis_by_axis_and_rounding_is_a_tie():
     assert scores((0.1, 0.3, 0.2), (0.2, 0.2, 0.2)).winners("training") == ["model", "rigid-body", "tie"]
-
-
-def test_a_difference_of_nothing_but_rounding_is_a_tie():
     assert scores((3e-28, 1e-30, 2e-29), (1e-33, 2e-34, 1e-33)).winners("training") == ["tie"] * 3
-
-
-def test_the_same_small_numbers_decide_where_the_torque_itself_is_small():
     small = (1e-26, 1e-26, 1e-26)
     assert scores((3e-28, 3e-28, 3e-28), (1e-33, 1e-33, 1e-33), small).winners("training") == ["rigid-body"] * 3
 

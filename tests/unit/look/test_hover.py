@@ -82,14 +82,11 @@ def test_a_height_controller_hides_no_exponent():
     assert hover_of(still_flight(120.0, RATE, collective=only_gusts, specific_force=forces(up))).shape is None
 
 
-def test_a_loop_in_acro_is_no_hover():
+def test_a_loop_in_acro_is_no_hover_and_a_steady_collective_has_no_shape():
     """Where no attitude is logged, the mean force of a loop may be gravity all the same."""
     turning = np.tile([0.0, 6.0, 0.0], (1200, 1))
     flight = still_flight(60.0, RATE, body_rate=turning, attitude=np.full((1200, 3), np.nan))
     assert hover_of(flight).throttle is None
-
-
-def test_a_steady_collective_has_no_shape():
     assert hover_of(climbing(0, 1.5, by=0.02)).shape is None
 
 

@@ -53,14 +53,11 @@ def test_a_line_above_half_the_rate_comes_back_folded():
     assert line.hz == pytest.approx(100, abs=8)
 
 
-def test_a_collective_that_rests_cannot_tell_what_a_line_follows():
+def test_a_line_follows_what_moves_and_noise_alone_has_none():
     flight, _ = shaking(spread=0.001)
     (line,) = vibration_of(flight).lines
     assert line.kind == "unknown"
     assert line.power is None
-
-
-def test_noise_alone_has_no_line():
     assert all(vibration_of(shaking(size=0.0, seed=seed)[0]).lines == () for seed in range(10))
 
 

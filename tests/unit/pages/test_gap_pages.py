@@ -308,18 +308,12 @@ def test_where_nothing_is_repeatable_no_effect_explains_the_gap():
     assert sentences[0].startswith("Torque about x (roll): nothing is repeatable (at most 4 %).")
 
 
-def test_what_runs_do_not_tell_is_open():
+def test_what_runs_do_not_show_is_open_chance_is_no_effect_and_larger_noise_is_named():
     box, sentences = again_box(made.repeatability(NOTHING, error=0.5))
     assert box.title == "These runs do not show whether the gap is repeatable: up to 100 % of it may be."
     assert "nothing is surely repeatable" in sentences[0]
-
-
-def test_chance_is_not_taken_for_an_effect():
-    """Twice the error, in one of 36 numbers, is nothing."""
+    # Twice the error, in one of 36 numbers, is nothing.
     assert not made.repeatability(shares(yaw=[0.0, 0.0, 0.0, 0.2, 0.0, 0.0]), error=0.1).repeating
-
-
-def test_noise_that_is_larger_than_gusts_is_named():
     _, sentences = again_box(made.repeatability(NOTHING, noise=3.9))
     assert "The rest: noise of the sensors of about 3.9 rad/s²." in sentences[0]
 

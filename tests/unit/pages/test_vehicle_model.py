@@ -66,12 +66,9 @@ def of_inertia(own, *moments):
     return replace(own, model=replace(own.model, vehicle=replace(own.model.vehicle, inertia_kg_m2=moments)))
 
 
-def test_numbers_without_a_meaning_of_their_own_are_counted_and_not_listed():
+def test_numbers_without_a_meaning_of_their_own_are_counted_and_warned_of_where_they_stand_for_one_with_a_name():
     assert [row[0] for row in rows_of(learned(), "Number")] == ["rotor drag k_d"]
     assert any("3 more form the learned remainder" in text for text in texts(learned()))
-
-
-def test_they_are_warned_of_only_where_they_stand_for_a_number_with_a_name():
     said = " ".join(texts(learned()))
     assert "only together (correlation): rotor drag k_d and remainder force 3_0_0 (-0.970)" in said
     assert "remainder_force.3_0_1" not in said

@@ -244,12 +244,9 @@ def test_a_model_is_better_where_it_was_played_along_what_it_flies():
     assert where_better(alone, replay(alone, 10, 1)).speed_m_s is None
 
 
-def test_a_signal_that_no_flight_knows_has_no_errors():
+def test_a_signal_is_averaged_over_the_flights_that_know_it():
     found = replay([played(flight_of(has_velocity=False))], 10, 1)
     assert {tuple(own.signals) for own in found.models.values()} == {("body_rate", "attitude")}
-
-
-def test_a_signal_is_averaged_over_the_flights_that_know_it():
     known, alone = flight_of(seed=1), flight_of(seed=2, has_attitude=False)
     both, one = replay([played(known), played(alone)], 10, 1), replay([played(known)], 10, 1)
     np.testing.assert_allclose(mean_errors(both, "velocity"), mean_errors(one, "velocity"))

@@ -79,13 +79,10 @@ def test_a_table_fits_the_terminal_and_loses_nothing(width):
             assert any(word in line.split() for line in shown)
 
 
-def test_facts_stand_in_two_columns_and_long_ones_are_broken_under_themselves():
+def test_facts_stand_in_two_columns_and_tables_without_titles_have_no_header():
     facts = Facts([("Source", "simulated along a path with a long name"), ("Samples", "549")])
     assert lines(facts) == ["Source   simulated along a path with a long name", "Samples  549"]
     assert lines(facts, width=30) == ["Source   simulated along a", "         path with a long name", "Samples  549"]
-
-
-def test_a_table_without_titles_has_no_header():
     assert lines(Table("t", "", ("", ""), [["a", "1"], ["bc", "23"]])) == ["a    1", "bc  23"]
 
 
@@ -96,14 +93,11 @@ def test_sentences_stand_as_they_are_and_pictures_stay_on_the_page():
     assert shown == ["a sentence", "a heading", "Verdict: good", "  one reason", "  another", "one", "two"]
 
 
-def test_what_warns_is_apart():
+def test_what_warns_is_apart_and_what_is_folded_away_is_named():
     blocks = [Text("all is well"), Text("beware", "warning"), Text("note this", "note")]
     assert lines(*blocks) == ["all is well", "note this"]
     assert warnings_of(blocks) == (Text("beware", "warning"),)
     assert warnings_of([Folded("More", blocks)]) == warnings_of(blocks)
-
-
-def test_what_is_folded_away_is_named_and_shown_on_request():
     blocks = [Text("the answer"), Folded("why", [Text("because"), Folded("numbers", [Facts([("one", "1")])])])]
     assert lines(*blocks) == ["the answer"]
     assert folded_words(blocks) == ("why",)
@@ -305,13 +299,10 @@ def test_a_share_of_variance_reads_one_only_when_nothing_is_missing():
     assert r_squared(math.nan) == "—"
 
 
-def test_rounding_is_written_as_zero_and_a_small_error_is_not():
+def test_rounding_is_written_as_zero_and_a_change_with_its_sign():
     assert percent(1.5e-15) == "0 %"
     assert percent(1.5e-6) == "0.000150 %"
     assert percent(0.01706) == "1.71 %"
-
-
-def test_a_change_carries_its_sign():
     assert change(56805 / 56254 - 1) == "+0.98 %"
     assert change(-0.348) == "−34.80 %"
     assert change(-1e-9) == "0 %"

@@ -299,20 +299,14 @@ def flown_along(path, added, factor=1.0):
     return added.of_sizes(factor * added.sizes).onto(path, USUAL.gravity_m_s2)
 
 
-def test_what_fits_is_left_as_it_is():
+def test_limits_of_tilt_and_velocity_are_kept_and_reached():
     _, added, _, room = of(size_rad=0.03)
     np.testing.assert_array_equal(room.added.sizes, added.sizes)
     assert room.limits == ("", "")
-
-
-def test_tilt_is_kept_and_reached():
     path, _, _, room = of(size_rad=0.4, tilt_max=0.1, band_hz=(0.5, 1.0))
     assert room.limits == ("tilt (trajectory.tilt_max_rad = 0.1)",) * 2
     tilt = tilt_of(flown_along(path, room.added).attitude).max()
     assert 0.0995 < tilt <= 0.1
-
-
-def test_velocity_is_kept_and_reached():
     _, _, _, room = of(size_rad=0.4, velocity_max_m_s=0.2, band_hz=(0.5, 1.0))
     assert all("trajectory.excite.velocity_max_m_s = 0.2" in limit for limit in room.limits)
     velocity = np.linalg.norm(room.added.motion[1], axis=1).max()

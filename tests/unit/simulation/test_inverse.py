@@ -223,11 +223,8 @@ def test_collective_thrust_is_the_least_that_turns_every_rotor_forwards(vehicle)
         assert found == pytest.approx(least.x[0], rel=1e-9)
 
 
-def test_a_held_vehicle_that_does_not_turn_needs_no_thrust():
+def test_a_held_vehicle_needs_no_thrust_and_its_rotors_give_its_torque():
     assert collective_thrust(VehicleSettings(), np.zeros((3, 3)), None).max() == 0.0
-
-
-def test_rotors_of_a_held_vehicle_give_its_torque():
     vehicle = VehicleSettings(inertia_kg_m2=(0.06, 0.05, 0.08))
     signals = held(vehicle).signals
     given = body_wrench(vehicle, signals["rotor_speed"]).body_torque

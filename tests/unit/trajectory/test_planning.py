@@ -98,13 +98,10 @@ def test_a_path_that_falls_freely_is_refused():
         plan(settings, GRAVITY)
 
 
-def test_what_numbers_cannot_hold_ends_with_a_message():
+def test_what_numbers_cannot_hold_ends_with_a_message_and_the_largest_move_gives_no_warning():
     """Without a warning of the numerics, which would be an error here."""
     with pytest.raises(ComputationError, match="the attitude's derivatives are too large for floating-point numbers"):
         plan(TrajectorySettings(sample_time_s=0.1, yaw_turn_rad=1e300), GRAVITY)
-
-
-def test_the_largest_move_that_settings_allow_gives_no_warning():
     with pytest.raises(ComputationError, match="free fall"):
         plan(TrajectorySettings(sample_time_s=0.1, displacement_m=9e99), GRAVITY)
 
@@ -154,21 +151,12 @@ def test_contradictions_name_their_key(key, values):
     assert refusal.value.key == key
 
 
-def test_moves_that_fill_the_duration_exactly_are_accepted():
+def test_moves_fill_the_duration_and_messages_say_what_is_too_long_or_too_large():
     assert TrajectorySettings(duration_s=48.0).line.duration == 16.0
-
-
-def test_message_says_how_long_the_moves_take():
     with pytest.raises(SettingError, match=r"4 moves take 64 s"):
         TrajectorySettings(legs=4)
-
-
-def test_amplitude_sets_the_displacement():
     settings = TrajectorySettings(amplitude_m_s5=0.5, displacement_m=None)
     assert settings.line.profiles[0].peaks.displacement == pytest.approx(32.0)
-
-
-def test_message_says_what_is_too_large():
     with pytest.raises(SettingError, match=r"period_s = 1 has displacement up to 1e\+300 in m and s: too large"):
         TrajectorySettings(displacement_m=1e300)
 
@@ -210,13 +198,10 @@ def test_each_axis_takes_as_long_as_the_slowest_alone():
     assert moves[slowest].active == plan_moves(DISPLACEMENTS, LIMITS)[slowest].active
 
 
-def test_axes_that_nothing_limits_have_no_solution():
+def test_what_nothing_limits_has_no_solution_and_nothing_moves_where_nothing_is_asked():
     limits = Limits(velocity=np.array([1.0, np.inf]))
     each = synchronised(np.array([1.0, 1.0]), limits)
     assert [move.outcome for move in each] == [MoveOutcome.SOLVED, MoveOutcome.NO_LIMIT]
-
-
-def test_nothing_moves_where_nothing_is_asked():
     moves = synchronised(np.zeros(3), Limits(velocity=1.0))
     assert [(move.outcome, move.duration) for move in moves] == [(MoveOutcome.ZERO_DISPLACEMENT, 0.0)] * 3
 

@@ -92,14 +92,11 @@ def test_times_that_numbers_cannot_hold_are_no_solution(displacement, limit):
     assert "bring the displacement and the limits closer to 1" in move.outcome.words
 
 
-def test_a_negative_displacement_is_the_mirror_image():
+def test_a_negative_displacement_is_the_mirror_image_and_many_moves_are_planned_as_one():
     there, back = plan_move(7.0, Limits(**PAPER)), plan_move(-7.0, Limits(**PAPER))
     assert (back.duration, back.peaks, back.active) == (there.duration, there.peaks, there.active)
     time = np.linspace(0, there.duration, 100)
     np.testing.assert_array_equal(back.profile.sample(time), -there.profile.sample(time))
-
-
-def test_many_moves_are_planned_as_one_is():
     displacements, snaps = np.array([64.0, -1.0, 0.0, 3.0]), np.array([1.0, 2.0, 3.0, np.inf])
     moves = plan_moves(displacements, Limits(velocity=2.0, snap=snaps), period=np.array([1.0, 2.0, 3.0, 4.0]))
     for index, (displacement, snap) in enumerate(zip(displacements, snaps, strict=True)):

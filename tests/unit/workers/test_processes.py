@@ -223,17 +223,11 @@ def test_an_error_of_the_domain_keeps_its_message(kind):
     assert not isinstance(caught.value, WorkerError)
 
 
-def test_too_little_memory_has_a_remedy():
+def test_failures_have_a_remedy_or_their_origin_and_survive_being_pickled():
     with pytest.raises(WorkerError, match="ran out of memory: use fewer workers"):
         result_of(failing(MemoryError()))
-
-
-def test_any_other_error_is_named_and_its_origin_is_a_note():
     with pytest.raises(WorkerError, match="ZeroDivisionError: by nothing") as caught:
         result_of(failing(ZeroDivisionError("by nothing")))
     assert "test_processes.py" in caught.value.__notes__[0]
-
-
-def test_a_failure_survives_being_pickled():
     failure = failing(ZeroDivisionError("by nothing"))
     assert pickle.loads(pickle.dumps(failure)) == failure
