@@ -253,8 +253,7 @@ def test_section(cpfls, study, section):
 def test_single_key_and_several_sections(cpfls, study):
     words = ("config", study, "--section", "vehicle.mass_kg", "--section", "reduction", "--json")
     printed = json.loads(cpfls(*words).stdout)
-    assert printed["vehicle"] == {"mass_kg": 6.0}
-    assert set(printed) == {"seed", "vehicle", "reduction"}
+    assert (printed["vehicle"], set(printed)) == ({"mass_kg": 6.0}, {"seed", "vehicle", "reduction"})
 
 
 def test_unknown_section(refuse, study):

@@ -60,8 +60,7 @@ def test_version_loads_nothing_heavy():
 )
 def test_wrong_usage(cpfls, words, message):
     result = cpfls(*words)
-    assert result.exit_code == 2
-    assert result.stdout == ""
+    assert (result.exit_code, result.stdout) == (2, "")
     assert message in result.stderr
 
 

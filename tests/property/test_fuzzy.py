@@ -73,8 +73,7 @@ def test_smooth_at_every_breakpoint(weights):
 def test_breakpoints_ascend_from_0_to_1_on_any_scale(weights):
     a = np.array(weights, dtype=float)
     b = breakpoints(a)
-    assert b[0] == 0.0
-    assert b[-1] == 1.0
+    assert (b[0], b[-1]) == (0.0, 1.0)
     assert np.all(np.diff(b) >= -1e-15)
     np.testing.assert_allclose(breakpoints(1e-3 * a), b, atol=1e-14)
 

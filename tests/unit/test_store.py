@@ -331,8 +331,7 @@ def test_a_model_of_a_vehicle_is_written_with_all_its_parts(tmp_path, name):
     assert (given.vehicle, given.response, given.wind) == (model.vehicle, model.response, model.wind)
     assert all(np.array_equal(*pair) for pair in zip(wrench_somewhere(given), wrench_somewhere(model), strict=True))
     assert [(each.name, each.shape) for each in given.effects] == [(each.name, each.shape) for each in model.effects]
-    assert given.fuzzy.structure == fuzzy.structure
-    assert given.fuzzy.ranges == fuzzy.ranges
+    assert (given.fuzzy.structure, given.fuzzy.ranges) == (fuzzy.structure, fuzzy.ranges)
     assert all(map(np.array_equal, given.fuzzy.partitions, fuzzy.partitions))
     assert repr(given.repairs) == repr(audit)
     assert plain(given)["effects"][-1] == {"name": "battery_sag", "shape": {"exponent": 1.5}, "coefficients": []}

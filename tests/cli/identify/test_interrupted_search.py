@@ -120,8 +120,7 @@ def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_p
     monkeypatch.setattr("cpfls_cli.search.time.monotonic", lambda: clock[0])
     at_evaluation(40, lambda: clock.__setitem__(0, 700.0))
     result = cpfls.done(*words, "-o", output, "--time-limit", "10m")
-    assert stored(output, "stop_reason") == b"time-limit"
-    assert stored(output, "history/evaluations")[-1] == 40
+    assert (stored(output, "stop_reason"), stored(output, "history/evaluations")[-1]) == (b"time-limit", 40)
     assert result.stderr.splitlines()[-1] == (
         f"{NOTE}{output}: is incomplete, because --time-limit ended the search; the same command with --resume goes on"
     )

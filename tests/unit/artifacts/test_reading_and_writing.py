@@ -295,8 +295,7 @@ def test_every_model_answers_the_same_questions(kind):
 
 def test_machines_read_what_the_model_has():
     answer = plain(vehicle_of(MODELS["quad"]))["model"]
-    assert answer["vehicle"]["mass_kg"] == 0.9
-    assert answer["vehicle"]["inertia_kg_m2"][4] == -2e-4
+    assert (answer["vehicle"]["mass_kg"], answer["vehicle"]["inertia_kg_m2"][4]) == (0.9, -2e-4)
     assert answer["response"]["lag_s"] == 0.035
     assert [each["name"] for each in answer["effects"]] == [one.name for one in MODELS["quad"].effects]
     assert answer["remainder"]["rows"] == [0, 2, 5]

@@ -50,15 +50,13 @@ def moved(signals, amplitude=2.0):
 
 def test_without_attitude_nothing_is_tested(turning):
     found = audit([replace(turning, attitude=None)], WINDOWS)
-    assert found.findings == ()
-    assert set(found.untested) == FAULTS
+    assert (found.findings, set(found.untested)) == ((), FAULTS)
     assert found.repaired(turning) is turning
 
 
 def test_too_short_a_flight_is_not_tested():
     found = audit([faulty_flight(np.random.default_rng(0), Faults(), LEVELS["mid"], duration=5.0)], WINDOWS)
-    assert found.findings == ()
-    assert set(found.untested.values()) == {"the flights are too short"}
+    assert (found.findings, set(found.untested.values())) == ((), {"the flights are too short"})
 
 
 @pytest.mark.parametrize("seed", [3, 5, 6])
@@ -303,8 +301,7 @@ def test_a_gain_between_a_half_and_two_is_let_pass(gain, warned):
 
 
 def test_noise_alone_is_no_gain():
-    assert gains(log(noise=0.3, held=5)) == []
-    assert gains(log(noise=5.0)) == []
+    assert (gains(log(noise=0.3, held=5)), gains(log(noise=5.0))) == ([], [])
 
 
 def gentle(noise):
@@ -353,13 +350,11 @@ def named(fitted, period=0.01):
     ],
 )
 def test_significant_but_small_is_not_named(place, small, large, name):
-    assert named(fit(place, -small)) == []
-    assert named(fit(place, -large)) == [name]
+    assert (named(fit(place, -small)), named(fit(place, -large))) == ([], [name])
 
 
 def test_a_delay_must_exceed_a_fifth_of_a_sample():
-    assert named(fit(12, 0.003), period=0.01) == ["channel_delay"]
-    assert named(fit(12, 0.003), period=0.02) == []
+    assert (named(fit(12, 0.003), period=0.01), named(fit(12, 0.003), period=0.02)) == (["channel_delay"], [])
 
 
 def test_the_first_of_ten_counts_ten_times():
@@ -370,8 +365,7 @@ def test_the_first_of_ten_counts_ten_times():
 
 
 def test_what_noise_can_have_pulled_does_not_count():
-    assert named(fit(3, 0.02, pull=0.0)) == ["gyro_scale"]
-    assert named(fit(3, 0.02, pull=0.02)) == []
+    assert (named(fit(3, 0.02, pull=0.0)), named(fit(3, 0.02, pull=0.02))) == (["gyro_scale"], [])
     [scale] = findings(checked(fit(3, 0.02, pull=0.01), ("gyro_scale",)), 0.01)
     assert scale.coefficients[0].high == pytest.approx(0.02 + 0.01 + 1e-4 * stats.t.ppf(0.975, 20))
 

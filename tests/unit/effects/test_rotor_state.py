@@ -166,8 +166,7 @@ def test_what_one_spin_lifts_more_shows_in_force_only(columns, flight):
 
 
 def test_pairs_face_each_other_and_spin_alike(vehicle):
-    assert opposite_pairs(vehicle) == ((0, 2), (1, 3))
-    assert opposite_pairs(circle(6)) == ()
+    assert (opposite_pairs(vehicle), opposite_pairs(circle(6))) == (((0, 2), (1, 3)), ())
     beside = (
         replace(rotor, position_m=(rotor.position_m[0] + 0.01, *rotor.position_m[1:])) for rotor in vehicle.rotors
     )

@@ -316,8 +316,7 @@ def test_a_known_chromosome_recalls_its_refinement_and_so_does_the_refined_one()
     again = archive.evaluate(np.array([[20, 10], [13, 4]]), recorder)
     assert len(recorder.calls) == 1
     assert first.genes.tolist() == [[20, 10]]
-    assert again.genes.tolist() == [[20, 10], [20, 10]]
-    assert again.objectives.tolist() == [[30.0, -30.0]] * 2
+    assert (again.genes.tolist(), again.objectives.tolist()) == ([[20, 10], [20, 10]], [[30.0, -30.0]] * 2)
 
 
 def test_objectives_that_are_not_finite_are_kept_as_worst():

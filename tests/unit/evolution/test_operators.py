@@ -97,8 +97,7 @@ def test_intermediate_offspring_of_a_pair_are_drawn_gene_by_gene_and_apart():
 def test_intermediate_recombination_stays_in_range_and_takes_its_share_of_the_pairs():
     genes = np.tile([[0], [65535]], (10001, 1))[:20001]
     offspring = intermediate_recombination(genes, 0.8, 65535, np.random.default_rng(10))
-    assert offspring.min() == 0
-    assert offspring.max() == 65535
+    assert (offspring.min(), offspring.max()) == (0, 65535)
     changed = (offspring != genes)[:20000, 0].reshape(-1, 2)
     # An end of the range stays where it is clipped to it: a sixth of the draws.
     assert abs(changed.any(axis=1).mean() - 0.8 * (1 - 1 / 36)) < 0.02

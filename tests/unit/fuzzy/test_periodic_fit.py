@@ -114,8 +114,7 @@ def test_half_a_circle_gives_finite_coefficients_and_a_lower_rank():
 def test_zero_columns_are_worth_nothing():
     """Samples at one place only: one direction is known."""
     system = fit_periodic(np.zeros((50, 2)), np.full(50, 3.0), PeriodicSettings(membership_functions=3))
-    assert system.quality.rank == 1
-    assert system([[0.0, 0.0]])[0] == pytest.approx(3.0)
+    assert (system.quality.rank, system([[0.0, 0.0]])[0]) == (1, pytest.approx(3.0))
 
 
 GOOD = samples(100)
@@ -220,13 +219,10 @@ def test_settings_of_another_type_name_the_right_one():
 
 def test_a_single_point_gives_a_single_value():
     two = fit_periodic(GOOD, surface(GOOD))
-    assert two([0.1, 0.2]).shape == ()
-    assert two([0.1, 0.2]) == two([[0.1, 0.2]])[0]
+    assert (two([0.1, 0.2]).shape, two([0.1, 0.2])) == ((), two([[0.1, 0.2]])[0])
     np.testing.assert_array_equal(two.gradient([0.1, 0.2]), two.gradient([[0.1, 0.2]])[0])
     one = fit_periodic(GOOD[:, 0], np.sin(GOOD[:, 0]))
-    assert one(0.3).shape == ()
-    assert one(0.3) == one([0.3])[0]
-    assert one([0.3, 0.4]).shape == (2,)
+    assert (one(0.3).shape, one(0.3), one([0.3, 0.4]).shape) == ((), one([0.3])[0], (2,))
     assert one.gradient(0.3).shape == (1,)
     with pytest.raises(ValueError, match=r"angles: expected shape \(samples, 1\), or \(\) for one point, got \(3, 2\)"):
         one(np.zeros((3, 2)))

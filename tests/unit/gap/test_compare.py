@@ -92,8 +92,7 @@ def test_stretch_is_where_the_gap_is():
 
     first = compared([recording_of_sines(1), recording_of_sines(2, burst)]).worst[0]
     assert (first.flight, first.channel) == (1, "torque x")
-    assert first.start_s == pytest.approx(10, abs=0.6)
-    assert first.end_s == pytest.approx(13, abs=0.6)
+    assert (first.start_s, first.end_s) == (pytest.approx(10, abs=0.6), pytest.approx(13, abs=0.6))
 
 
 def test_effects_without_signals_are_listed():

@@ -118,8 +118,7 @@ def test_formulas_are_off_by_what_is_left_above_the_floor_and_a_tenth_at_most(ex
 
 
 def test_a_set_alone_is_certain_and_two_that_predict_alike_are_as_likely():
-    assert likely([]).tolist() == [1.0]
-    assert likely([np.zeros(12), np.zeros(12)]) == pytest.approx([1 / 3] * 3)
+    assert (likely([]).tolist(), likely([np.zeros(12), np.zeros(12)])) == ([1.0], pytest.approx([1 / 3] * 3))
 
 
 def test_even_odds_of_blocks_multiply():
@@ -193,8 +192,7 @@ def drawn(size, right=0.0, rng=RNG):
 def test_without_noise_it_is_least_squares():
     rows = drawn(0.0)
     plain = np.linalg.lstsq(rows.columns[:, :3], rows.right, rcond=None)[0]
-    assert rows.solve() == pytest.approx([*plain, 0.0], rel=1e-9, abs=1e-12)
-    assert rows.trusted == 1.0
+    assert (rows.solve(), rows.trusted) == (pytest.approx([*plain, 0.0], rel=1e-9, abs=1e-12), 1.0)
 
 
 def test_noise_is_taken_off_the_normal_equations():
@@ -202,8 +200,7 @@ def test_noise_is_taken_off_the_normal_equations():
     noise, own = rows.noise[:, :3], rows.noise[:, -1]
     gram = rows.columns[:, :3].T @ rows.columns[:, :3] - noise.T @ noise
     moment = rows.columns[:, :3].T @ rows.right - noise.T @ own
-    assert rows.trusted == 1.0
-    assert rows.solve()[:3] == pytest.approx(np.linalg.solve(gram, moment), rel=1e-8)
+    assert (rows.trusted, rows.solve()[:3]) == (1.0, pytest.approx(np.linalg.solve(gram, moment), rel=1e-8))
 
 
 def test_numbers_that_noise_shrinks_come_out_as_they_are():

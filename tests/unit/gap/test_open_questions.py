@@ -164,13 +164,11 @@ def test_others_are_not(quiet):
 
 
 def test_what_a_refit_leaves_shows_in_the_channel_of_its_number():
-    assert result(SURE, share=0.04) == ()
-    assert result(SURE, unknown=0.14) == ("inertia_x",)
+    assert (result(SURE, share=0.04), result(SURE, unknown=0.14)) == ((), ("inertia_x",))
     assert result(SURE, unknown=0.16) == ()
     elsewhere, there = np.zeros(6), np.zeros(6)
     elsewhere[1:], there[0] = 0.9, 0.9
-    assert result(SURE, share=elsewhere) == ()
-    assert result(SURE, share=there) == ("inertia_x",)
+    assert (result(SURE, share=elsewhere), result(SURE, share=there)) == ((), ("inertia_x",))
 
 
 def test_probability_is_that_of_a_normal_error_of_the_surest_number():
@@ -201,8 +199,7 @@ def test_a_wrong_drag_factor_accounts_for_as_much_of_izz():
     small, large, other = (
         number(name, value, 0.02) for name, value in (("inertia_z", -0.15), ("inertia_z", -0.25), ("inertia_x", -0.15))
     )
-    assert result(small, effects=(wrong,)) == ()
-    assert result(large, effects=(wrong,)) == ("inertia_z",)
+    assert (result(small, effects=(wrong,)), result(large, effects=(wrong,))) == ((), ("inertia_z",))
     assert result(other, effects=(wrong,)) == ("inertia_x",)
 
 

@@ -65,10 +65,8 @@ def rivals(step, own):
 
 def test_a_column_that_is_the_same_is_an_alternative_and_a_superset_is_none(step):
     found = rivals(step, "special")
-    assert set(found) == {"twin"}
-    assert found["twin"].instead_of == "special"
-    assert found["twin"].relative_gain == pytest.approx(1)
-    assert found["twin"].separated_by == "fly otherwise"
+    assert (set(found), found["twin"].instead_of) == ({"twin"}, "special")
+    assert (found["twin"].relative_gain, found["twin"].separated_by) == (pytest.approx(1), "fly otherwise")
 
 
 def test_a_superset_explains_as_much_all_the_same(step):

@@ -39,8 +39,7 @@ def turning(found):
 @pytest.mark.parametrize("autopilot", logs.WRITERS)
 def test_one_flight_is_the_same_in_every_log(autopilot):
     found = read(logs.WRITERS[autopilot](OWN))
-    assert found.autopilot == autopilot
-    assert found.rate_hz == pytest.approx(200.0, rel=1e-3)
+    assert (found.autopilot, found.rate_hz) == (autopilot, pytest.approx(200.0, rel=1e-3))
     # Of a sample every 0.01 s: exact where there is one.
     np.testing.assert_allclose(found.body_rate[::2], on(found, OWN.rate @ FLIP)[::2], atol=1e-6)
     np.testing.assert_allclose(found.gyroscope.values, OWN.rate @ FLIP, atol=1e-6)

@@ -195,8 +195,7 @@ def test_a_change_in_words(cause, sizes, words, shows):
 
 def test_names_and_checks():
     assert cause_name("unbalance M2") == "another balance of rotor M2"
-    assert cause_name("unbalance") == "another balance of rotors"
-    assert cause_name("odd thing") == "odd thing"
+    assert (cause_name("unbalance"), cause_name("odd thing")) == ("another balance of rotors", "odd thing")
     assert what_to_check("scale z").startswith("see whether the gyroscope's range")
     assert what_to_check("odd thing") == "look at the numbers that changed"
 
@@ -259,8 +258,7 @@ def test_verdicts_of_a_trend(more, verdict, title):
 def test_each_has_a_figure_and_tables(name):
     result = made[name]()
     section = loaded(name).section(source_of(result, name), 1)
-    assert section.plots == [f"{name}-1-numbers"]
-    assert len(section.tables) == 2
+    assert (section.plots, len(section.tables)) == ([f"{name}-1-numbers"], 2)
     (fold,) = [block for block in section.blocks if isinstance(block, Folded)]
     assert fold.shown
     assert not [block for block in unfolded(section.blocks) if isinstance(block, Box)]
@@ -291,21 +289,13 @@ def test_settings_read_as_the_paper_prints_them(value, text):
 
 
 def test_a_share_of_variance_reads_one_only_when_nothing_is_missing():
-    assert r_squared(1.0) == "1"
-    assert r_squared(1.0 - 1e-6) == "> 0.9999"
-    assert r_squared(0.98765) == "0.9877"
-    assert r_squared(-1e-9) == "0.0000"
-    assert r_squared(-56730.0) == "−56730"
-    assert r_squared(math.nan) == "—"
+    assert (r_squared(1.0), r_squared(1.0 - 1e-6), r_squared(0.98765)) == ("1", "> 0.9999", "0.9877")
+    assert (r_squared(-1e-9), r_squared(-56730.0), r_squared(math.nan)) == ("0.0000", "−56730", "—")
 
 
 def test_rounding_is_written_as_zero_and_a_change_with_its_sign():
-    assert percent(1.5e-15) == "0 %"
-    assert percent(1.5e-6) == "0.000150 %"
-    assert percent(0.01706) == "1.71 %"
-    assert change(56805 / 56254 - 1) == "+0.98 %"
-    assert change(-0.348) == "−34.80 %"
-    assert change(-1e-9) == "0 %"
+    assert (percent(1.5e-15), percent(1.5e-6), percent(0.01706)) == ("0 %", "0.000150 %", "1.71 %")
+    assert (change(56805 / 56254 - 1), change(-0.348), change(-1e-9)) == ("+0.98 %", "−34.80 %", "0 %")
 
 
 @pytest.mark.parametrize(
@@ -337,20 +327,17 @@ def test_ends_are_distinguished_and_right_to_a_tenth_of_the_width(value, width, 
 
 
 def test_print():
-    assert printed("-1.40e-4") == "−1.40 × 10⁻⁴"
-    assert printed("0.25") == "0.25"
+    assert (printed("-1.40e-4"), printed("0.25")) == ("−1.40 × 10⁻⁴", "0.25")
 
 
 def test_numbers_are_not_rounded_into_certainty():
     assert [whole_percent(share) for share in (0.0, 0.001, 0.42, 0.9961, 1.0)] == [
         "0 %", "< 1 %", "42 %", "> 99 %", "100 %",
     ]  # fmt: skip
-    assert probability(1e-9) == "< 10⁻⁶"
-    assert probability(0.0123) == "0.012"
+    assert (probability(1e-9), probability(0.0123)) == ("< 10⁻⁶", "0.012")
 
 
 def test_words_become_phrases_and_sentences():
-    assert joined(["a", "b", "c", "a"]) == "a, b and c"
-    assert joined(["a", "b"], "or") == "a or b"
+    assert (joined(["a", "b", "c", "a"]), joined(["a", "b"], "or")) == ("a, b and c", "a or b")
     assert sentence("no rotors") == "No rotors."
     assert sentence("log_1.csv: saturated?") == "log_1.csv: saturated?"

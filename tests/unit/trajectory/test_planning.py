@@ -54,8 +54,7 @@ def test_each_derivative_is_that_of_the_one_before(diagonal, of, derivative):
 
 
 def test_yaw_makes_one_turn_from_rest_to_rest(diagonal):
-    assert diagonal.yaw[0] == 0.0
-    assert diagonal.yaw[-1] == pytest.approx(2 * np.pi, abs=1e-12)
+    assert (diagonal.yaw[0], diagonal.yaw[-1]) == (0.0, pytest.approx(2 * np.pi, abs=1e-12))
     np.testing.assert_allclose(diagonal.yaw_rate[[0, -1]], 0.0, atol=1e-12)
     np.testing.assert_allclose(diagonal.yaw_rate, np.gradient(diagonal.yaw, 0.01, edge_order=2), atol=1e-6)
     np.testing.assert_allclose(diagonal.yaw_acceleration, np.gradient(diagonal.yaw_rate, 0.01, edge_order=2), atol=1e-6)

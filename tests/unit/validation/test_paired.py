@@ -199,8 +199,7 @@ def test_torque_is_scaled_by_axis_and_left_out_where_the_pitch_is_vertical():
         lambda motion: 0.8 * torque[: len(motion)],
     )
     scaled = np.sum((0.1 * torque[result]) ** 2 / np.mean(torque[result] ** 2, axis=0), axis=1)
-    assert found.ours == pytest.approx(np.mean(scaled), rel=0.01)
-    assert found.ratio == pytest.approx(0.25)
+    assert (found.ours, found.ratio) == (pytest.approx(np.mean(scaled), rel=0.01), pytest.approx(0.25))
     assert found.lower
     # 342 samples are left, and a block has 20.
     assert found.blocks == 17

@@ -66,9 +66,7 @@ def test_derivatives_are_difference_quotients(case):
 def test_what_is_linear_has_no_value_and_a_factor_for_each_number():
     unit = {name: Tangent(0, {place: 1.0}) for place, name in enumerate("ab")}
     given = unit["a"] * np.array([1.0, 2.0]) - unit["b"] * 3.0 + unit["a"]
-    assert given.value == 0
-    assert given.by[0].tolist() == [2.0, 3.0]
-    assert given.by[1] == -3.0
+    assert (given.value, given.by[0].tolist(), given.by[1]) == (0, [2.0, 3.0], -3.0)
 
 
 def test_a_polynomial_has_a_value_for_each_product_of_its_numbers():

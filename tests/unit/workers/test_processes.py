@@ -159,8 +159,7 @@ def exists(process):
 def test_workers_are_closed_to_interrupts_take_one_thread_and_end_when_their_parent_is_killed(parent):
     processes = [int(text) for text in parent.stdout.readline().split()]
     most_threads, closed = parent.stdout.readline().split()
-    assert float(most_threads) == 1.0
-    assert float(closed) == 1.0
+    assert (float(most_threads), float(closed)) == (1.0, 1.0)
     assert all(exists(process) for process in processes)
     parent.kill()
     deadline = time.monotonic() + 10.0
@@ -197,8 +196,7 @@ def test_each_row_is_in_one_chunk_and_chunks_shrink_to_one_row(rows, workers):
     parts = chunks(rows, workers)
     lengths = [len(part) for part in parts]
     assert np.concatenate(parts).tolist() == list(range(rows))
-    assert lengths == sorted(lengths, reverse=True)
-    assert lengths[-1] == 1
+    assert (lengths, lengths[-1]) == (sorted(lengths, reverse=True), 1)
     assert lengths[0] <= -(-rows // (4 * workers))
 
 
