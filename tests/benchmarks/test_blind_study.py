@@ -51,7 +51,8 @@ def judged(tmp_path_factory):
 @pytest.mark.parametrize("effect", ["com_offset", "motor_lag"])
 def test_hidden_effect_is_named_alone_and_closes_the_gap(judged, effect):
     each = judged[f"single-sixkg-{effect}-0"]
-    assert (each.names, each.outcome) == ((effect,), RIGHT)
+    assert each.names == (effect,)
+    assert each.outcome == RIGHT
     assert each.floors("before") > 3
     assert each.floors("after") < 1.3
 
@@ -71,7 +72,8 @@ def test_wrong_numbers_of_the_vehicle_are_called_so(judged):
 
 def test_nothing_hidden_has_no_name(judged):
     each = judged["none-sixkg-0"]
-    assert (each.names, each.verdict) == ((), "NO_GAP")
+    assert each.names == ()
+    assert each.verdict == "NO_GAP"
 
 
 def test_what_no_catalogue_lists_is_never_called_found(judged):

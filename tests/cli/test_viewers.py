@@ -99,7 +99,8 @@ def test_mcap_is_read_back_at_the_stamps_of_the_log(cpfls, logged, tmp_path):
     read = [said["y"]["measured"] for _, said in found["/body_rate"]]
     np.testing.assert_allclose(read, RATE[own, 1], atol=1e-8)
     assert about["/body_rate"][1] == {"unit": "rad/s", "frame": "body (FLU)", "description": "body rates p, q, r"}
-    assert (about["/pose"][0], about["/tf/body"][0]) == ("foxglove.PoseInFrame", "foxglove.FrameTransform")
+    assert about["/pose"][0] == "foxglove.PoseInFrame"
+    assert about["/tf/body"][0] == "foxglove.FrameTransform"
     stamp, pose = found["/pose"][7]
     assert pose["timestamp"] == {"sec": stamp // 10**9, "nsec": stamp % 10**9}
     half = np.array([pose["pose"]["orientation"][axis] for axis in "xyzw"])

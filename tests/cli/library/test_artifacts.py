@@ -69,7 +69,8 @@ def test_columns_are_named_by_axis_and_have_units(pipeline):
 def test_another_dimension_counts_where_it_has_no_numbers_of_its_own(pipeline):
     model = cpfls_cli.read(pipeline.model)
     frame = model.to_pandas("rule")
-    assert (frame.index.name, list(frame["rules/name"])) == ("rule", list(model["rules/name"]))
+    assert frame.index.name == "rule"
+    assert list(frame["rules/name"]) == list(model["rules/name"])
     with pytest.raises(InputError, match=r"no dataset along 'rules'; its dimensions are .*rule"):
         model.to_pandas("rules")
 

@@ -63,9 +63,12 @@ def test_a_delay_is_found_next_to_it(levelled_flights):
     assert abs(float(re.match(r"The attitude is late by ([\d.]+) ms", sentence)[1]) - 30) < 0.5
 
 
-def test_of_what_nothing_levels_nothing_is_said():
+def test_one_that_nothing_levels_says_so_of_none():
     assert not any("levelled" in note for note in audit(sensed(), WINDOWS).notes)
-    # The lead of a levelled attitude at one frequency is any delay's.
+
+
+def test_of_one_slow_swing_no_gyroscope_is_late_because_the_attitude_may_be_levelled():
+    """The lead of a levelled attitude at one frequency is any delay's."""
     flights = [replace(s, rotor_speed=None) for s in levelled_slowly(0.1)]
     assert audit(flights, WINDOWS).named == ()
 

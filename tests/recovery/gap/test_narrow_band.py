@@ -50,7 +50,8 @@ def found(seed, amplitude, lead=0.0):
 @pytest.mark.parametrize(("lead", "energy"), [(0.0, "feeds"), (np.pi, "drains"), (np.pi / 2, "neither")])
 def test_a_periodic_torque_is_found_with_its_frequency_and_its_energy(lead, energy):
     band = found(1, 0.2, lead)
-    assert (band.channel, band.frequency_hz) == ("torque y", pytest.approx(0.91, abs=0.02))
+    assert band.channel == "torque y"
+    assert band.frequency_hz == pytest.approx(0.91, abs=0.02)
     assert band.p_value <= 0.01
     assert band.share > 0.5
     assert band.energy == energy

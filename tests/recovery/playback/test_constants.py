@@ -56,11 +56,14 @@ def test_in_gusts_instruments_tell_the_body(constants, name):
     assert (np.abs(off) < 2 * half).all()
 
 
-def test_constants_come_to_a_per_cent_in_still_air_or_are_not_determined(constants):
+def test_in_still_air_they_tell_it_to_a_per_cent(constants):
     off, _ = _moments(constants["calm"])
     assert np.abs(off).max() < 0.01
     assert all(band.used for band in constants["calm"].used.bands)
-    # About yaw gusts turn the vehicle by more than the path asks for.
+
+
+def test_what_instruments_do_not_tell_is_not_determined(constants):
+    """About yaw gusts turn the vehicle by more than the path asks for."""
     found = constants["setpoints"]
     yaw = found.fitted.free.index[LOG_INERTIA[2]]
     assert not found.spread.determined[yaw]
