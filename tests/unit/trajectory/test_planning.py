@@ -90,8 +90,6 @@ def test_straight_path_follows_its_direction():
     np.testing.assert_array_equal(trajectory.position[:, [0, 2]], 0.0)
 
 
-
-
 def test_what_numbers_cannot_hold_ends_with_a_message_and_the_largest_move_gives_no_warning():
     """Without a warning of the numerics, which would be an error here."""
     with pytest.raises(ComputationError, match="the attitude's derivatives are too large for floating-point numbers"):
@@ -198,8 +196,6 @@ def test_what_nothing_limits_has_no_solution_and_nothing_moves_where_nothing_is_
     assert [move.outcome for move in each] == [MoveOutcome.SOLVED, MoveOutcome.NO_LIMIT]
     moves = synchronised(np.zeros(3), Limits(velocity=1.0))
     assert [(move.outcome, move.duration) for move in moves] == [(MoveOutcome.ZERO_DISPLACEMENT, 0.0)] * 3
-
-
 
 
 def test_covering_chooses_the_amplitude():
