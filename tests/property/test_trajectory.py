@@ -95,19 +95,7 @@ def test_torque_shares_are_those_of_newton_and_euler(seed):
 
 
 def integrated(profile: BaseProfile) -> tuple[Array, Array]:
-    """Integrate the pop from rest, at the quarters of every wave and hold.
-
-    Parameters
-    ----------
-    profile : BaseProfile
-        With a period greater than zero.
-
-    Returns
-    -------
-    times : array, shape (time,), s
-    states : array, shape (time, 7), m and s
-        Displacement to pop; the last row is the end.
-    """
+    """Integrate the pop from rest, at the quarters of every wave and hold: times, and displacement to pop by time."""
     with localcontext(prec=60):
         amplitude = _amplitude(profile)
         start, state, times, states = Decimal(0), [Decimal(0)] * 7, [], []

@@ -369,12 +369,9 @@ def test_fields_say_what_they_are():
     assert (own["hover"].inner, own["hover"].optional) == (Estimate, True)
 
 
-def test_datasets_are_listed_by_path():
+def test_datasets_are_listed_by_path_and_tables_by_column():
     paths = [path for path, _ in datasets(Craft)]
     assert {"mass", "hover/low", "rotors/peaks/frequency", "curves/*/gain"} <= set(paths)
     assert len(paths) == len(set(paths))
-
-
-def test_a_column_of_a_table():
     assert column(craft().rotors, "name") == ["M1", "M2 ±|*x*"]
     assert np.isclose(estimate(3.0, 2.0).half, 2.0)

@@ -179,14 +179,11 @@ def off(found, cable):
     return np.sqrt(np.mean((found - cable) ** 2))
 
 
-def test_a_load_that_swings_from_the_start_shows_in_the_balance_of_forces(flight):
+def test_a_load_that_swings_from_the_start_is_followed_all_flight_long(flight):
     level, cable = balanced(tumbling(flight.vehicle), (0.12, -0.15, 0.3, 0.2))
     assert off(swing(level, 1.5, 0.1)[:, :2], cable) > 0.09
     assert off(settled_swing(level, 1.5, 0.1)[:, :2], cable) < 0.02
-
-
-def test_a_large_swing_is_followed_all_flight_long(flight):
-    """Slower than a small one, so that it is not the driven swing and a free one next to it."""
+    # Slower than a small one, so that it is not the driven swing and a free one next to it.
     long = tumbling(flight.vehicle, np.arange(0.0, 25.0, 0.01))
     level, cable = balanced(long, (0.4, -0.35, 0.8, 0.7), damping=0.02)
     assert off(settled_swing(level, 1.5, 0.02)[:, :2], cable) < 0.02

@@ -185,11 +185,8 @@ def test_a_weak_rotor_in_the_held_out_flight(result):
     assert "rotor M3, sure to" in sentence
 
 
-def test_nothing_is_said_of_like_flights_or_of_one(result):
+def test_nothing_is_said_of_like_flights_or_of_one_or_of_rougher_air(result):
     assert (result("0 0", "0 0", "0 0"), result("0 0", "0.5 0")) == ((), ())
-
-
-def test_rougher_air_is_no_other_vehicle(result):
     calm = ["0 0"] * 5
     assert result(*calm, "0 2") == ()
     (sentence,) = result(*calm, "0.5 2")

@@ -129,12 +129,9 @@ def test_what_is_left_out_is_measured_along_flights():
     assert Off.of(unseen.ends).sentence.endswith(" degrees")
 
 
-def test_a_plain_model_is_the_vehicle():
+def test_a_plain_model_is_the_vehicle_and_an_inertia_of_no_body_is_not_taken():
     whole = whole_vehicle(plain(None), QUAD)
     assert (whole.vehicle, whole.is_rigid_body) == (QUAD, True)
-
-
-def test_an_inertia_of_no_body_is_not_taken():
     products = fitted("products_of_inertia", 0.1, 0.0, 0.0)
     whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD)
     assert whole.vehicle == QUAD

@@ -342,14 +342,11 @@ def test_torque_on_a_moving_axis_that_is_not_inertia_is_not_called_unexcited():
     assert "hardly excited" not in sentences
 
 
-def test_a_wrong_unit_shows_in_the_ratio_to_the_stated_inertia():
+def test_a_wrong_unit_and_another_vehicle_show_in_the_ratio_to_the_stated_inertia():
     data = small_angle_flight()
     assert "times those stated" in result(with_torque(data, 57.3 * data.torque))
     assert "times those stated" not in result(with_torque(data, 2.0 * data.torque))
     assert "times those stated" not in result(with_torque(data, 57.3 * data.torque), stated=None)
-
-
-def test_another_vehicle_is_said_on_held_out_flights():
     data, other = small_angle_flight(), small_angle_flight(seed=2)
     assert "other: the model explains less than half" in result(data, {"other": with_torque(other, 5 * other.torque)})
     assert "explains less than half" not in result(data, {"other": other})

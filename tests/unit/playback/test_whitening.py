@@ -154,13 +154,10 @@ def test_a_gust_has_its_size_and_falls_to_37_percent_within_its_memory():
         assert np.mean(column[late:] * column[:-late]) == pytest.approx(size**2 / np.e, rel=0.12)
 
 
-def test_the_first_is_as_large_as_any():
+def test_the_first_gust_is_as_large_as_any_and_comes_again_with_its_seed():
     rng = np.random.default_rng(2)
     first = np.array([GUSTS.drawn(rng, 0.01, 1)[0] for _ in range(4000)])
     assert first.std(axis=0) == pytest.approx(GUSTS.size, rel=0.05)
-
-
-def test_gusts_come_again_with_their_seed():
     one, other = (GUSTS.drawn(np.random.default_rng(3), 0.01, 50) for _ in range(2))
     np.testing.assert_array_equal(one, other)
 

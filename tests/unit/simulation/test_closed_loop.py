@@ -231,14 +231,11 @@ def test_more_than_four_rotors_fly_too():
     assert flight.tracking.position_rms_m < 0.05
 
 
-def test_vehicle_that_cannot_stay_on_its_path_is_given_up():
+def test_a_vehicle_off_its_path_and_a_path_of_changing_rate_are_given_up():
     with pytest.raises(ComputationError, match=r"m away from the path at t = .* fly more gently"):
         flown(deviation_max_m=0.2, effects={"parameter_error": {"thrust_scale": -0.5}})
     with pytest.raises(ComputationError, match=r"tilts beyond 90 degrees|out of control"):
         flown(attitude_frequency_hz=8.0, effects={"command_delay": [0.12]})
-
-
-def test_trajectory_of_changing_rate_is_refused():
     time, plan = planned(0.5)
     settings = SimulationSettings(mode="closed-loop")
     with pytest.raises(ComputationError, match="at one rate"):

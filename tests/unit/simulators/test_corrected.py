@@ -177,14 +177,11 @@ def test_inertia_alone_is_that_of_the_whole_vehicle(mine):
     assert any("iyy" in sentence and "agrees with the flights" in sentence for sentence in said.unchanged)
 
 
-def test_centre_of_mass_moves(mine):
+def test_centre_of_mass_moves_and_is_put_in_where_there_is_none(mine):
     said, new = correct(mine, effect("com_offset", c_x=(0.004, 1e-4), c_y=(-0.002, 1e-4), c_z=(0.001, 0.005)))
     np.testing.assert_allclose(new.centre, [0.004, -0.002, 0], atol=3e-6)
     assert [each.element for each in said.changes] == ["pose x", "pose y"]
     assert "4 mm forward" in said.changes[0].sentence
-
-
-def test_a_centre_is_put_in_where_there_is_none(mine):
     mine.write_text(mine.read_text().replace("        <pose>0 0 0 0 0 0</pose>\n", ""))
     said, new = correct(mine, effect("com_offset", c_x=(0.004, 1e-4), c_y=(-0.002, 1e-4)))
     np.testing.assert_allclose(new.centre, [0.004, -0.002, 0], atol=3e-6)
@@ -261,12 +258,9 @@ def test_one_weak_rotor_with_what_the_force_shows(mine):
     assert [each.sentence.partition(" is ")[0] for each in said.changes] == ["thrust of M3"]
 
 
-def test_torque_of_the_rotors(mine):
+def test_torque_of_the_rotors_and_a_product_of_inertia(mine):
     _, new = correct(mine, effect("drag_factor_error", error=0.3))
     assert [rotor.ratio.value for rotor in new.rotors] == pytest.approx([0.0078] * 4)
-
-
-def test_a_product_of_inertia(mine):
     _, new = correct(mine, effect("products_of_inertia", I_xy=(2e-6, 1e-7), I_xz=(0.0, 1e-7), I_yz=(0.0, 1e-7)))
     assert new.inertia[0, 1] == pytest.approx(2e-6, rel=1e-3)
 

@@ -291,11 +291,8 @@ def test_the_own_structure_comes_first_and_every_name_once(keys):
     assert all(model_structure(structure).parameters > 0 for structure in listed)
 
 
-def test_settings_of_an_identification_are_a_structure_too():
+def test_settings_of_an_identification_are_a_structure_and_one_rule_has_no_use_for_an_input_map():
     assert candidate_structures(IdentificationSettings()) == candidate_structures(StructureSettings())
-
-
-def test_one_rule_of_harmonics_has_no_use_for_an_input_map():
     one_rule = [
         s for s in candidate_structures(StructureSettings()) if s.membership_functions == 1 and s.harmonic_order == 2
     ]

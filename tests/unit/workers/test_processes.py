@@ -54,12 +54,9 @@ def test_parts_say_which_rows_they_are(two):
     assert sorted(seen) == list(range(len(GENES)))
 
 
-def test_one_chromosome_and_many_follow_each_other(two):
+def test_streams_follow_each_other_and_one_that_is_given_up_leaves_nothing(two):
     for count in (1, 3, 40):
         assert two(GENES[:count]).genes.tolist() == (GENES[:count, ::-1] + 1).tolist()
-
-
-def test_a_stream_that_is_given_up_leaves_nothing_to_the_next(two):
     stream = two.stream(GENES)
     next(stream)
     stream.close()
