@@ -141,7 +141,7 @@ def test_too_short_and_without_rotors():
         flight_numbers(replace(flight, rotor_speed=None, name="none.csv"))
 
 
-def test_the_ground_is_no_flight():
+def test_the_ground_is_no_flight_and_throttle_cuts_of_acrobatic_flight_are():
     """Five seconds of idling before: not flown, nor half a second next to it."""
     signals = recorded()
     idle = signals.rotor_speed.copy()
@@ -149,10 +149,7 @@ def test_the_ground_is_no_flight():
     flies = in_flight(replace(signals, rotor_speed=idle, position=None))
     assert not flies[:549].any()
     assert flies[560:].all()
-
-
-def test_throttle_cuts_of_acrobatic_flight_are_flight():
-    """As the import has it: a second of each three with the throttle cut, in which the vehicle turns."""
+    # As the import has it: a second of each three with the throttle cut, in which the vehicle turns.
     signals = recorded()
     cut = np.mod(signals.time, 3.0) > 2.0
     speed = np.where(cut[:, None], 0.05, 1.0) * signals.rotor_speed

@@ -34,14 +34,11 @@ def drawn():
     return full_rotation(RotationSettings(), 10.0, np.random.default_rng(2))
 
 
-def test_design_variables_give_the_path_back():
+def test_design_variables_give_the_path_and_its_motion_back():
     path = drawn()
     again = path_of(variables_of(path), path)
     for name in ("start", "turns", "sine", "cosine"):
         np.testing.assert_allclose(getattr(again, name), getattr(path, name), rtol=1e-14)
-
-
-def test_the_motion_of_the_design_is_that_of_the_path():
     path = drawn()
     times, sampled = path.times(30), path.sample(path.times(30))
     motion = design(path, times).motion(variables_of(path))

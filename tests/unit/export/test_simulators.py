@@ -174,16 +174,13 @@ def test_jax_differentiates_and_batches():
     np.testing.assert_allclose(by_mass, [-0.01 * thrust / model.vehicle.mass_kg**2] * 3, rtol=1e-9)
 
 
-def test_drag_along_the_axes_of_the_world_counts_as_not_held():
+def test_what_a_target_does_otherwise_counts_as_not_held():
     model = replace(whole(response=RotorResponse()), remainder=None)
     made, found = fly("urdf", model)
     (turned,) = [each for each in made.missing if each.title.startswith("drag along the axes of the world")]
     assert turned.off.velocity > 1e-4
     # The equations are compared along the axes of the body, and the flight is along those of the world.
     assert found.equations.max() < AGREES
-
-
-def test_what_ardupilot_does_otherwise_counts_as_not_held():
     made, found = fly("ardupilot", VehicleModel(vehicle=QUAD))
     (otherwise,) = [each for each in made.missing if "cube of the speed" in each.title]
     assert otherwise.off.rate > 1e-3

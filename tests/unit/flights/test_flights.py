@@ -162,14 +162,11 @@ def speed():
     return np.random.default_rng(1).uniform(300.0, 600.0, (SAMPLES, 4))
 
 
-def test_the_commands_are_those_that_give_the_wrench(speed):
+def test_the_commands_are_those_that_give_the_wrench_and_no_rotor_pushes_down(speed):
     signals, notes = read(VehicleSettings(), speed)
     np.testing.assert_allclose(signals.rotor_speed, speed, rtol=1e-9)
     assert signals.commanded
     assert "four rotors of the config" in " ".join(notes)
-
-
-def test_a_rotor_that_would_have_to_push_down_stands_still(speed):
     vehicle = VehicleSettings()
     thrust = body_wrench(vehicle, speed).thrust
     thrust[:3] = 0.0

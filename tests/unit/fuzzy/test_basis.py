@@ -111,15 +111,12 @@ def test_seesaw_of_equation_11():
     np.testing.assert_allclose(seesaw(angle)[0], [0, 0.5, 1, 0.5, 0, -0.5, -1, -0.5, 0, -0.5, 1], atol=1e-14)
 
 
-def test_data_range_scales_the_training_data_to_0_and_1():
+def test_data_range_scales_the_training_data_to_0_and_1_and_what_stands_still_stays_finite():
     training = np.linspace(-0.8, 0.5, 30)
     for circular in (True, False):
         mapped = map_input(training, "data-range", circular, input_range(training, circular))
         np.testing.assert_allclose((mapped.antecedent.min(), mapped.antecedent.max()), (0, 1), atol=1e-14)
         np.testing.assert_array_equal(mapped.consequent, mapped.antecedent)
-
-
-def test_data_that_do_not_move_stay_finite():
     still = np.full(5, 0.3)
     mapped = map_input(still, "data-range", True, input_range(still, True))
     np.testing.assert_array_equal(mapped.antecedent, np.zeros(5))

@@ -25,20 +25,14 @@ def result(name, vehicle=None, **values):
     return sentence.removeprefix(CATALOGUE[name].sentence).strip()
 
 
-def test_weak_rotor_or_strong_opposite():
+def test_a_weak_rotor_or_its_strong_opposite_is_said_where_it_is_sure():
     said = result("rotor_mismatch", difference_1=(-0.05, 0.01), difference_2=(0.001, 0.01))
     assert said == "M1 pulls 5 % less than modelled, or M3 as much more."
     said = result("rotor_mismatch", difference_1=(0.05, 0.01), difference_2=(-0.12, 0.01))
     assert "M3 pulls 5 % less than modelled, or M1 as much more." in said
     assert "M2 pulls 12 % less than modelled, or M4 as much more." in said
-
-
-def test_nothing_sure_says_nothing_more():
     assert result("rotor_mismatch", difference_1=(0.01, 0.02), difference_2=(-0.01, 0.02)) == ""
     assert result("vertical_descent", f_1=(0.01, 0.02)) == ""
-
-
-def test_vehicle_without_opposite_pairs_names_the_weakest_rotor():
     angles = 2 * np.pi * np.arange(6) / 6
     hubs = [(0.3 * float(np.cos(a)), 0.3 * float(np.sin(a)), 0.0) for a in angles]
     vehicle = VehicleSettings(rotors=tuple(RotorSettings(position_m=h, spin=(-1) ** n) for n, h in enumerate(hubs)))
@@ -96,15 +90,12 @@ def test_the_chance_of_ranks_is_that_of_scipy(blocks, mean):
     assert chance_of_ranks(np.append(margin, 0.0)) == pytest.approx(expected, rel=1e-12)
 
 
-def test_equal_margins_share_their_ranks():
+def test_equal_margins_share_their_ranks_and_are_chance():
     margin = np.array([1.0, -1.0, 2.0, 2.0, 2.0, -0.5, 3.0, 1.0])
     ranks = np.array([3.0, 3.0, 6.0, 6.0, 6.0, 1.0, 8.0, 3.0]) * np.sign(margin)
     above = lambda each: each[each > 0].sum()  # noqa: E731
     exact = permutation_test((ranks,), above, permutation_type="samples", alternative="greater")
     assert chance_of_ranks(margin) == pytest.approx(exact.pvalue, rel=1e-12)
-
-
-def test_what_is_equal_is_chance():
     assert chance_of_ranks(np.zeros(4)) == 1.0
 
 
@@ -117,12 +108,9 @@ def test_formulas_are_off_by_what_is_left_above_the_floor_and_a_tenth_at_most(ex
     assert off_by(explained, left, above) == pytest.approx(off)
 
 
-def test_a_set_alone_is_certain_and_two_that_predict_alike_are_as_likely():
+def test_a_set_alone_is_certain_two_that_predict_alike_are_not_and_even_odds_multiply():
     assert (likely([]).tolist(), likely([np.zeros(12), np.zeros(12)])) == ([1.0], pytest.approx([1 / 3] * 3))
-
-
-def test_even_odds_of_blocks_multiply():
-    """Where all blocks say the same their weights do not matter: Bayes' rule remains."""
+    # Where all blocks say the same their weights do not matter: Bayes' rule remains.
     odds = np.log([1 / 4, 1 / 19])
     assert likely([np.full(12, each / 12) for each in odds]) == pytest.approx(
         [1 / 1.302632, 0.25 / 1.302632, 0.052632 / 1.302632], abs=1e-5
@@ -189,13 +177,10 @@ def drawn(size, right=0.0, rng=RNG):
     return Equations(CLEAN + met[:, :-1], CLEAN @ TRUE + met[:, -1] + 0.01 * rng.standard_normal(ROWS), noise())
 
 
-def test_without_noise_it_is_least_squares():
+def test_noise_is_taken_off_the_normal_equations_of_least_squares():
     rows = drawn(0.0)
     plain = np.linalg.lstsq(rows.columns[:, :3], rows.right, rcond=None)[0]
     assert (rows.solve(), rows.trusted) == (pytest.approx([*plain, 0.0], rel=1e-9, abs=1e-12), 1.0)
-
-
-def test_noise_is_taken_off_the_normal_equations():
     rows = drawn(0.6, right=0.4)
     noise, own = rows.noise[:, :3], rows.noise[:, -1]
     gram = rows.columns[:, :3].T @ rows.columns[:, :3] - noise.T @ noise

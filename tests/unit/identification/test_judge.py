@@ -325,15 +325,12 @@ def test_a_constant_torque_is_named_with_its_size():
     assert "hardly" not in sentences
 
 
-def test_an_axis_that_does_not_move_is_called_hardly_excited():
+def test_an_axis_that_does_not_move_is_called_hardly_excited_and_one_that_does_is_not():
     data = small_angle_flight(yaw=0.01, tilt=0.05)
     noise = 0.2 * np.random.default_rng(3).standard_normal((300, 3)) * [0, 0, 1]
     sentences = result(with_torque(data, data.torque + noise))
     assert "yaw is hardly excited: motion and a constant explain less than half" in sentences
     assert "roll is" not in sentences
-
-
-def test_torque_on_a_moving_axis_that_is_not_inertia_is_not_called_unexcited():
     data = small_angle_flight()
     wrong = data.torque.copy()
     wrong[:, 1] = np.random.default_rng(4).standard_normal(300)

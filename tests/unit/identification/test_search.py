@@ -364,16 +364,13 @@ def test_ridge_weights_must_ascend():
     assert caught.value.key == "largest"
 
 
-def test_nothing_is_identified_from_a_torque_of_zero():
+def test_nothing_is_identified_from_a_torque_of_zero_or_a_vehicle_that_never_turns():
     # It would be a body without inertia, of which no score, band or verdict makes sense.
     data = nearly_rigid_flight()
     still = TorqueData(data.time, data.motion, np.zeros_like(data.torque))
     for base in ("rigid-body", "none"):
         with pytest.raises(ComputationError, match="the torque is zero at all samples"):
             identified({**SMALL, "base": base}, still)
-
-
-def test_a_vehicle_that_never_turns_cannot_be_identified():
     zero = np.zeros((40, 3))
     still = TorqueData(0.01 * np.arange(40), Motion(zero, zero, zero), np.ones((40, 3)))
     for settings in ({**SMALL, "base": "rigid-body"}, {**SEARCHED, "base": "none"}):

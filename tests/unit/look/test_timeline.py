@@ -216,13 +216,10 @@ def test_clipping_gaps_and_the_battery():
     assert not [e for e in events(logs.betaflight(OWN)) if e.kind in ("clipping", "gap", "battery")]
 
 
-def test_a_log_that_ends_in_the_air():
+def test_a_log_that_ends_in_the_air_is_said_and_who_disarms_with_the_rotors_on_may_touch_down():
     found = events(logs.px4(OWN))
     assert [text for _, text in of(found, "end")] == ["the log ends in the air"]
     assert not of(found, "landing")
-
-
-def test_who_disarms_with_the_rotors_on_may_touch_down():
     armed = {"flightModeFlags": (OWN.time < OWN.time[-1] - 0.05).astype(float)}
     found = events(logs.betaflight(OWN, more=armed))
     assert [text for _, text in of(found, "end")] == ["disarmed as it flies or touches down"]
