@@ -29,13 +29,9 @@ UP = np.array([0.0, 0.0, 9.81])
 EAST, NORTH = np.eye(3)[:2]
 DRAG = 2e-3
 NOISE = {
-    "attitude": 0.003,
-    "body_rate": 0.005,
-    "position": 0.02,
-    "velocity": 0.05,
-    "acceleration": 0.1,
+    "attitude": 0.003, "body_rate": 0.005, "position": 0.02, "velocity": 0.05, "acceleration": 0.1,
     "rotor_speed": 1.0,
-}
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -15,14 +15,9 @@ from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_o
 
 NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.01, "acceleration": 0.1}
 LOAD = {
-    "mass": 0.6,
-    "mass_times_depth": 0.0,
-    "mass_times_right": 0.0,
-    "mass_times_behind": 0.0,
-    "length_m": 1.0,
-    "damping_1_s": 0.1,
-    "depth_m": 0.0,
-}
+    "mass": 0.6, "mass_times_depth": 0.0, "mass_times_right": 0.0, "mass_times_behind": 0.0, "length_m": 1.0,
+    "damping_1_s": 0.1, "depth_m": 0.0,
+}  # fmt: skip
 
 
 def recorded(vehicle=VEHICLE, seed=1, **closed_loop):

@@ -159,23 +159,11 @@ def test_malformed(override):
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("1e-3", 0.001),
-        ("-.5", -0.5),
-        ("1.", 1.0),
-        ("+3", 3),
-        ("0", 0),
-        ("true", True),
-        ("null", None),
-        ("~", None),
-        ("on", "on"),
-        ("yes", "yes"),
-        ("1:30", "1:30"),
-        ("0x10", "0x10"),
-        ("1_000", "1_000"),
-        ("2001-01-01", "2001-01-01"),
-        ("010", 10.0),
+        ("1e-3", 0.001), ("-.5", -0.5), ("1.", 1.0), ("+3", 3), ("0", 0), ("true", True), ("null", None), ("~", None),
+        ("on", "on"), ("yes", "yes"), ("1:30", "1:30"), ("0x10", "0x10"), ("1_000", "1_000"),
+        ("2001-01-01", "2001-01-01"), ("010", 10.0),
     ],
-)
+)  # fmt: skip
 def test_scalars(text, value):
     parsed = parse_yaml(text, "file")
     assert parsed == value
@@ -244,22 +232,11 @@ TABLE = METHOD.read_text(encoding="utf-8").partition("| key of `identification` 
 PAGE = {key: {"paper": paper, "fast": fast} for key, paper, fast in ROW.findall(TABLE)}
 # A value of each key that is neither the paper's nor the default.
 OTHER = {
-    "population": 44,
-    "generations": 7,
-    "subpopulations": 2,
-    "migration_rate": 0.11,
-    "migration_interval": 3,
-    "generation_gap": 0.5,
-    "crossover_rate": 0.6,
-    "insertion_rate": 0.4,
-    "selective_pressure": 1.2,
-    "mutated_individuals": 0.3,
-    "mutated_bits": 0.02,
-    "ranking": "pareto-count",
-    "first_objective_weight": 4,
-    "reinsertion": "fitness",
-    "stall_generations": 9,
-}
+    "population": 44, "generations": 7, "subpopulations": 2, "migration_rate": 0.11, "migration_interval": 3,
+    "generation_gap": 0.5, "crossover_rate": 0.6, "insertion_rate": 0.4, "selective_pressure": 1.2,
+    "mutated_individuals": 0.3, "mutated_bits": 0.02, "ranking": "pareto-count", "first_objective_weight": 4,
+    "reinsertion": "fitness", "stall_generations": 9,
+}  # fmt: skip
 
 
 def identification(**keys):

@@ -257,13 +257,8 @@ def test_rotors_that_one_stretch_shows_clearly_are_said_of_all(flight):
 
 
 CONTRADICTED = {
-    "velocity in km/h",
-    "velocity down",
-    "world down",
-    "rotors in another order",
-    "hanging",
-    "speeds in rpm",
-}
+    "velocity in km/h", "velocity down", "world down", "rotors in another order", "hanging", "speeds in rpm",
+}  # fmt: skip
 ONLY_TOLD = {"twice the mass", "gyroscope late"}
 
 

@@ -238,19 +238,13 @@ def sphere(genes):
 @pytest.mark.parametrize(
     ("best", "expected"),
     [
-        ([[8, 4], [8, 4], [8, 4]], True),
-        ([[8, 4], [7.3, 4], [7.2, 4]], True),
-        ([[8, 4], [7.3, 4], [7.1, 4]], False),
-        ([[8, 4], [8, 3.9], [8, 3.5]], False),
-        ([[9, 4], [8, 4], [8, 4], [8, 4]], True),
-        ([[8, 4], [8, 4]], False),
-        ([[np.inf, 4], [np.inf, 4], [8, 4]], False),
-        ([[np.inf, 4], [np.inf, 4], [np.inf, 4]], True),
-        ([[-8, 4], [-8, 4], [-8.9, 4]], False),
-        ([[-8, 4], [-8, 4], [-8.7, 4]], True),
+        ([[8, 4], [8, 4], [8, 4]], True), ([[8, 4], [7.3, 4], [7.2, 4]], True), ([[8, 4], [7.3, 4], [7.1, 4]], False),
+        ([[8, 4], [8, 3.9], [8, 3.5]], False), ([[9, 4], [8, 4], [8, 4], [8, 4]], True), ([[8, 4], [8, 4]], False),
+        ([[np.inf, 4], [np.inf, 4], [8, 4]], False), ([[np.inf, 4], [np.inf, 4], [np.inf, 4]], True),
+        ([[-8, 4], [-8, 4], [-8.9, 4]], False), ([[-8, 4], [-8, 4], [-8.7, 4]], True),
         ([[0, 0], [0, 0], [0, 0]], True),
     ],
-)
+)  # fmt: skip
 def test_stalled_looks_back_two_generations_for_ten_per_cent(best, expected):
     assert stalled(course(*best), 2, 0.1) is expected
 

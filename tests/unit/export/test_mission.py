@@ -145,13 +145,9 @@ def parameters(text):
 
 # Of ArduPilot's documentation: least, most.
 RANGES = {
-    "SID_AXIS": (0, 19),
-    "SID_F_START_HZ": (0.01, 100),
-    "SID_F_STOP_HZ": (0.01, 100),
-    "SID_T_FADE_IN": (0, 20),
-    "SID_T_REC": (0, 255),
-    "SID_T_FADE_OUT": (0, 5),
-}
+    "SID_AXIS": (0, 19), "SID_F_START_HZ": (0.01, 100), "SID_F_STOP_HZ": (0.01, 100), "SID_T_FADE_IN": (0, 20),
+    "SID_T_REC": (0, 255), "SID_T_FADE_OUT": (0, 5),
+}  # fmt: skip
 
 
 def chirp_of(given, time):

@@ -150,24 +150,13 @@ def refused(raised, after, monkeypatch, beyond=None):
         ({}, 2.4, None),
     ],
     ids=[
-        "small beside a formula that fits",
-        "small beside one that is off",
-        "hardly to be seen beside a large one",
-        "to be seen beside a large one",
-        "hardly to be seen beside one that is not much larger",
-        "not so small",
-        "needless",
-        "small in a channel of its own",
-        "of second order in a channel of its own",
-        "not so small in a channel of its own",
-        "needless alone",
-        "needed",
-        "what is noise without it",
-        "what just is not",
-        "harmful",
-        "nothing named",
+        "small beside a formula that fits", "small beside one that is off", "hardly to be seen beside a large one",
+        "to be seen beside a large one", "hardly to be seen beside one that is not much larger", "not so small",
+        "needless", "small in a channel of its own", "of second order in a channel of its own",
+        "not so small in a channel of its own", "needless alone", "needed", "what is noise without it",
+        "what just is not", "harmful", "nothing named",
     ],
-)
+)  # fmt: skip
 def test_names_stand_that_the_unseen_flights_need(raised, after, name, monkeypatch):
     found = refused(raised, after, monkeypatch)
     assert (found.name if found else None) == name

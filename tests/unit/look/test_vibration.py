@@ -81,14 +81,9 @@ def test_slow_logs_show_no_vibration():
 
 
 PX4 = {
-    "MC_ROLLRATE_P": 0.15,
-    "MC_ROLLRATE_D": 0.003,
-    "IMU_GYRO_CUTOFF": 40.0,
-    "IMU_GYRO_NF0_FRQ": 120.0,
-    "IMU_GYRO_NF0_BW": 20.0,
-    "IMU_DGYRO_CUTOFF": 30.0,
-    "IMU_GYRO_RATEMAX": 800.0,
-}
+    "MC_ROLLRATE_P": 0.15, "MC_ROLLRATE_D": 0.003, "IMU_GYRO_CUTOFF": 40.0, "IMU_GYRO_NF0_FRQ": 120.0,
+    "IMU_GYRO_NF0_BW": 20.0, "IMU_DGYRO_CUTOFF": 30.0, "IMU_GYRO_RATEMAX": 800.0,
+}  # fmt: skip
 
 
 def test_filters_are_listed_with_what_they_cost():

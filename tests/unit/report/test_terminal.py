@@ -267,16 +267,10 @@ def test_each_has_a_figure_and_tables(name):
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (0.0, "0"),
-        (5153.338, "5153"),
-        (0.0123456, "0.01235"),
-        (-0.5, "−0.5000"),
-        (6.3e-9, "6.300 × 10⁻⁹"),
-        (9.9999e5, "1.000 × 10⁶"),
-        (math.inf, "∞"),
-        (math.nan, "—"),
+        (0.0, "0"), (5153.338, "5153"), (0.0123456, "0.01235"), (-0.5, "−0.5000"), (6.3e-9, "6.300 × 10⁻⁹"),
+        (9.9999e5, "1.000 × 10⁶"), (math.inf, "∞"), (math.nan, "—"),
     ],
-)
+)  # fmt: skip
 def test_a_number_keeps_its_significant_digits(value, text):
     assert number(value) == text
 
