@@ -368,8 +368,7 @@ def setting(structure="cpfls", samples=685, population=500, generations=200):
 
 def test_the_papers_own_settings_find_their_columns():
     own = [setting(c.structure, c.samples, c.population, c.generations) for c in TABLE_5]
-    assert printed_beside(own) == list(TABLE_5)
-    assert printed_beside(own[::-1]) == list(TABLE_5)[::-1]
+    assert (printed_beside(own), printed_beside(own[::-1])) == (list(TABLE_5), list(TABLE_5)[::-1])
 
 
 def test_smaller_searches_take_the_columns_in_order_but_leave_exact_ones():
@@ -385,17 +384,13 @@ def test_other_settings_have_none():
 
 def test_mean_and_variance():
     found = spread(np.array(VALUES))
-    assert found.count == len(VALUES)
-    assert found.mean == pytest.approx(statistics.mean(VALUES))
+    assert (found.count, found.mean) == (len(VALUES), pytest.approx(statistics.mean(VALUES)))
     assert found.variance == pytest.approx(statistics.variance(VALUES))
     assert found.standard_deviation == pytest.approx(statistics.stdev(VALUES))
 
 
-def test_what_is_not_known_does_not_count():
+def test_what_is_not_known_does_not_count_and_too_few_have_no_spread():
     assert plain(spread(np.array([*VALUES, np.nan, np.inf]))) == plain(spread(np.array(VALUES)))
-
-
-def test_too_few():
     one, none = spread(np.array([3.0])), spread(np.array([]))
     assert (one.count, one.mean) == (1, 3.0)
     assert np.isnan([one.variance, one.standard_deviation, none.mean, none.variance]).all()

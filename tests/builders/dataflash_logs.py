@@ -35,15 +35,8 @@ def line(name, letters, values):
 def dataflash(kinds, rows, parameters=None, said=(), units=None, *, text=False):
     """Write a log, in bytes or as text.
 
-    Parameters
-    ----------
-    kinds : dict from name to (letters, columns)
-        Columns as one text, separated by commas.
-    rows : sequence of (name, values)
-    parameters : dict from str to float, optional
-    said : sequence of str
-        Messages to the pilot.
-    units : dict from name to (unit letters, factor letters), optional
+    By name `kinds` are letters and columns as one text, and `units` letters of units and of factors; `said` are
+    messages to the pilot.
     """
     kinds = {
         "PARM": ("QNf", "TimeUS,Name,Value"),

@@ -284,24 +284,15 @@ def executed(text: str) -> dict[str, Any]:
 
 
 class Flying(NamedTuple):
-    """How a target is flown.
+    """How a target is flown."""
 
-    Attributes
-    ----------
-    fly : callable
-        States at the samples behind each start, shape (run, horizon, ...).
-    package : str
-        That flies it; empty where this program does.
-    step_s : float
-        Longest step that it is flown with; infinite where it takes the flight's own.
-    levels : int
-        Flights, each with half the step of the one before, that a step of no length follows from; 0 for a target that
-        takes the very steps of a playback.
-    """
-
+    # States at the samples behind each start, shape (run, horizon, ...).
     fly: Callable[[str, Course], State]
+    # What flies it; empty where this program does.
     package: str = ""
+    # The longest step that it is flown with; infinite where it takes the flight's own.
     step_s: float = np.inf
+    # Flights, each with half the step of the one before, that a step of no length follows from; 0 takes the very steps.
     levels: int = 4
 
 

@@ -15,17 +15,8 @@ NAMES = ("stdin", "stdout", "stderr")
 class Forked:
     """A command with streams, signals and an exit code of its own.
 
-    Parameters
-    ----------
-    words : sequence
-        Of the command, without the program.
-    stdout, stderr : Path, int or None
-        A file or a descriptor to print to; None closes the stream, as a caller may.
-    stdin : int or None
-    patch : callable
-        Called in the copy before the program.
-    environment : mapping
-        On top of this process's.
+    Its streams are files or descriptors; None closes one, as a caller may. `patch` is called in the copy before the
+    program, and its environment comes on top of this process's.
     """
 
     def __init__(self, words, stdout, stderr, *, stdin=0, patch=lambda: None, environment=None):

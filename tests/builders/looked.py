@@ -31,25 +31,26 @@ def looked_plant(gain, delay, lag, spread=NARROW, axis="roll", seed=1):
     return SimpleNamespace(axis=axis, identified=True, reason="", parameters=found, draws=draws, band_hz=band)
 
 
+def log_of_nothing(time, rate_hz, **given):
+    """A flight of a log that holds nothing but its clock, and what is given."""
+    three, one, every = np.full((len(time), 3), np.nan), np.full(len(time), np.nan), np.ones(len(time), dtype=bool)
+    names = ("body_rate", "command", "rate_setpoint", "stick", "attitude_setpoint", "attitude", "specific_force")
+    known = dict.fromkeys(names, three) | {"rotors": Samples(np.zeros(0), np.zeros((0, 4)))}
+    known |= dict.fromkeys(("collective", "voltage", "current", "height", "climb_rate"), one)
+    known |= {"flown": every, "usable": every, "gaps_s": np.zeros((0, 2))}
+    return LogFlight(**known | {"time": time, "rate_hz": rate_hz} | given)
+
+
 def looked_flight(autopilot, values=None, system=None, *, noise=0.02, attitude=False):
     """A log with the parameters of an autopilot, in which nothing but noise of the gyroscope is there."""
-    count = 4000
-    nothing, one, every = np.full((count, 3), np.nan), np.full(count, np.nan), np.ones(count, dtype=bool)
-    time = np.arange(count) / 500
-    rates = noise * np.random.default_rng(0).standard_normal((count, 3))
-    return LogFlight(
+    time, random = np.arange(4000) / 500, np.random.default_rng(0)
+    return log_of_nothing(
+        time,
+        500.0,
         name="log",
         autopilot=autopilot,
         system=SYSTEMS[autopilot] if system is None else system,
         parameters=AUTOPILOTS[autopilot].defaults() | (values or {}),
-        rate_hz=500.0,
-        time=time,
-        **dict.fromkeys(("body_rate", "command", "rate_setpoint", "stick", "attitude", "specific_force"), nothing),
-        attitude_setpoint=np.zeros((count, 3)) if attitude else nothing,
-        **dict.fromkeys(("collective", "voltage", "current", "height", "climb_rate"), one),
-        flown=every,
-        usable=every,
-        rotors=Samples(np.zeros(0), np.zeros((0, 4))),
-        gyroscope=Samples(time, rates),
-        gaps_s=np.zeros((0, 2)),
+        gyroscope=Samples(time, noise * random.standard_normal((4000, 3))),
+        **({"attitude_setpoint": np.zeros((4000, 3))} if attitude else {}),
     )

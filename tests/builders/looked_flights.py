@@ -9,6 +9,7 @@ import numpy as np
 from cpfls_cli.autopilots.law import Controller
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.flight import LogFlight, Samples
+from tests.builders.looked import log_of_nothing
 
 RATE_HZ = 500.0
 
@@ -64,36 +65,15 @@ def controller_filters():
 
 def logged(kept, stick) -> LogFlight:
     """Lay columns of rate, command, setpoint and angle about roll into a flight whose other axes are silent."""
-    time = np.arange(len(kept)) / RATE_HZ
-    nothing, one = np.full((len(time), 3), np.nan), np.full(len(time), np.nan)
+    time, one = np.arange(len(kept)) / RATE_HZ, np.full(len(kept), np.nan)
 
     def roll(values):
         return np.stack([values, one, one], axis=1)
 
-    return LogFlight(
-        name="flown",
-        autopilot="crazyflie",
-        parameters=dict(PARAMETERS),
-        rate_hz=RATE_HZ,
-        time=time,
-        body_rate=roll(kept[:, 0]),
-        command=roll(kept[:, 1]),
-        rate_setpoint=roll(kept[:, 2]),
-        stick=roll(stick),
-        attitude_setpoint=nothing,
-        attitude=roll(kept[:, 3]),
-        collective=one,
-        voltage=one,
-        current=one,
-        height=one,
-        climb_rate=one,
-        specific_force=nothing,
-        flown=np.ones(len(time), dtype=bool),
-        usable=np.ones(len(time), dtype=bool),
-        rotors=Samples(np.zeros(0), np.zeros((0, 4))),
-        gyroscope=Samples(time, roll(kept[:, 0])),
-        gaps_s=np.zeros((0, 2)),
-    )
+    names = ("body_rate", "command", "rate_setpoint", "attitude")
+    signals = {name: roll(column) for name, column in zip(names, kept.T, strict=True)} | {"stick": roll(stick)}
+    origin = {"name": "flown", "autopilot": "crazyflie", "parameters": dict(PARAMETERS)}
+    return log_of_nothing(time, RATE_HZ, **origin, **signals, gyroscope=Samples(time, roll(kept[:, 0])))
 
 
 def without_sticks(flight: LogFlight) -> LogFlight:

@@ -29,17 +29,7 @@ def rates(stamp_us, xyz):
 
 
 def write_bag(folder, kind, sent):
-    """Write a bag of the kind ``.db3`` or ``.mcap``.
-
-    Parameters
-    ----------
-    sent : sequence of (topic, when received in ns, message)
-
-    Returns
-    -------
-    Path
-        Of its file.
-    """
+    """Write a bag of the kind ``.db3`` or ``.mcap`` of topics, when received in ns, and messages; give its file."""
     plugin = {".db3": StoragePlugin.SQLITE3, ".mcap": StoragePlugin.MCAP}[kind]
     with Writer(folder, version=9, storage_plugin=plugin) as writer:
         connections = {}

@@ -15,13 +15,7 @@ def event(number, name, variables):
 
 
 def usd(events, samples, version=2, whole=True):
-    """Write a log.
-
-    Parameters
-    ----------
-    events : dict from name to dict from variable to letter
-    samples : sequence of (name of event, stamp, values)
-    """
+    """Write a log of events, variables and their letters by name, from samples: name of event, stamp, values."""
     numbers = {name: 7 + place for place, name in enumerate(events)}
     content = b"\xbc" + struct.pack("<HH", version, len(events))
     content += b"".join(event(numbers[name], name, variables) for name, variables in events.items())

@@ -163,24 +163,6 @@ def test_flight_of_wrong_content(refuse, changed, study, tmp_path, path, value, 
     assert refuse("identify", study, flight, "-o", tmp_path / "out.h5", *dry_run) == [f"{flight}: {message}"]
 
 
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        ("weights", np.zeros((3, 1))),
-        ("model/fuzzy/coefficients", np.zeros(5)),
-        ("model/fuzzy/coefficients", np.full(113, np.nan)),
-        ("model/fuzzy/rigid_body", np.zeros(2)),
-        ("model/fuzzy/ranges/maximum", np.zeros(3)),
-        ("model/fuzzy/visited", np.zeros((2, 3))),
-        ("base", 3),
-    ],
-)
-def test_model_of_wrong_content(refuse, changed, pipeline, study, tmp_path, path, value):
-    model = changed("model", put(path, value))
-    lines = refuse("replay", study, model, pipeline.flight, "-o", tmp_path / "out.h5")
-    assert all(line.startswith(f"{model}: ") for line in lines)
-
-
 def test_model_whose_numbers_do_not_fit_its_structure(refuse, changed, pipeline, study, tmp_path):
     def shorten(file):
         values = file["model/fuzzy/coefficients"][:-1]

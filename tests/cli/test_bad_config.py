@@ -179,8 +179,6 @@ def test_missing_config_and_folder_as_config(refuse, tmp_path):
     ("override", "message"),
     [
         ("vehicle", "--set vehicle: write section.key=value"),
-        ("=3", "--set =3: write section.key=value"),
-        ("vehicle..mass_kg=3", "--set vehicle..mass_kg=3: write section.key=value"),
         ("vehicle.mass=3", "FILE: vehicle.mass = 3: unknown key (did you mean 'mass_kg'?)"),
         ("vehicle.mass_kg=x", 'FILE: vehicle.mass_kg = "x": must be a number'),
         ("vehicle.mass_kg=[", "--set vehicle.mass_kg:1:2: not valid YAML: "),
@@ -255,8 +253,7 @@ def test_section(cpfls, study, section):
 def test_single_key_and_several_sections(cpfls, study):
     words = ("config", study, "--section", "vehicle.mass_kg", "--section", "reduction", "--json")
     printed = json.loads(cpfls(*words).stdout)
-    assert printed["vehicle"] == {"mass_kg": 6.0}
-    assert set(printed) == {"seed", "vehicle", "reduction"}
+    assert (printed["vehicle"], set(printed)) == ({"mass_kg": 6.0}, {"seed", "vehicle", "reduction"})
 
 
 def test_unknown_section(refuse, study):

@@ -277,13 +277,6 @@ def test_what_is_null_is_a_guess_that_is_named(unknown):
     assert all(moment > 0 for moment in vehicle.inertia_kg_m2)
 
 
-@pytest.mark.parametrize("command", ["identify", "gap", "diagnose"])
-def test_other_commands_refuse_a_guess(refuse, unknown, flights, open_folder, command):
-    (message,) = refuse(command, unknown, flights["flight"], "-o", open_folder / "x.h5")
-    assert "vehicle.inertia_kg_m2" in message
-    assert "--model VEHICLE.h5 takes the numbers that `cpfls vehicle` found, --accept-guesses those" in message
-
-
 def test_a_torque_of_unknown_rotors_is_refused(refuse, open_folder):
     def change(data):
         open_constants(data)

@@ -119,16 +119,9 @@ def test_hostile_text_in_a_model_stays_text(cpfls, model, tmp_path, form):
         assert done.returncode == 0, done.stderr
 
 
-def test_not_a_good_model(refuse, pipeline, study, tmp_path):
-    words = ("--format", "json", "-o", tmp_path / "m.json")
-    (line,) = refuse("export", pipeline.flight, *words)
-    assert line == (
-        f"{pipeline.flight}: is a cpfls/flight; this command needs a model (made by `cpfls identify`, "
-        "`cpfls extend`, `cpfls gap` or `cpfls vehicle`)"
-    )
-    (line,) = refuse("export", study, *words)
+def test_a_config_is_no_model(refuse, study, tmp_path):
+    (line,) = refuse("export", study, "--format", "json", "-o", tmp_path / "m.json")
     assert line == f"{study}: is a config, and this takes what cpfls made; `cpfls config {study}` shows it"
-    assert refuse("export", tmp_path / "none.h5", *words) == [f"{tmp_path / 'none.h5'}: no such file"]
 
 
 @pytest.mark.parametrize(

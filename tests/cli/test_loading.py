@@ -62,15 +62,9 @@ def of_gap(names):
     return [name for name in names if name.startswith("cpfls_cli.gap.") and name != "cpfls_cli.gap.settings"]
 
 
-def test_the_version_and_the_help_load_nothing_heavy(after):
+def test_each_group_of_commands_loads_no_more_than_it_needs(after):
     assert HEAVY & after["nothing"] == set()
-
-
-def test_what_only_reads_loads_neither_compiled_loops_nor_scipy(after):
     assert HEAVY & after["reading"] == {"h5py", "jinja2", "numpy", "pydantic", "yaml"}
-
-
-def test_what_is_printed_loads_no_plotting(after):
     assert "matplotlib" not in after["all"]
 
 
@@ -89,22 +83,13 @@ def imported():
     return dict(zip(codes, loading([*codes.values()]), strict=True))
 
 
-def test_the_python_interface_loads_nothing_heavy_before_it_is_used(imported):
+def test_imports_load_no_more_than_is_worked_with(imported):
     assert (HEAVY | {"typer", "rich"}) & imported["the package"] == set()
-
-
-def test_what_plans_and_flies_loads_nothing_that_reads_models(imported):
-    """It takes half the start of both, and only a model that is given needs it."""
+    # It takes half the start of both, and only a model that is given needs it.
     models = {"cpfls_cli.artifacts.vehicle_model", "cpfls_cli.flights.models", "cpfls_cli.playback.model"}
     assert (models | {"scipy"}) & imported["flying"] == set()
-
-
-def test_a_search_loads_nothing_of_scipy_that_only_logs_need(imported):
-    """Splines take a fifth of the start of a command, and no flight of `cpfls import` needs them again."""
+    # Splines take a fifth of the start of a command, and no flight of `cpfls import` needs them again.
     assert {"scipy.interpolate", "scipy.optimize", "scipy.spatial"} & imported["searches"] == set()
-
-
-def test_a_report_loads_no_compiled_loops(imported):
     assert "numba" not in imported["report"]
 
 

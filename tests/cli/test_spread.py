@@ -28,8 +28,7 @@ def test_all_forms_hold_the_same(cpfls, vehicle):
     files = {ending: written(cpfls, vehicle, ending)[1] for ending in ("json", "yaml", "npz")}
     document = json.loads(files["json"].read_text())
     assert document == yaml.safe_load(files["yaml"].read_text())
-    assert document["not_determined"] == ["inertia.Izz"]
-    assert document["verdict"] == "not-determined"
+    assert (document["not_determined"], document["verdict"]) == (["inertia.Izz"], "not-determined")
     assert document["ranges"]["inertia.Izz"]["determined"] is False
     assert document["ranges"]["gust.roll_size"]["unit"] == "N m"
     assert document["drawn"] == COUNT + sum(document["rejected"].values())
@@ -39,8 +38,7 @@ def test_all_forms_hold_the_same(cpfls, vehicle):
             assert len(values) == COUNT
             assert name in document["units"]
         assert arrays["inertia_kg_m2"].shape == (COUNT, 3, 3)
-        assert arrays["thrust_factor_n_s2"].shape == (COUNT, 4)
-        assert arrays["parameters"].shape[0] == COUNT
+        assert (arrays["thrust_factor_n_s2"].shape, arrays["parameters"].shape[0]) == ((COUNT, 4), COUNT)
         assert np.array_equal(arrays["parameters"][:, 0], arrays["mass_kg"])
         assert np.array_equal(arrays["parameters"][:, -1], arrays["delay_s"])
         assert json.loads(str(arrays["facts"]))["cautions"] == document["cautions"]
@@ -67,8 +65,7 @@ def test_the_first_screen(cpfls, vehicle):
     assert "draws, because no vehicle has such numbers: " in lines[2]
     assert "Not determined, because the flights say too little about it: Izz." in result.stderr
     summary = json.loads(written(cpfls, vehicle, "yaml", "--json")[0].stdout)
-    assert summary["vehicles"] == COUNT
-    assert summary["ranges"]["lag.time_constant_s"]["value"] == 0.035
+    assert (summary["vehicles"], summary["ranges"]["lag.time_constant_s"]["value"]) == (COUNT, 0.035)
 
 
 def test_a_model_that_lacks_an_effect_is_said_to_spread_too_little(cpfls, vehicle, monkeypatch):

@@ -38,10 +38,6 @@ def test_printed_chromosome_decodes_to_the_printed_breakpoints(decoded):
     np.testing.assert_allclose(decoded["D13(pitch)"][1], 0.024633, rtol=0, atol=0.1 * LAST_DIGIT)
 
 
-def test_every_partition_reaches_from_0_to_1(decoded):
-    assert {(b[0], b[-1], len(b)) for b in decoded.values()} == {(0.0, 1.0, 5)}
-
-
 WEIGHTS = np.array([3157.0, 31387, 59087, 34526]), np.array([61856.0, 23999, 31983, 5100])
 TRIPLETS = np.random.default_rng(4).standard_normal((17, 3))
 """Consequents c_1 to c_16 = (c_0, c_1, c_2); row 0 is not used."""

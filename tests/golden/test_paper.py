@@ -32,8 +32,7 @@ def paper_path(request):
 
 def test_size_is_the_papers(paper_path):
     # Table 4: 5487 points at dt = 0.01 s.
-    assert len(paper_path[0].time) == 5487
-    assert paper_path[0].time[-1] == pytest.approx(54.86, abs=1e-12)
+    assert (len(paper_path[0].time), paper_path[0].time[-1]) == (5487, pytest.approx(54.86, abs=1e-12))
 
 
 def test_maxima_are_the_papers(paper_path):

@@ -21,12 +21,6 @@ def test_decoding_undoes_encoding(data, bits_per_gene):
     np.testing.assert_array_equal(gray_decode(bits, bits_per_gene), genes)
 
 
-@given(st.data(), st.integers(1, 20))
-def test_encoding_undoes_decoding(data, bits_per_gene):
-    bits = data.draw(arrays(np.bool_, (3, 2 * bits_per_gene)))
-    np.testing.assert_array_equal(gray_encode(gray_decode(bits, bits_per_gene), bits_per_gene), bits)
-
-
 @given(RANKS, st.floats(1, 2))
 def test_fitness_has_mean_one_stays_in_bounds_and_follows_the_ranks(ranks, pressure):
     fitness = linear_ranking_fitness(ranks, pressure)

@@ -95,19 +95,7 @@ def test_torque_shares_are_those_of_newton_and_euler(seed):
 
 
 def integrated(profile: BaseProfile) -> tuple[Array, Array]:
-    """Integrate the pop from rest, at the quarters of every wave and hold.
-
-    Parameters
-    ----------
-    profile : BaseProfile
-        With a period greater than zero.
-
-    Returns
-    -------
-    times : array, shape (time,), s
-    states : array, shape (time, 7), m and s
-        Displacement to pop; the last row is the end.
-    """
+    """Integrate the pop from rest, at the quarters of every wave and hold: times, and displacement to pop by time."""
     with localcontext(prec=60):
         amplitude = _amplitude(profile)
         start, state, times, states = Decimal(0), [Decimal(0)] * 7, [], []
@@ -212,14 +200,11 @@ def peaks_upward(batch):
     return np.vstack([peaks[:, smooth], pop]), smooth
 
 
-def test_a_move_is_found_wherever_anything_limits_it(batch):
+def test_a_move_is_found_wherever_anything_limits_it_and_nothing_is_not_a_number(batch):
     limited = np.isfinite(batch.limits).any(axis=0) | (batch.period is not None)
     expected = np.where(limited, MoveOutcome.SOLVED, MoveOutcome.NO_LIMIT)
     np.testing.assert_array_equal(batch.moves.outcome, expected)
     assert np.isfinite(batch.moves.duration[limited]).all()
-
-
-def test_nothing_is_not_a_number(batch):
     for values in (batch.moves.duration, batch.moves.peaks, batch.moves.holds, batch.moves.period):
         assert not np.isnan(values).any()
 

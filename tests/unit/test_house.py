@@ -30,14 +30,11 @@ def body_lines(function):
     return function.end_lineno - start.lineno + 1
 
 
-def test_functions_are_short():
+def test_functions_are_short_and_classes_of_one_thought():
     lengths = {f"{path}:{f.name}": body_lines(f) for path in MODULES for f in functions(path)}
     assert {name: length for name, length in lengths.items() if length > LONGEST} == {}
     assert median(lengths.values()) <= 25
-
-
-def test_classes_are_of_one_thought():
-    """With their docstrings, which grow with the attributes: a class that is longer does several things."""
+    # With their docstrings, which grow with the attributes: a class that is longer does several things.
     classes = [(path, node) for path in MODULES for node in nodes(path) if isinstance(node, ast.ClassDef)]
     lengths = {f"{path}:{node.name}": node.end_lineno - node.lineno + 1 for path, node in classes}
     assert {name: length for name, length in lengths.items() if length > LONGEST_CLASS} == {}

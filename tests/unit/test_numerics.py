@@ -58,11 +58,8 @@ def test_a_value_converts_to_si(value, unit, expected):
     assert to_si(np.array([value]), unit)[0] == pytest.approx(expected, rel=1e-12)
 
 
-def test_the_table_holds_exactly_the_names_that_a_config_may_use():
+def test_units_are_those_of_a_config_and_another_is_refused_with_the_nearest_names():
     assert set(KNOWN_UNITS) == set(get_args(UnitName))
-
-
-def test_an_unknown_unit_is_refused_with_the_nearest_names():
     with pytest.raises(InputError, match=r"'degs'.*did you mean 'deg/s' or 'deg'"):
         to_si(np.zeros(1), "degs")
 
@@ -125,12 +122,9 @@ def test_a_step_is_the_minimum_of_the_damped_model_between_the_bounds(seed, damp
     np.testing.assert_allclose((gradient + damped.T @ damped @ found)[free], 0.0, atol=1e-9)
 
 
-def test_numbers_that_move_nothing_stay():
+def test_numbers_that_move_nothing_or_are_on_their_bound_stay():
     found = damped_step(np.diag([0.0, 2.0]), np.array([0.0, 0.1]), 1e-9, -np.ones(2), np.ones(2))
     np.testing.assert_allclose(found, [0.0, -0.05])
-
-
-def test_a_number_on_its_bound_stays_there_and_the_others_move_as_without_it():
     hessian, gradient = np.array([[2.0, 0.5], [0.5, 1.0]]), np.array([-1.0, -1.0])
     found = damped_step(hessian, gradient, 0.0, np.full(2, -5.0), np.array([0.0, 5.0]))
     np.testing.assert_allclose(found, [0.0, 1.0])

@@ -62,8 +62,7 @@ def test_no_data_is_taken_for_markdown_or_html(tmp_path):
     text = worded(tmp_path, "# {{ r }}\n{{ r }}\n\n- {{ r }}\n\n{{ table(('Name', r), [(r, 1.0)]) }}\n", HOSTILE)
     plain = "a_b__c*d* `e` [f](javascript:x) <script>alert(1)</script> | {good} \\u202egpj\\x1b[2J # g"
     said = page.blocks(text)
-    assert said[:3] == [Heading(plain), Text(plain), Text(f"- {plain}")]
-    assert said[3].header == ["Name", plain]
+    assert (said[:3], said[3].header) == ([Heading(plain), Text(plain), Text(f"- {plain}")], ["Name", plain])
     assert [each.text for each in said[3].rows[0]] == [plain, "1.000"]
     shown = page.html(HOSTILE, text, {})
     assert "<script" not in shown
@@ -190,8 +189,7 @@ def test_a_terminal_shows_the_answer_and_names_what_is_folded():
     assert isinstance(said[5], Table)
     assert (said[5].rows[0][1].tone, said[5].words, said[5].sentences) == ("good", {0, 2}, {2})
     assert said[6] == Folded("More of it", [Text("Inside."), Text("a note inside", "warning")])
-    assert said[7] == Folded("Opened", [Text("Shown.")], shown=True)
-    assert said[-1] == Text("a note", "warning")
+    assert (said[7], said[-1]) == (Folded("Opened", [Text("Shown.")], shown=True), Text("a note", "warning"))
     assert not any(isinstance(each, Heading) and each.text in {"Health", "Empty"} for each in said)
 
 
@@ -235,8 +233,7 @@ def test_a_page_is_whole_and_needs_nothing_else():
     assert ("th", {"style": "text-align:left", "scope": "row"}) in parsed.tags
     assert ("td", {"style": "text-align:right", "class": "good", "data-title": "Works"}) in parsed.tags
     assert ("th", {"style": "text-align:right", "scope": "col"}) in parsed.tags
-    assert tags.count("th") == 4
-    assert tags.count("td") == 2
+    assert (tags.count("th"), tags.count("td")) == (4, 2)
     assert ("div", {"class": "table prose", "tabindex": "0"}) in parsed.tags
     assert "<figcaption>Shares of <em>thrust</em></figcaption>" in shown
     assert "<details><summary>More of it</summary><p>Inside.</p>" in shown

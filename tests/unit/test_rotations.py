@@ -27,13 +27,10 @@ def states(count=100):
     return attitude, rng.standard_normal((count, 3)), rng.standard_normal((count, 3))
 
 
-def test_rotation_matrix_is_scipys_intrinsic_zyx():
+def test_angles_and_matrices_are_those_of_scipy_and_come_back():
     attitude, _, _ = states()
     expected = Rotation.from_euler("ZYX", attitude[:, ::-1]).as_matrix()
     np.testing.assert_allclose(rotations.rotation_matrix(attitude), expected, atol=1e-14)
-
-
-def test_angles_come_back_from_matrices():
     attitude, _, _ = states()
     np.testing.assert_allclose(rotations.euler_angles(rotations.rotation_matrix(attitude)), attitude, atol=1e-12)
 
@@ -71,13 +68,10 @@ def test_body_acceleration_is_the_derivative_of_the_body_rate():
     np.testing.assert_allclose(rotations.body_acceleration(attitude, rate, acceleration), expected, atol=1e-8)
 
 
-def test_body_torque_inverts_generalised_torque():
+def test_torques_of_body_and_coordinates_are_inverse_and_do_the_same_work():
     attitude, torque, _ = states()
     back = rotations.body_torque(attitude, rotations.generalised_torque(attitude, torque))
     np.testing.assert_allclose(back, torque, rtol=1e-12, atol=1e-12)
-
-
-def test_both_torques_do_the_same_work():
     attitude, rate, body_torque = states()
     generalised = rotations.generalised_torque(attitude, body_torque)
     power = np.sum(rotations.body_rate(attitude, rate) * body_torque, axis=1)
@@ -102,20 +96,11 @@ def vectors(seed, count=50):
     return np.random.default_rng(seed).normal(size=(count, 3))
 
 
-def test_six_parameters_fill_the_matrix():
+def test_parameters_fill_the_matrix_and_columns_times_them_are_its_product():
     np.testing.assert_array_equal(symmetric(PARAMETERS), MATRIX)
-
-
-def test_three_parameters_fill_the_diagonal():
     np.testing.assert_array_equal(symmetric((1.0, 2.0, 3.0)), np.diag([1.0, 2.0, 3.0]))
-
-
-def test_names_say_the_places():
     axes = "xyz"
     assert tuple(f"I{axes[row]}{axes[column]}" for row, column in INERTIA_ENTRIES) == INERTIA_PARAMETERS
-
-
-def test_columns_times_parameters_are_the_matrix_times_the_vectors():
     v = vectors(1)
     np.testing.assert_allclose(symmetric_columns(v) @ PARAMETERS, v @ MATRIX, atol=1e-14)
 

@@ -46,8 +46,7 @@ def test_thinned_signals_keep_each_peak_and_each_gap(most):
     time, kept = thinned(np.arange(2000.0), values, most)
     assert len(time) == len(kept) <= max(most, 2000 if most > 2000 else 0)
     assert (np.diff(time) >= 0).all()
-    assert np.nanmax(kept[:, 0]) == 50.0
-    assert np.nanmin(kept[:, 1]) == -50.0
+    assert (np.nanmax(kept[:, 0]), np.nanmin(kept[:, 1])) == (50.0, -50.0)
     assert np.isnan(kept).any()
     at = int(np.nanargmax(kept[:, 0]))
     assert abs(time[at] - 777) <= 2 * 2000 / min(most, 2000) + 1
@@ -56,8 +55,7 @@ def test_thinned_signals_keep_each_peak_and_each_gap(most):
 def test_a_track_has_a_gap_where_the_log_has_one_and_no_signal_of_nothing():
     time = np.r_[np.arange(100), 300 + np.arange(100)] * 0.01
     own = track(("a", "b"), time, np.column_stack([time, np.full(200, np.nan)]))
-    assert own.labels == ("a",)
-    assert len(own.time) == 201
+    assert (own.labels, len(own.time)) == (("a",), 201)
     assert np.isnan(own.values[100, 0])
     assert own.time[99] < own.time[100] < own.time[101]
 

@@ -70,22 +70,10 @@ def other_config(gap_config, tmp_path_factory):
     return path
 
 
-def test_flight_of_another_vehicle(cpfls, refuse, gap_config, other_config, shifted, tmp_path):
-    flight = cpfls.made("import", other_config, shifted[0], at=tmp_path / "flight.h5")
-    (message,) = refuse("compare", gap_config, flight, "-o", tmp_path / "x.h5")
-    assert "was made with another vehicle; these differ: vehicle.mass_kg (7.0 there, 6.0 in the config)" in message
-
-
 def test_disagreement_of_another_vehicle(cpfls, refuse, gap_config, other_config, shifted, tmp_path):
     source = cpfls.made("compare", other_config, *shifted[:2], at=tmp_path / "disagreement.h5")
     (message,) = refuse("diagnose", gap_config, source, "-o", tmp_path / "x.h5")
     assert "vehicle.mass_kg" in message
-
-
-def test_model_of_another_vehicle(refuse, pipeline, gap_config, shifted, tmp_path):
-    options = ("--model", pipeline.model, "--set", "vehicle.mass_kg=5.5")
-    (message,) = refuse("gap", gap_config, *shifted, *options, "-o", tmp_path / "x")
-    assert f"{pipeline.model}: was made with another vehicle" in message
 
 
 def test_commands_stand_in_where_speeds_are_missing(cpfls, gap_config, shifted, tmp_path):

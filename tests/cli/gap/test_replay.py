@@ -37,8 +37,7 @@ def of_vehicle(replayed, with_attitude):
 def test_json_shows_every_prediction_by_signal_and_horizon(of_vehicle):
     answer, _ = of_vehicle
     assert answer["horizon_s"] == pytest.approx(0.01 * np.arange(1, 51))
-    assert answer["windows"] == 2 * len(range(0, 2400 - 50, 7))
-    assert list(answer["models"]) == NAMES
+    assert (answer["windows"], list(answer["models"])) == (2 * len(range(0, 2400 - 50, 7)), NAMES)
     for summary in answer["models"].values():
         assert set(summary) == {"body_rate", "attitude", "velocity", "position", "diverged"}
         assert summary["diverged"] == 0
@@ -97,8 +96,7 @@ def test_an_identified_model_is_played_back(replayed, pipeline, study):
 def test_options_change_what_they_say(replayed, with_attitude):
     options = ("--horizon", "0.2", "--every", "100", "--hold", "previous")
     answer, output = replayed("vehicle", with_attitude[0], options=options)
-    assert len(answer["horizon_s"]) == 20
-    assert answer["windows"] == len(range(0, 2380, 100))
+    assert (len(answer["horizon_s"]), answer["windows"]) == (20, len(range(0, 2380, 100)))
     assert [flight["hold"] for flight in answer["flights"]] == ["previous"]
     with h5py.File(output) as file:
         assert file["hold"][()].decode() == "previous"
@@ -240,14 +238,11 @@ def test_a_flight_without_rotors_is_refused(refused, shifted, tmp_path):
     )
 
 
-def test_a_horizon_longer_than_the_flight_is_refused(refused, shifted):
+def test_a_horizon_longer_than_the_flight_or_shorter_than_a_sample_is_refused(refused, shifted):
     message = refused("vehicle", shifted[0], options=("--horizon", "30"))
     assert message.startswith(
         "flight_1.csv: a horizon of 30 s is longer than its longest stretch without a pause, 23.99 s"
     )
-
-
-def test_a_horizon_shorter_than_a_sample_is_refused(refused, shifted):
     message = refused("vehicle", shifted[0], options=("--horizon", "0.001"))
     assert message == "--horizon 0.001 s is shorter than a sample of flight_1.csv, 0.01 s"
 

@@ -246,14 +246,11 @@ def notes(cpfls, tmp_path):
     return call
 
 
-def test_two_seconds_are_too_short_and_it_says_how_long_would_do(notes):
+def test_two_seconds_are_too_short_and_it_says_how_long_would_do_and_two_minutes_are_not(notes):
     (note,) = notes(2.0)
     assert note.startswith("cpfls: note: the training flights are short: in 2 s the rates reverse 2, 2, 1 times about")
     assert "roll, pitch, yaw, 5 swings for " in note
     assert "train on about " in note
-
-
-def test_two_minutes_are_long_enough(notes):
     assert notes(120.0) == []
 
 

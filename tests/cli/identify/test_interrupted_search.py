@@ -120,8 +120,7 @@ def test_search_out_of_time_keeps_a_model_and_goes_on(cpfls, words, whole, tmp_p
     monkeypatch.setattr("cpfls_cli.search.time.monotonic", lambda: clock[0])
     at_evaluation(40, lambda: clock.__setitem__(0, 700.0))
     result = cpfls.done(*words, "-o", output, "--time-limit", "10m")
-    assert stored(output, "stop_reason") == b"time-limit"
-    assert stored(output, "history/evaluations")[-1] == 40
+    assert (stored(output, "stop_reason"), stored(output, "history/evaluations")[-1]) == (b"time-limit", 40)
     assert result.stderr.splitlines()[-1] == (
         f"{NOTE}{output}: is incomplete, because --time-limit ended the search; the same command with --resume goes on"
     )
@@ -230,19 +229,6 @@ def test_forced_search_gives_up_the_checkpoint_from_the_start(cpfls, words, stop
 def test_search_that_is_refused_keeps_the_checkpoint(refuse, words, stopped, tmp_path):
     refuse(*words, "-o", stopped, "--force", "--validate", tmp_path / "none.h5")
     refuse(*words, "-o", stopped, "--resume", "--validate", tmp_path / "none.h5")
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (("--seed", 2), "seed = 1 there, 2 here"),
-        (("--set", "identification.population=18"), "identification.population = 16 there, 18 here"),
-        (("--set", "identification.generations=0"), "identification.generations = 0, but it has reached generation"),
-    ],
-)
-def test_other_config(refuse, words, stopped, options, said):
-    (line,) = refuse(*words, "-o", stopped, "--resume", *options)
-    assert line.startswith(f"{stopped}.checkpoint: belongs to another search: {said}")
 
 
 def test_other_selection_and_other_flight(cpfls, refuse, search, pipeline, stopped, tmp_path):

@@ -54,8 +54,7 @@ def _describes_itself(path, kind, origin):
     with h5py.File(path) as file:
         assert (file.attrs["format"], file.attrs["schema_version"]) == (kind.FORMAT, SCHEMA_VERSION)
         assert (file.attrs["cpfls_version"], file.attrs["stage"]) == (origin.version, origin.stage)
-        assert file.attrs.get("seed") == origin.seed
-        assert set(file.get("inputs", {})) == set(origin.inputs)
+        assert (file.attrs.get("seed"), set(file.get("inputs", {}))) == (origin.seed, set(origin.inputs))
         for name, (about, values) in held.items():
             attributes = file[name].attrs
             assert (attributes["units"], attributes["frame"]) == (about.units, about.frame)

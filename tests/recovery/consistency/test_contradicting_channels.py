@@ -29,13 +29,9 @@ UP = np.array([0.0, 0.0, 9.81])
 EAST, NORTH = np.eye(3)[:2]
 DRAG = 2e-3
 NOISE = {
-    "attitude": 0.003,
-    "body_rate": 0.005,
-    "position": 0.02,
-    "velocity": 0.05,
-    "acceleration": 0.1,
+    "attitude": 0.003, "body_rate": 0.005, "position": 0.02, "velocity": 0.05, "acceleration": 0.1,
     "rotor_speed": 1.0,
-}
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -478,22 +474,13 @@ def test_rotors_on_another_clock_are_set_right(lively, delay, words, tmp_path):
     np.testing.assert_array_equal(again.repaired(given[0]).rotor_speed, found.repaired(given[0]).rotor_speed)
 
 
-def test_rotors_on_the_clock_of_the_gyroscope_stay(lively):
+def test_rotors_on_the_clock_of_the_gyroscope_and_commands_ahead_of_the_motion_stay(lively):
     assert audit(lively, WINDOWS).repairs == ()
-
-
-def test_a_late_gyroscope_is_not_taken_for_early_rotors(lively):
     found = audit([replace(s, body_rate=late(s.body_rate, 0.05)) for s in lively], WINDOWS)
     assert [fault.name for fault in found.named] == ["channel_delay"]
     assert found.repairs == ()
-
-
-def test_commands_that_are_ahead_of_the_motion_are_left_alone(lively):
     ahead = [replace(signals, commanded=True) for signals in with_rotors_late(lively, -0.05, -0.05)]
     assert audit(ahead, WINDOWS).repairs == ()
-
-
-def test_rotors_that_disagree_about_their_delay_are_left_alone(lively):
     assert audit(with_rotors_late(lively, 0.05, 0.09), WINDOWS).repairs == ()
 
 

@@ -24,19 +24,9 @@ BAND_HZ = (0.5, 5.0)
 
 
 def shortest_duration(displacement: float, limits: Array, period: float | None, rng: np.random.Generator) -> float:
-    """Minimise the total time from two starts; spans that nothing limits are left out, as they are zero.
+    """Minimise the total time, s, from two starts; spans that nothing limits are left out, as they are zero.
 
-    Parameters
-    ----------
-    displacement : float, m
-    limits : array, shape (6,)
-        On velocity, acceleration, jerk, snap, crackle, pop; one of them finite, or the period given.
-    period : float, s, or None
-    rng : Generator
-
-    Returns
-    -------
-    float, s
+    Limits are on velocity to pop: one of them is finite, or the period given.
     """
     first = 0 if period is not None else max(4 - int(np.isfinite(limits).nonzero()[0][-1]), 0)
     matrix, bounds = _peak_constraints(displacement, limits, first)

@@ -242,14 +242,11 @@ def test_one_rule_holds_everywhere_where_training_went_all_round_and_determined_
     assert (own.functions.same_everywhere, own.known_everywhere) == (same, known)
 
 
-def test_an_infinite_ridge_switches_the_fuzzy_part_off_and_without_weights_there_is_no_search():
+def test_what_a_search_left_is_known_from_its_model():
     off = made(ridge_weight=np.inf, weights=np.zeros(0, dtype=int))
     on = made(ridge_weight=0.1, weights=np.ones(4, dtype=int))
     assert (off.fuzzy_part_off, off.searched) == (True, False)
     assert (on.fuzzy_part_off, on.searched) == (False, True)
-
-
-def test_without_a_verdict_it_is_not_judged():
     assert (made().trust, made().validated) == ("not-judged", False)
 
 
@@ -298,8 +295,7 @@ def test_every_model_answers_the_same_questions(kind):
 
 def test_machines_read_what_the_model_has():
     answer = plain(vehicle_of(MODELS["quad"]))["model"]
-    assert answer["vehicle"]["mass_kg"] == 0.9
-    assert answer["vehicle"]["inertia_kg_m2"][4] == -2e-4
+    assert (answer["vehicle"]["mass_kg"], answer["vehicle"]["inertia_kg_m2"][4]) == (0.9, -2e-4)
     assert answer["response"]["lag_s"] == 0.035
     assert [each["name"] for each in answer["effects"]] == [one.name for one in MODELS["quad"].effects]
     assert answer["remainder"]["rows"] == [0, 2, 5]

@@ -249,8 +249,7 @@ def test_a_change_since_a_flight_of_today_is_not_hidden_by_those_before():
     weak = -np.log(0.75) * (np.arange(10) == 2)
     found = changed([*flights(4, rng), *flights(2, rng, weak)], before, QUAD, rng)
     assert found.p <= FALSE_ALARM
-    assert found.since_flight == 4
-    assert found.causes[0].name == "rotor M3"
+    assert (found.since_flight, found.causes[0].name) == (4, "rotor M3")
     assert found.causes[0].sizes[0].low < 0.25 < found.causes[0].sizes[0].high
 
 

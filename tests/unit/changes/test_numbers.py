@@ -15,14 +15,9 @@ from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_o
 
 NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.01, "acceleration": 0.1}
 LOAD = {
-    "mass": 0.6,
-    "mass_times_depth": 0.0,
-    "mass_times_right": 0.0,
-    "mass_times_behind": 0.0,
-    "length_m": 1.0,
-    "damping_1_s": 0.1,
-    "depth_m": 0.0,
-}
+    "mass": 0.6, "mass_times_depth": 0.0, "mass_times_right": 0.0, "mass_times_behind": 0.0, "length_m": 1.0,
+    "damping_1_s": 0.1, "depth_m": 0.0,
+}  # fmt: skip
 
 
 def recorded(vehicle=VEHICLE, seed=1, **closed_loop):
@@ -141,7 +136,7 @@ def test_too_short_and_without_rotors():
         flight_numbers(replace(flight, rotor_speed=None, name="none.csv"))
 
 
-def test_the_ground_is_no_flight():
+def test_the_ground_is_no_flight_and_throttle_cuts_of_acrobatic_flight_are():
     """Five seconds of idling before: not flown, nor half a second next to it."""
     signals = recorded()
     idle = signals.rotor_speed.copy()
@@ -149,10 +144,7 @@ def test_the_ground_is_no_flight():
     flies = in_flight(replace(signals, rotor_speed=idle, position=None))
     assert not flies[:549].any()
     assert flies[560:].all()
-
-
-def test_throttle_cuts_of_acrobatic_flight_are_flight():
-    """As the import has it: a second of each three with the throttle cut, in which the vehicle turns."""
+    # As the import has it: a second of each three with the throttle cut, in which the vehicle turns.
     signals = recorded()
     cut = np.mod(signals.time, 3.0) > 2.0
     speed = np.where(cut[:, None], 0.05, 1.0) * signals.rotor_speed

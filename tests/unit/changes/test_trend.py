@@ -137,8 +137,7 @@ def test_a_flight_that_has_a_ratio_reversed_is_a_change():
     left = {name: value for name, value in given[9].values.items() if name != "delay yaw"}
     given[9] = having(given[9], left, reversed=("delay yaw",))
     found = trend(given, QUAD, np.random.default_rng(1))
-    assert found.left_out == ("flight10",)
-    assert found.reversed == ("flight10: delay yaw reversed, or nothing",)
+    assert (found.left_out, found.reversed) == (("flight10",), ("flight10: delay yaw reversed, or nothing",))
 
 
 def test_the_probability_and_the_limit_are_one_rule():

@@ -34,19 +34,13 @@ def all_keys(settings, prefix=""):
             yield from all_keys(key.section, f"{prefix}{key.name}.")
 
 
-def test_every_key_has_one_line_of_documentation():
+def test_every_key_has_one_line_of_documentation_which_the_commented_default_shows():
     undocumented = [path for path, key in all_keys(Study) if not key.doc.strip() or "\n" in key.doc]
     assert undocumented == []
-
-
-def test_the_commented_default_shows_every_line():
     comments = {line.split("#", 1)[1].strip() for line in commented_default().splitlines() if "#" in line}
     entries = {comment.split(": ", 1)[-1] for comment in comments}
     missing = [path for path, key in all_keys(Study) if key.doc not in comments | entries]
     assert missing == []
-
-
-def test_sections_are_those_of_the_study():
     assert [key.name for key in keys_of(Study) if key.section is not None] == list(SECTIONS)
 
 
@@ -54,8 +48,7 @@ def test_known_keys_look_inside_lists_and_mappings():
     assert known_keys(["vehicle", "rotors", "0"]) == known_keys(["vehicle", "rotors", "3"])
     assert "spin" in known_keys(["vehicle", "rotors", "0"])
     assert "unit" in known_keys(["import", "signals", "attitude"])
-    assert known_keys(["vehicle", "mass_kg"]) == []
-    assert known_keys(["nowhere"]) == []
+    assert (known_keys(["vehicle", "mass_kg"]), known_keys(["nowhere"])) == ([], [])
     assert "vehicle.rotors.spin" in known_keys([], deep=True)
 
 
@@ -98,8 +91,7 @@ def test_signals_come_with_their_names_units_and_an_example_that_is_a_study():
     begin = next(number for number, line in enumerate(comments) if line.startswith("example"))
     example = "import:\n  signals:\n" + "\n".join(f"  {line}" for line in comments[begin + 1 :])
     signals = validate(parse_config(example, "example"), "example").import_.signals
-    assert set(signals) == {"attitude", "body_torque"}
-    assert signals["body_torque"].sign == (1, -1, -1)
+    assert (set(signals), signals["body_torque"].sign) == ({"attitude", "body_torque"}, (1, -1, -1))
 
 
 def test_a_config_file_with_keys_that_are_gone_is_refused_with_what_to_do(tmp_path):
@@ -167,23 +159,11 @@ def test_malformed(override):
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("1e-3", 0.001),
-        ("-.5", -0.5),
-        ("1.", 1.0),
-        ("+3", 3),
-        ("0", 0),
-        ("true", True),
-        ("null", None),
-        ("~", None),
-        ("on", "on"),
-        ("yes", "yes"),
-        ("1:30", "1:30"),
-        ("0x10", "0x10"),
-        ("1_000", "1_000"),
-        ("2001-01-01", "2001-01-01"),
-        ("010", 10.0),
+        ("1e-3", 0.001), ("-.5", -0.5), ("1.", 1.0), ("+3", 3), ("0", 0), ("true", True), ("null", None), ("~", None),
+        ("on", "on"), ("yes", "yes"), ("1:30", "1:30"), ("0x10", "0x10"), ("1_000", "1_000"),
+        ("2001-01-01", "2001-01-01"), ("010", 10.0),
     ],
-)
+)  # fmt: skip
 def test_scalars(text, value):
     parsed = parse_yaml(text, "file")
     assert parsed == value
@@ -201,11 +181,6 @@ def test_merge_keys_and_anchors_are_plain_yaml():
     assert parse_yaml("a: &a {x: 1}\nb: {<<: *a, y: 2}\n", "file") == {"a": {"x": 1}, "b": {"x": 1, "y": 2}}
 
 
-def test_messages_name_line_and_column():
-    with pytest.raises(ConfigError, match=r"^file:2:1: not valid YAML: key 'a' appears twice$"):
-        parse_yaml("a: 1\na: 2\n", "file")
-
-
 def study(name):
     return load_study(FOLDER / f"{name}.yaml")
 
@@ -214,19 +189,10 @@ def torque(name, speed=SPEED):
     return body_wrench(study(name).vehicle, speed).body_torque[0]
 
 
-def test_every_config_is_looked_at():
-    crazyflies = {"arpl", "crazyswarm2", "crazyswarm2_card", "crazypad", "crazypad_usd", "nanodrone"}
-    known = crazyflies | {"rotorpy", "sixkg", "neurobem"}
-    assert known <= {path.stem for path in FOLDER.glob("*.yaml")}
-
-
-def test_the_hummingbird_has_the_torques_of_its_origin():
+def test_craft_have_the_torques_of_their_origin():
     k, b, d = 5.57e-6, 1.36e-7, 0.1202081528
     expected = [k * d * (O1 - O2 - O3 + O4), k * d * (-O1 - O2 + O3 + O4), b * (O1 - O2 + O3 - O4)]
     np.testing.assert_allclose(torque("rotorpy"), expected, rtol=1e-12)
-
-
-def test_the_six_kilogram_craft_has_the_torques_of_the_plus_layout():
     k, b, arm = 121.5e-6, 2.7e-6, 0.3
     expected = [arm * k * (O4 - O2), arm * k * (O3 - O1), b * (-O1 + O2 - O3 + O4)]
     np.testing.assert_allclose(torque("sixkg"), expected, rtol=1e-12)
@@ -266,22 +232,11 @@ TABLE = METHOD.read_text(encoding="utf-8").partition("| key of `identification` 
 PAGE = {key: {"paper": paper, "fast": fast} for key, paper, fast in ROW.findall(TABLE)}
 # A value of each key that is neither the paper's nor the default.
 OTHER = {
-    "population": 44,
-    "generations": 7,
-    "subpopulations": 2,
-    "migration_rate": 0.11,
-    "migration_interval": 3,
-    "generation_gap": 0.5,
-    "crossover_rate": 0.6,
-    "insertion_rate": 0.4,
-    "selective_pressure": 1.2,
-    "mutated_individuals": 0.3,
-    "mutated_bits": 0.02,
-    "ranking": "pareto-count",
-    "first_objective_weight": 4,
-    "reinsertion": "fitness",
-    "stall_generations": 9,
-}
+    "population": 44, "generations": 7, "subpopulations": 2, "migration_rate": 0.11, "migration_interval": 3,
+    "generation_gap": 0.5, "crossover_rate": 0.6, "insertion_rate": 0.4, "selective_pressure": 1.2,
+    "mutated_individuals": 0.3, "mutated_bits": 0.02, "ranking": "pareto-count", "first_objective_weight": 4,
+    "reinsertion": "fitness", "stall_generations": 9,
+}  # fmt: skip
 
 
 def identification(**keys):
@@ -320,12 +275,9 @@ def test_the_other_values_would_be_noticed():
         assert value not in (yaml.safe_load(text) for text in PAGE[key].values())
 
 
-def test_a_resolved_preset_reads_back_the_same():
+def test_a_resolved_preset_reads_back_the_same_and_names_every_key_of_the_search():
     study = validate({"identification": {"preset": "paper", "population": 20}}, "study.yaml")
     assert validate(resolved(study), "study.yaml") == study
-
-
-def test_the_paper_names_every_key_of_the_search():
     # How small an improvement counts is never asked where no search is stopped for it.
     assert {key.name for key in fields(EvolutionSettings)} - set(PRESETS["paper"]) == {"stall_improvement"}
 

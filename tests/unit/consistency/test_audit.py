@@ -50,15 +50,13 @@ def moved(signals, amplitude=2.0):
 
 def test_without_attitude_nothing_is_tested(turning):
     found = audit([replace(turning, attitude=None)], WINDOWS)
-    assert found.findings == ()
-    assert set(found.untested) == FAULTS
+    assert (found.findings, set(found.untested)) == ((), FAULTS)
     assert found.repaired(turning) is turning
 
 
 def test_too_short_a_flight_is_not_tested():
     found = audit([faulty_flight(np.random.default_rng(0), Faults(), LEVELS["mid"], duration=5.0)], WINDOWS)
-    assert found.findings == ()
-    assert set(found.untested.values()) == {"the flights are too short"}
+    assert (found.findings, set(found.untested.values())) == ((), {"the flights are too short"})
 
 
 @pytest.mark.parametrize("seed", [3, 5, 6])
@@ -83,13 +81,10 @@ def integrated(signals):
     return replace(signals, attitude=np.unwrap(Rotation.concatenate(turned).as_euler("ZYX")[:, ::-1], axis=0))
 
 
-def test_an_attitude_integrated_from_the_gyroscope_shows_no_scale(turning):
+def test_an_attitude_integrated_from_the_gyroscope_shows_its_bias_and_no_scale(turning):
     found = audit([integrated(turning)], WINDOWS)
     assert {"gyro_scale", "imu_misalignment"} <= set(found.untested)
     assert found.named == ()
-
-
-def test_an_attitude_integrated_from_the_corrected_gyroscope_still_shows_the_bias(turning):
     estimated = integrated(turning)
     found = audit([replace(estimated, body_rate=estimated.body_rate + np.array([0.02, 0, 0]))], WINDOWS)
     assert [finding.name for finding in found.named] == ["gyro_bias"]
@@ -268,17 +263,11 @@ def test_a_wrong_sign_is_found_about_its_axis_alone(axis, words):
     assert result.size == pytest.approx(-1.0, abs=0.05)
 
 
-def test_an_attitude_in_other_axes_than_the_gyroscope_is_found():
+def test_an_attitude_and_a_gyroscope_that_disagree_are_found_where_they_move():
     """An attitude in FRD against NED of a gyroscope in FLU: pitch and yaw have the other sign."""
     signals = log()
     assert len(found(replace(signals, attitude=signals.attitude * [1.0, -1.0, -1.0]))) == 2
-
-
-def test_a_gyroscope_that_stands_still_in_a_flight_that_moves_is_found():
     assert len(found(turned(log(), [1.0, 0.0, 1.0]))) == 1
-
-
-def test_an_axis_that_hardly_turns_is_not_judged():
     assert found(log(sizes=(0.001, 0.001, 0.001), noise=0.05)) == []
     still = turned(log(sizes=(0.01, 0.9, 0.001)), [1.0, 1.0, 0.0])
     assert not any("yaw" in each.what for each in found(still))
@@ -312,8 +301,7 @@ def test_a_gain_between_a_half_and_two_is_let_pass(gain, warned):
 
 
 def test_noise_alone_is_no_gain():
-    assert gains(log(noise=0.3, held=5)) == []
-    assert gains(log(noise=5.0)) == []
+    assert (gains(log(noise=0.3, held=5)), gains(log(noise=5.0))) == ([], [])
 
 
 def gentle(noise):
@@ -362,13 +350,11 @@ def named(fitted, period=0.01):
     ],
 )
 def test_significant_but_small_is_not_named(place, small, large, name):
-    assert named(fit(place, -small)) == []
-    assert named(fit(place, -large)) == [name]
+    assert (named(fit(place, -small)), named(fit(place, -large))) == ([], [name])
 
 
 def test_a_delay_must_exceed_a_fifth_of_a_sample():
-    assert named(fit(12, 0.003), period=0.01) == ["channel_delay"]
-    assert named(fit(12, 0.003), period=0.02) == []
+    assert (named(fit(12, 0.003), period=0.01), named(fit(12, 0.003), period=0.02)) == (["channel_delay"], [])
 
 
 def test_the_first_of_ten_counts_ten_times():
@@ -379,8 +365,7 @@ def test_the_first_of_ten_counts_ten_times():
 
 
 def test_what_noise_can_have_pulled_does_not_count():
-    assert named(fit(3, 0.02, pull=0.0)) == ["gyro_scale"]
-    assert named(fit(3, 0.02, pull=0.02)) == []
+    assert (named(fit(3, 0.02, pull=0.0)), named(fit(3, 0.02, pull=0.02))) == (["gyro_scale"], [])
     [scale] = findings(checked(fit(3, 0.02, pull=0.01), ("gyro_scale",)), 0.01)
     assert scale.coefficients[0].high == pytest.approx(0.02 + 0.01 + 1e-4 * stats.t.ppf(0.975, 20))
 

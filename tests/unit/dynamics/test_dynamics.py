@@ -176,13 +176,10 @@ def test_coriolis_matrix_by_the_sum_of_christoffel_symbols(case):
     np.testing.assert_allclose(coriolis_matrix(inertia, qd)[n], expected, atol=1e-12)
 
 
-def test_long_motions_are_predicted_in_parts(case):
+def test_long_motions_are_predicted_in_parts_and_attitudes_outside_training_are_flagged(case):
     model, motion = case
     many = np.arange(9000) % 50
     np.testing.assert_allclose(model.torque(motion[many]), model.torque(motion)[many], atol=1e-12)
-
-
-def test_attitudes_outside_training_are_flagged(case):
     model, motion = case
     assert not model.outside(motion.attitude).any()
     assert model.outside(np.random.default_rng(20).uniform(-np.pi, np.pi, (500, 3))).any()

@@ -48,7 +48,7 @@ def push(t):
     return np.stack([2.5 * np.sin(2.1 * t), 2.0 * np.sin(1.4 * t + 1.0), 9.81 + 1.5 * np.sin(3.0 * t)], axis=-1)
 
 
-def test_integration_agrees_with_lagrange_in_large_swings():
+def test_integration_agrees_with_lagrange_and_keeps_the_energy():
     step, length, damping = 0.02, 1.5, 0.1
     at = np.arange(0.0, 8.0, step)
     found = integrate(push(at), push(at[:-1] + step / 2), step, length, damping, HANGING)
@@ -56,9 +56,6 @@ def test_integration_agrees_with_lagrange_in_large_swings():
     np.testing.assert_allclose(found[:, :3], expected, atol=1e-5)
     np.testing.assert_allclose(found[:, 3:], CubicSpline(at, expected)(at, 1), atol=5e-3)
     assert np.abs(expected[:, :2]).max(axis=0).min() > 0.4
-
-
-def test_an_undamped_load_under_a_still_hook_keeps_its_energy():
     step, length, steps = 0.02, 1.0, 600
     pulse = np.array([[6.0, -4.0, 9.81]] * 20 + [GRAVITY.tolist()] * (steps - 20))
     found = integrate(pulse, pulse[:-1], step, length, 0.0, HANGING)[25:]
@@ -179,14 +176,11 @@ def off(found, cable):
     return np.sqrt(np.mean((found - cable) ** 2))
 
 
-def test_a_load_that_swings_from_the_start_shows_in_the_balance_of_forces(flight):
+def test_a_load_that_swings_from_the_start_is_followed_all_flight_long(flight):
     level, cable = balanced(tumbling(flight.vehicle), (0.12, -0.15, 0.3, 0.2))
     assert off(swing(level, 1.5, 0.1)[:, :2], cable) > 0.09
     assert off(settled_swing(level, 1.5, 0.1)[:, :2], cable) < 0.02
-
-
-def test_a_large_swing_is_followed_all_flight_long(flight):
-    """Slower than a small one, so that it is not the driven swing and a free one next to it."""
+    # Slower than a small one, so that it is not the driven swing and a free one next to it.
     long = tumbling(flight.vehicle, np.arange(0.0, 25.0, 0.01))
     level, cable = balanced(long, (0.4, -0.35, 0.8, 0.7), damping=0.02)
     assert off(settled_swing(level, 1.5, 0.02)[:, :2], cable) < 0.02
@@ -241,13 +235,10 @@ def test_cable_pulls_along_gravity_where_the_velocity_is_constant(columns, fligh
     np.testing.assert_allclose(found @ [0.06, -0.01, -0.02, 0.6], [expected] * len(level), atol=1e-8)
 
 
-def test_cable_rights_a_tilted_vehicle(columns, flight, with_velocity):
+def test_a_cable_rights_a_tilted_vehicle_and_pulls_harder_in_a_climb(columns, flight, with_velocity):
     tilted = replace(with_velocity(flight, [0.0, 0.0, 0.0]), attitude=np.full_like(flight.attitude, [0.2, 0.0, 0.0]))
     torque = columns("payload", tilted, **LEVEL).direct[:, :3, 0]
     np.testing.assert_allclose(torque, [[-9.81 * np.sin(0.2), 0.0, 0.0]] * len(tilted), atol=1e-9)
-
-
-def test_climbing_harder_pulls_harder(columns, flight, with_velocity):
     rising = replace(with_velocity(flight, [0.0, 0.0, 0.0]), acceleration=np.tile([0.0, 0.0, 2.0], (len(flight), 1)))
     force = columns("payload", replace(rising, rotor_speed=None), **LEVEL).direct[:, 3:, 3]
     np.testing.assert_allclose(np.linalg.norm(force, axis=1), 11.81)

@@ -121,8 +121,7 @@ def test_what_is_needed_can_be_there(flight, commanded, name):
 
 def test_all_are_there_and_in_order():
     modules = {module.name for module in pkgutil.iter_modules(catalogue.__path__)}
-    assert set(CATALOGUE) == modules
-    assert list(CATALOGUE)[:2] == ["linear_damping", "quadratic_damping"]
+    assert (set(CATALOGUE), list(CATALOGUE)[:2]) == (modules, ["linear_damping", "quadratic_damping"])
     assert list(CATALOGUE)[32] == "parameter_error"
 
 
@@ -143,8 +142,7 @@ def test_wind_and_drag_are_two_sides_of_one_number():
 
 def test_a_shape_with_a_first_value_is_tried_there_only():
     shapes = {shape.name: shape for shape in CATALOGUE["payload"].shapes}
-    assert shapes["depth_m"].tried == (0.0,)
-    assert shapes["length_m"].tried == shapes["length_m"].grid
+    assert (shapes["depth_m"].tried, shapes["length_m"].tried) == ((0.0,), shapes["length_m"].grid)
     assert all(shape.first in (None, *shape.grid) for entry in CATALOGUE.values() for shape in entry.shapes)
 
 

@@ -23,13 +23,10 @@ def level(flight, height, roll=0.0):
     return replace(flight, attitude=attitude, position=np.full_like(flight.position, [0.0, 0.0, height]))
 
 
-def test_ground_effect_of_a_level_vehicle_is_cheeseman_and_bennett(columns, flight):
+def test_ground_effect_is_cheeseman_and_bennett_and_levels_a_tilted_vehicle(columns, flight):
     near = level(flight, 0.25)
     found = columns("ground_effect", near, G=1.0).direct[:, 5, 0]
     np.testing.assert_allclose(found, near.thrust * (1 / (1 - (0.2 / (4 * 0.30)) ** 2) - 1))
-
-
-def test_ground_levels_a_tilted_vehicle(columns, flight):
     hovering = replace(flight, rotor_speed=np.full_like(flight.rotor_speed, 348.0))
     torque = columns("ground_effect", level(hovering, 0.3, roll=0.2), G=2.0).direct[:, :3, 0]
     assert (torque[:, 0] < -0.01).all()
@@ -169,8 +166,7 @@ def test_what_one_spin_lifts_more_shows_in_force_only(columns, flight):
 
 
 def test_pairs_face_each_other_and_spin_alike(vehicle):
-    assert opposite_pairs(vehicle) == ((0, 2), (1, 3))
-    assert opposite_pairs(circle(6)) == ()
+    assert (opposite_pairs(vehicle), opposite_pairs(circle(6))) == (((0, 2), (1, 3)), ())
     beside = (
         replace(rotor, position_m=(rotor.position_m[0] + 0.01, *rotor.position_m[1:])) for rotor in vehicle.rotors
     )

@@ -87,9 +87,6 @@ def test_strength_shows_a_weak_instrument():
     strong, weak = (fit(*closed_loop(rng, instrument=size)).strength for size in (1.0, 0.0))
     assert strong.min() > 50
     assert weak.max() < 10
-
-
-def test_strength_over_chance_is_the_ratio_for_a_number_alone():
     normal = Normal(np.array([[[30.0]], [[20.0]]]), np.zeros((2, 1)), np.array([[5.0]]))
     assert conditional_strength(normal, Prior.none(1))[0] == pytest.approx(10.0)
 

@@ -238,19 +238,13 @@ def sphere(genes):
 @pytest.mark.parametrize(
     ("best", "expected"),
     [
-        ([[8, 4], [8, 4], [8, 4]], True),
-        ([[8, 4], [7.3, 4], [7.2, 4]], True),
-        ([[8, 4], [7.3, 4], [7.1, 4]], False),
-        ([[8, 4], [8, 3.9], [8, 3.5]], False),
-        ([[9, 4], [8, 4], [8, 4], [8, 4]], True),
-        ([[8, 4], [8, 4]], False),
-        ([[np.inf, 4], [np.inf, 4], [8, 4]], False),
-        ([[np.inf, 4], [np.inf, 4], [np.inf, 4]], True),
-        ([[-8, 4], [-8, 4], [-8.9, 4]], False),
-        ([[-8, 4], [-8, 4], [-8.7, 4]], True),
+        ([[8, 4], [8, 4], [8, 4]], True), ([[8, 4], [7.3, 4], [7.2, 4]], True), ([[8, 4], [7.3, 4], [7.1, 4]], False),
+        ([[8, 4], [8, 3.9], [8, 3.5]], False), ([[9, 4], [8, 4], [8, 4], [8, 4]], True), ([[8, 4], [8, 4]], False),
+        ([[np.inf, 4], [np.inf, 4], [8, 4]], False), ([[np.inf, 4], [np.inf, 4], [np.inf, 4]], True),
+        ([[-8, 4], [-8, 4], [-8.9, 4]], False), ([[-8, 4], [-8, 4], [-8.7, 4]], True),
         ([[0, 0], [0, 0], [0, 0]], True),
     ],
-)
+)  # fmt: skip
 def test_stalled_looks_back_two_generations_for_ten_per_cent(best, expected):
     assert stalled(course(*best), 2, 0.1) is expected
 
@@ -302,25 +296,18 @@ class RoundingRecorder:
         return Evaluation(refined, np.hstack([total, -total]))
 
 
-def test_only_unknown_chromosomes_are_evaluated_once_in_order_of_appearance():
+def test_unknown_chromosomes_are_evaluated_once_and_known_ones_recall_their_refinement():
     archive, recorder = Archive(), RoundingRecorder()
     archive.evaluate(np.array([[13], [2], [13], [31]]), recorder)
     archive.evaluate(np.array([[5], [2], [5], [31]]), recorder)
     assert recorder.calls == [[[13], [2], [31]], [[5]]]
     assert len(archive) == 4
-
-
-def test_a_known_chromosome_recalls_its_refinement_and_so_does_the_refined_one():
     archive, recorder = Archive(), RoundingRecorder()
     first = archive.evaluate(np.array([[13, 4]]), recorder)
     again = archive.evaluate(np.array([[20, 10], [13, 4]]), recorder)
     assert len(recorder.calls) == 1
     assert first.genes.tolist() == [[20, 10]]
-    assert again.genes.tolist() == [[20, 10], [20, 10]]
-    assert again.objectives.tolist() == [[30.0, -30.0]] * 2
-
-
-def test_objectives_that_are_not_finite_are_kept_as_worst():
+    assert (again.genes.tolist(), again.objectives.tolist()) == ([[20, 10], [20, 10]], [[30.0, -30.0]] * 2)
     archive = Archive()
     archive.store(np.array([[1], [2]]), Evaluation(np.array([[1], [2]]), np.array([[np.nan, -np.inf], [1, 2]])))
     assert archive.results.objectives.tolist() == [[np.inf, np.inf], [1.0, 2.0]]

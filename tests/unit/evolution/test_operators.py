@@ -20,13 +20,10 @@ RANKS = np.random.default_rng(1).permutation(54)
 GENES = np.arange(54)[:, np.newaxis]
 
 
-def test_three_bit_code_is_the_published_table():
+def test_the_code_is_the_published_table_gene_after_gene():
     table = ["000", "001", "011", "010", "110", "111", "101", "100"]
     bits = gray_encode(np.arange(8)[:, np.newaxis], bits_per_gene=3)
     assert ["".join(str(int(bit)) for bit in row) for row in bits] == table
-
-
-def test_genes_lie_one_after_another_most_significant_bit_first():
     bits = gray_encode(np.array([[65535, 0]]))
     assert np.flatnonzero(bits[0]).tolist() == [0]
     assert gray_decode(bits).tolist() == [[65535, 0]]
@@ -66,9 +63,6 @@ def test_crossover_rate_is_the_share_of_crossed_pairs():
     offspring = single_point_crossover(bits, 0.8, np.random.default_rng(4))
     crossed = np.any(offspring != bits, axis=1)[::2]
     assert abs(crossed.mean() - 0.8) < 0.025
-
-
-def test_a_single_bit_has_no_point_to_cross_at():
     bits = alternating(4, 1)
     np.testing.assert_array_equal(single_point_crossover(bits, 1.0, np.random.default_rng(6)), bits)
 
@@ -82,7 +76,7 @@ def test_mutation_shares_are_those_asked_for():
     assert abs(changed[mutated].mean() - 0.0102) < 0.001
 
 
-def test_intermediate_offspring_lie_uniformly_between_their_parents_and_a_quarter_beyond():
+def test_intermediate_offspring_lie_uniformly_around_their_parents_gene_by_gene_and_in_range():
     genes = np.tile([[20000], [40000]], (5000, 3))
     offspring = intermediate_recombination(genes, 1.0, 65535, np.random.default_rng(8))
     assert offspring.min() >= 15000
@@ -90,21 +84,14 @@ def test_intermediate_offspring_lie_uniformly_between_their_parents_and_a_quarte
     shares = np.histogram(offspring, bins=6, range=(15000, 45000))[0] / offspring.size
     # 30000 draws, a sixth in each bin: standard deviation 0.002.
     np.testing.assert_allclose(shares, 1 / 6, atol=0.012)
-
-
-def test_intermediate_offspring_of_a_pair_are_drawn_gene_by_gene_and_apart():
     genes = np.tile([[10000], [50000]], (1000, 2))
     offspring = intermediate_recombination(genes, 1.0, 65535, np.random.default_rng(9))
     first, second = offspring[::2], offspring[1::2]
     assert abs(np.corrcoef(first[:, 0], first[:, 1])[0, 1]) < 0.15
     assert abs(np.corrcoef(first[:, 0], second[:, 0])[0, 1]) < 0.15
-
-
-def test_intermediate_recombination_stays_in_range_and_takes_its_share_of_the_pairs():
     genes = np.tile([[0], [65535]], (10001, 1))[:20001]
     offspring = intermediate_recombination(genes, 0.8, 65535, np.random.default_rng(10))
-    assert offspring.min() == 0
-    assert offspring.max() == 65535
+    assert (offspring.min(), offspring.max()) == (0, 65535)
     changed = (offspring != genes)[:20000, 0].reshape(-1, 2)
     # An end of the range stays where it is clipped to it: a sixth of the draws.
     assert abs(changed.any(axis=1).mean() - 0.8 * (1 - 1 / 36)) < 0.02
@@ -167,27 +154,10 @@ def test_the_fittest_offspring_of_each_subpopulation_enter(method):
         assert sorted(RANKS[places[places >= 30]]) == sorted(offspring_ranks)[:10]
 
 
-def test_fitness_based_reinsertion_keeps_the_fittest_parents():
+def test_fitness_based_reinsertion_keeps_the_fittest_parents_and_breaks_ties_at_random():
     source = reinsert(GENES, RANKS, PARENTS, OFFSPRING, 0.8, "fitness", np.random.default_rng(3))
     for places, parent_ranks in zip(split(source, PARENTS), split(RANKS[:30], PARENTS), strict=True):
         assert sorted(RANKS[places[places < 30]]) == sorted(parent_ranks)[:5]
-
-
-def test_uniform_reinsertion_replaces_each_parent_equally_often():
-    rng = np.random.default_rng(4)
-    runs = [reinsert(GENES, RANKS, PARENTS, OFFSPRING, 0.8, "uniform", rng) for _ in range(1500)]
-    replaced = np.mean([source != np.arange(30) for source in runs], axis=0)
-    # 10 of 15, standard deviation 0.012: the best parent is lost as often as the worst.
-    np.testing.assert_allclose(replaced, 2 / 3, atol=0.06)
-
-
-def test_survivors_keep_their_places():
-    source = reinsert(GENES, RANKS, PARENTS, OFFSPRING, 0.8, "uniform", np.random.default_rng(5))
-    kept = source < 30
-    np.testing.assert_array_equal(source[kept], np.flatnonzero(kept))
-
-
-def test_fitness_based_reinsertion_breaks_ties_at_random():
     rng = np.random.default_rng(6)
     kept = {
         tuple(reinsert(GENES, np.zeros(54, dtype=int), PARENTS, OFFSPRING, 0.8, "fitness", rng) < 30) for _ in range(20)
@@ -195,14 +165,22 @@ def test_fitness_based_reinsertion_breaks_ties_at_random():
     assert len(kept) > 10
 
 
-def test_elitist_reinsertion_keeps_the_fittest_of_parents_and_offspring():
+def test_uniform_reinsertion_replaces_each_parent_equally_often_and_survivors_keep_their_places():
+    rng = np.random.default_rng(4)
+    runs = [reinsert(GENES, RANKS, PARENTS, OFFSPRING, 0.8, "uniform", rng) for _ in range(1500)]
+    replaced = np.mean([source != np.arange(30) for source in runs], axis=0)
+    # 10 of 15, standard deviation 0.012: the best parent is lost as often as the worst.
+    np.testing.assert_allclose(replaced, 2 / 3, atol=0.06)
+    source = reinsert(GENES, RANKS, PARENTS, OFFSPRING, 0.8, "uniform", np.random.default_rng(5))
+    kept = source < 30
+    np.testing.assert_array_equal(source[kept], np.flatnonzero(kept))
+
+
+def test_elitist_reinsertion_keeps_the_fittest_and_one_of_equal_chromosomes():
     source = reinsert(GENES, RANKS, PARENTS, OFFSPRING, 1.0, "elitist", np.random.default_rng(6))
     labels = np.concatenate([PARENTS, OFFSPRING])
     for places, ranks in zip(split(source, PARENTS), split(RANKS, labels), strict=True):
         assert sorted(RANKS[places]) == sorted(ranks)[:15]
-
-
-def test_elitist_reinsertion_keeps_one_of_equal_chromosomes_as_long_as_there_are_others():
     genes = np.array([[5], [5], [7], [8], [5], [9]])
     ranks, labels = np.array([1, 1, 4, 6, 1, 5]), np.zeros(4, dtype=int)
     kept = reinsert(genes, ranks, labels, labels[:2], 1.0, "elitist", np.random.default_rng(7))

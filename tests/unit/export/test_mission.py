@@ -92,8 +92,7 @@ def test_the_plan_has_what_qgroundcontrol_asks_for(square):
     assert (mission["version"], mission["firmwareType"], mission["vehicleType"]) == (2, 12, 2)
     assert mission["plannedHomePosition"][:2] == [HOME.latitude, HOME.longitude]
     for number, item in enumerate(mission["items"], start=1):
-        assert item["doJumpId"] == number
-        assert item["type"] == "SimpleItem"
+        assert (item["doJumpId"], item["type"]) == (number, "SimpleItem")
         assert item["autoContinue"] is True
         assert isinstance(item["command"], int)
         assert len(item["params"]) == 7
@@ -146,13 +145,9 @@ def parameters(text):
 
 # Of ArduPilot's documentation: least, most.
 RANGES = {
-    "SID_AXIS": (0, 19),
-    "SID_F_START_HZ": (0.01, 100),
-    "SID_F_STOP_HZ": (0.01, 100),
-    "SID_T_FADE_IN": (0, 20),
-    "SID_T_REC": (0, 255),
-    "SID_T_FADE_OUT": (0, 5),
-}
+    "SID_AXIS": (0, 19), "SID_F_START_HZ": (0.01, 100), "SID_F_STOP_HZ": (0.01, 100), "SID_T_FADE_IN": (0, 20),
+    "SID_T_REC": (0, 255), "SID_T_FADE_OUT": (0, 5),
+}  # fmt: skip
 
 
 def chirp_of(given, time):
@@ -173,8 +168,7 @@ def test_parameters_keep_to_the_ranges_of_ardupilot_and_sweep_the_band(shaken):
     assert set(given) == {*RANGES, "SID_MAGNITUDE"}
     for name, (least, most) in RANGES.items():
         assert least <= given[name] <= most
-    assert given["SID_AXIS"] == 7
-    assert given["SID_T_REC"] == 20.0
+    assert (given["SID_AXIS"], given["SID_T_REC"]) == (7, 20.0)
     # A rate in deg/s which at the lowest frequency turns by the size.
     time = np.arange(0, 20.0, 0.0025)
     rate = chirp_of(given, time)

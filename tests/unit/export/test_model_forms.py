@@ -192,43 +192,30 @@ def test_what_no_polynomial_is_is_refused(work):
 @pytest.mark.parametrize(
     ("text", "safe"),
     [
-        ("a */ b", "a * / b"),
-        ("a /* b", "a / * b"),
-        ("*/*/*", "* / * / *"),
-        ("what??/", "what?/"),
-        ("one\ntwo\rthree\0", "one?two?three?"),
-        ("Größe \u202e", "Gr?e ?"),
-        ("C:\\flights", "C:|flights"),
+        ("a */ b", "a * / b"), ("a /* b", "a / * b"), ("*/*/*", "* / * / *"), ("what??/", "what?/"),
+        ("one\ntwo\rthree\0", "one?two?three?"), ("Größe \u202e", "Gr?e ?"), ("C:\\flights", "C:|flights"),
         ("N m/s, 3 * 4", "N m/s, 3 * 4"),
     ],
-)
+)  # fmt: skip
 def test_comment_text(text, safe):
     assert comment_text(text) == safe
 
 
-def test_comment_lines_are_short_and_keep_empty_paragraphs():
+def test_comment_lines_are_short_and_literals_hold_no_quotes():
     lines = comment_lines(["word " * 100, "", "x" * 300])
     assert "" in lines
     assert all(len(line) <= 115 for line in lines)
     assert all(line == "" or line.startswith(" ") for line in lines)
-
-
-def test_literals_hold_no_quotes_and_no_escapes():
     assert literal_text('good" "\\n%s??/') == "good_ __n_s___"
 
 
 @pytest.mark.parametrize(
     ("stem", "name"),
     [
-        ("model", "model"),
-        ("my model-2", "my_model_2"),
-        ("2nd", "model_2nd"),
-        ("_x", "x"),
-        ("模型", "model"),
-        ("...", "model"),
-        ("é1", "model_1"),
+        ("model", "model"), ("my model-2", "my_model_2"), ("2nd", "model_2nd"), ("_x", "x"), ("模型", "model"),
+        ("...", "model"), ("é1", "model_1"),
     ],
-)
+)  # fmt: skip
 def test_identifier(stem, name):
     assert identifier(stem) == name
     assert checked_identifier(name) == name

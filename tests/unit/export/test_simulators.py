@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.export.holding import FUZZY, Missing, Off, of_a_body, probe_flight, sized
+from cpfls_cli.export.holding import FUZZY, of_a_body, probe_flight
 from cpfls_cli.export.registry import exported
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of
@@ -110,21 +110,6 @@ def test_sizes_are_those_of_what_is_missing():
     assert np.isnan(smaller.floors)
 
 
-def test_an_effect_outside_the_weights_is_named():
-    outside = (
-        Missing("payload", np.nan, np.nan, np.nan, None),
-        sized("sag", np.array([0.0, 0.2, 0.1, 0.0, 0.0, 3.0]), np.full(6, 0.1), Off.of(np.arange(1.0, 5.0)), "here"),
-    )
-    made = exported(sheet_of_vehicle(truth(), outside=outside), "casadi", "v.py")
-    assert made.missing == outside
-    assert made.remarks == (
-        "Not held: payload; its size depends on the flight and was not measured along one.",
-        "Not held, or only in part: sag: 0.2 N m and 3 N here, 30 noise floors; half a second without it ends 4 rad/s, "
-        "172 degrees, 2 m/s and 1 m off.",
-    )
-    assert "Not held: payload" in made.text
-
-
 @pytest.mark.parametrize("form", ["sdf", "mjcf", "casadi"])
 def test_an_export_flies_in_the_wind_of_its_flights(form):
     require(form)
@@ -189,16 +174,13 @@ def test_jax_differentiates_and_batches():
     np.testing.assert_allclose(by_mass, [-0.01 * thrust / model.vehicle.mass_kg**2] * 3, rtol=1e-9)
 
 
-def test_drag_along_the_axes_of_the_world_counts_as_not_held():
+def test_what_a_target_does_otherwise_counts_as_not_held():
     model = replace(whole(response=RotorResponse()), remainder=None)
     made, found = fly("urdf", model)
     (turned,) = [each for each in made.missing if each.title.startswith("drag along the axes of the world")]
     assert turned.off.velocity > 1e-4
     # The equations are compared along the axes of the body, and the flight is along those of the world.
     assert found.equations.max() < AGREES
-
-
-def test_what_ardupilot_does_otherwise_counts_as_not_held():
     made, found = fly("ardupilot", VehicleModel(vehicle=QUAD))
     (otherwise,) = [each for each in made.missing if "cube of the speed" in each.title]
     assert otherwise.off.rate > 1e-3

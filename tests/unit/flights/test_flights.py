@@ -82,14 +82,11 @@ def test_the_first_leg_is_the_first_sixteen_seconds(duration_s):
     assert curves["velocity"].min() >= -1e-9
 
 
-def test_the_first_leg_of_a_path_through_waypoints_ends_at_the_second_point():
+def test_the_first_leg_ends_at_the_second_point_or_is_the_whole_path():
     points = tuple(WaypointSettings(position_m=place) for place in ((1.0, 2.0, 3.0), (4.0, 6.0, 3.0), (40.0, 6.0, 3.0)))
     time, curves = trajectory(path="waypoints", waypoints=points).first_leg()
     assert time[-1] == pytest.approx(16.0)
     assert curves["displacement"][-1] == pytest.approx(5.0)
-
-
-def test_a_file_that_does_not_know_its_legs_shows_the_whole_path():
     time, curves = replace(trajectory(), legs=()).first_leg()
     assert len(time) == 5487
     assert curves["displacement"].max() == pytest.approx(64.0)
@@ -165,14 +162,11 @@ def speed():
     return np.random.default_rng(1).uniform(300.0, 600.0, (SAMPLES, 4))
 
 
-def test_the_commands_are_those_that_give_the_wrench(speed):
+def test_the_commands_are_those_that_give_the_wrench_and_no_rotor_pushes_down(speed):
     signals, notes = read(VehicleSettings(), speed)
     np.testing.assert_allclose(signals.rotor_speed, speed, rtol=1e-9)
     assert signals.commanded
     assert "four rotors of the config" in " ".join(notes)
-
-
-def test_a_rotor_that_would_have_to_push_down_stands_still(speed):
     vehicle = VehicleSettings()
     thrust = body_wrench(vehicle, speed).thrust
     thrust[:3] = 0.0
@@ -189,13 +183,10 @@ def test_rotors_of_unknown_factors_are_asked_for_nothing(unknown, speed):
     assert not notes
 
 
-def test_torque_without_thrust_shows_no_commands(speed):
+def test_torque_without_thrust_and_six_rotors_show_no_commands(speed):
     signals, _ = read(VehicleSettings(), speed, thrust=None)
     assert signals.rotor_speed is None
     assert signals.stated_torque is not None
-
-
-def test_six_rotors_leave_a_choice(speed):
     vehicle = VehicleSettings()
     six = replace(vehicle, rotors=(*vehicle.rotors, *vehicle.rotors[:2]))
     signals, _ = read(six, np.hstack([speed, speed[:, :2]]))

@@ -111,15 +111,12 @@ def test_seesaw_of_equation_11():
     np.testing.assert_allclose(seesaw(angle)[0], [0, 0.5, 1, 0.5, 0, -0.5, -1, -0.5, 0, -0.5, 1], atol=1e-14)
 
 
-def test_data_range_scales_the_training_data_to_0_and_1():
+def test_data_range_scales_the_training_data_to_0_and_1_and_what_stands_still_stays_finite():
     training = np.linspace(-0.8, 0.5, 30)
     for circular in (True, False):
         mapped = map_input(training, "data-range", circular, input_range(training, circular))
         np.testing.assert_allclose((mapped.antecedent.min(), mapped.antecedent.max()), (0, 1), atol=1e-14)
         np.testing.assert_array_equal(mapped.consequent, mapped.antecedent)
-
-
-def test_data_that_do_not_move_stay_finite():
     still = np.full(5, 0.3)
     mapped = map_input(still, "data-range", True, input_range(still, True))
     np.testing.assert_array_equal(mapped.antecedent, np.zeros(5))
@@ -142,20 +139,14 @@ def test_zero_widths_are_finite_steps(weights):
     np.testing.assert_allclose(degrees.value.sum(axis=1), 1.0, atol=1e-15)
 
 
-def test_a_function_between_two_empty_intervals_never_fires_inside():
+def test_functions_hold_at_their_ends_and_never_fire_between_two_empty_intervals():
     """b = 0, 1/2, 1/2, 1/2, 1: the middle function has no width on either side."""
     b = breakpoints(np.array([1.0, 0.0, 0.0, 1.0]))
     inside = np.setdiff1d(np.linspace(0, 1, 101), [0.5])
     np.testing.assert_array_equal(memberships(inside, b).value[:, 2], 0.0)
-
-
-def test_one_function_is_everywhere_one():
     degrees = memberships(np.linspace(-1, 2, 7), breakpoints(np.empty(0)))
     np.testing.assert_array_equal(degrees.value, np.ones((7, 1)))
     np.testing.assert_array_equal(degrees.slope, np.zeros((7, 1)))
-
-
-def test_beyond_the_ends_the_outer_functions_stay_at_one():
     degrees = memberships(np.array([-0.3, 1.3]), np.array([0.0, 0.4, 1.0]))
     np.testing.assert_array_equal(degrees.value, [[1, 0, 0], [0, 0, 1]])
     np.testing.assert_array_equal(degrees.slope, np.zeros((2, 3)))

@@ -49,9 +49,6 @@ def test_what_is_nothing_is_taken_for_something_as_often_as_chance_does():
     assert 0.02 < (chances < 0.05).mean() < 0.09
     assert 0.4 < chances.mean() < 0.6
     assert _chance(crossed([2.0, 2.0], rng), OWN, OTHER, np.zeros(2)) < 1e-3
-
-
-def test_alone_it_is_a_test_of_means():
     products = crossed([0.2, 0.0], np.random.default_rng(2))
     nothing = np.zeros(2, dtype=bool)
     expected = ttest_1samp(products[:, 0, -1], 0.0).pvalue

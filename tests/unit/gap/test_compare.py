@@ -7,13 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.balance.weak_flight import rotation_balance
 from cpfls_cli.gap.before_after import before_after
 from cpfls_cli.gap.compare import compare
 from cpfls_cli.gap.extended import ExtendedModel, extend, plain
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.gap.whole_vehicle import of_vehicle, whole_vehicle
+from cpfls_cli.gap.whole_vehicle import whole_vehicle
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.gap_artifacts import named_effect
@@ -61,23 +61,20 @@ def effect_wrench(model, signals):
     return model.wrench_along(model.acting(signals)) - signals.wrench
 
 
-def test_gap_is_the_missing_torque():
+def test_gap_is_the_missing_torque_and_without_one_about_one_floor():
     found = compared([recording_of_sines(1, bias), recording_of_sines(2, bias)])
     assert found.sizes.rms[1] == pytest.approx(0.1, rel=0.02)
     assert (found.sizes.rms[[0, 2]] < 0.03).all()
     assert found.floors[1] > 5
     assert np.isnan(found.sizes.rms[3:]).all()
     assert np.isnan(found.residual.value[:, 3:]).all()
-
-
-def test_no_gap_is_about_one_floor():
     found = compared([recording_of_sines(1), recording_of_sines(2)])
     assert (found.floors[:3] < 1.4).all()
     assert (found.floors[:3] > 0.7).all()
     assert all(d.p_value > 0.02 or d.r2 < 0.2 for d in found.dependence)
 
 
-def test_gap_follows_the_signal_that_makes_it():
+def test_gap_follows_the_signal_that_makes_it_and_its_stretch_is_where_it_is():
     found = compared([recording_of_sines(1, damping), recording_of_sines(2, damping)])
     best = {channel: next(d for d in found.dependence if d.channel == channel) for channel in ("torque x", "torque y")}
     assert [best[channel].signal for channel in best] == ["body rate x", "body rate y"]
@@ -85,15 +82,12 @@ def test_gap_follows_the_signal_that_makes_it():
     assert found.heat_map is not None
     assert found.heat_map.signals[0].endswith(found.heat_map.channel[-1])
 
-
-def test_stretch_is_where_the_gap_is():
     def burst(time, _rate):
         return np.column_stack([np.where((time > 10) & (time < 13), 0.2, 0.0), 0 * time, 0 * time])
 
     first = compared([recording_of_sines(1), recording_of_sines(2, burst)]).worst[0]
     assert (first.flight, first.channel) == (1, "torque x")
-    assert first.start_s == pytest.approx(10, abs=0.6)
-    assert first.end_s == pytest.approx(13, abs=0.6)
+    assert (first.start_s, first.end_s) == (pytest.approx(10, abs=0.6), pytest.approx(13, abs=0.6))
 
 
 def test_effects_without_signals_are_listed():
@@ -148,12 +142,6 @@ def test_refitted_inertia_changes_the_inertial_torque_in_proportion():
     )
     assert heavier[:, 0] == pytest.approx(1.1 * stated[:, 0])
     assert model.body.inertia == pytest.approx(np.diag([0.66, 0.6, 1.2]))
-
-
-def test_a_missing_signal_is_named():
-    model = with_effect("rotor_drag", 1e-3)
-    with pytest.raises(InputError, match=r"lacks rotor speed and velocity, which the model of the whole vehicle needs"):
-        of_vehicle([recording_of_sines(1)], model)
 
 
 def named(name):

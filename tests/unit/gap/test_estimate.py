@@ -25,20 +25,14 @@ def result(name, vehicle=None, **values):
     return sentence.removeprefix(CATALOGUE[name].sentence).strip()
 
 
-def test_weak_rotor_or_strong_opposite():
+def test_a_weak_rotor_or_its_strong_opposite_is_said_where_it_is_sure():
     said = result("rotor_mismatch", difference_1=(-0.05, 0.01), difference_2=(0.001, 0.01))
     assert said == "M1 pulls 5 % less than modelled, or M3 as much more."
     said = result("rotor_mismatch", difference_1=(0.05, 0.01), difference_2=(-0.12, 0.01))
     assert "M3 pulls 5 % less than modelled, or M1 as much more." in said
     assert "M2 pulls 12 % less than modelled, or M4 as much more." in said
-
-
-def test_nothing_sure_says_nothing_more():
     assert result("rotor_mismatch", difference_1=(0.01, 0.02), difference_2=(-0.01, 0.02)) == ""
     assert result("vertical_descent", f_1=(0.01, 0.02)) == ""
-
-
-def test_vehicle_without_opposite_pairs_names_the_weakest_rotor():
     angles = 2 * np.pi * np.arange(6) / 6
     hubs = [(0.3 * float(np.cos(a)), 0.3 * float(np.sin(a)), 0.0) for a in angles]
     vehicle = VehicleSettings(rotors=tuple(RotorSettings(position_m=h, spin=(-1) ** n) for n, h in enumerate(hubs)))
@@ -96,15 +90,12 @@ def test_the_chance_of_ranks_is_that_of_scipy(blocks, mean):
     assert chance_of_ranks(np.append(margin, 0.0)) == pytest.approx(expected, rel=1e-12)
 
 
-def test_equal_margins_share_their_ranks():
+def test_equal_margins_share_their_ranks_and_are_chance():
     margin = np.array([1.0, -1.0, 2.0, 2.0, 2.0, -0.5, 3.0, 1.0])
     ranks = np.array([3.0, 3.0, 6.0, 6.0, 6.0, 1.0, 8.0, 3.0]) * np.sign(margin)
     above = lambda each: each[each > 0].sum()  # noqa: E731
     exact = permutation_test((ranks,), above, permutation_type="samples", alternative="greater")
     assert chance_of_ranks(margin) == pytest.approx(exact.pvalue, rel=1e-12)
-
-
-def test_what_is_equal_is_chance():
     assert chance_of_ranks(np.zeros(4)) == 1.0
 
 
@@ -117,16 +108,9 @@ def test_formulas_are_off_by_what_is_left_above_the_floor_and_a_tenth_at_most(ex
     assert off_by(explained, left, above) == pytest.approx(off)
 
 
-def test_alone_a_set_is_certain():
-    assert likely([]).tolist() == [1.0]
-
-
-def test_what_predicts_every_block_alike_is_as_likely():
-    assert likely([np.zeros(12), np.zeros(12)]) == pytest.approx([1 / 3] * 3)
-
-
-def test_even_odds_of_blocks_multiply():
-    """Where all blocks say the same their weights do not matter: Bayes' rule remains."""
+def test_a_set_alone_is_certain_two_that_predict_alike_are_not_and_even_odds_multiply():
+    assert (likely([]).tolist(), likely([np.zeros(12), np.zeros(12)])) == ([1.0], pytest.approx([1 / 3] * 3))
+    # Where all blocks say the same their weights do not matter: Bayes' rule remains.
     odds = np.log([1 / 4, 1 / 19])
     assert likely([np.full(12, each / 12) for each in odds]) == pytest.approx(
         [1 / 1.302632, 0.25 / 1.302632, 0.052632 / 1.302632], abs=1e-5
@@ -154,13 +138,10 @@ def test_a_centre_of_mass_lies_inside_four_tenths_of_the_arm(length, admissible)
     assert keep.all()
 
 
-def test_what_the_data_leave_open_is_no_reason_to_refuse():
+def test_a_damping_beyond_all_bodies_is_refused_and_one_that_is_open_is_not():
     far = np.array([0.15, 0.0])
     assert within_bounds(OFFSET, far, np.array([0.02, 0.02]), VEHICLE)[1]
     assert not within_bounds(OFFSET, far, np.array([0.01, 0.02]), VEHICLE)[1]
-
-
-def test_a_damping_beyond_all_bodies_is_refused():
     assert within_bounds(DAMPING, np.array([1.7, 0.0, 0.0]), SURE, VEHICLE)[1]
     assert not within_bounds(DAMPING, np.array([1.9, 0.0, 0.0]), SURE, VEHICLE)[1]
 
@@ -196,20 +177,15 @@ def drawn(size, right=0.0, rng=RNG):
     return Equations(CLEAN + met[:, :-1], CLEAN @ TRUE + met[:, -1] + 0.01 * rng.standard_normal(ROWS), noise())
 
 
-def test_without_noise_it_is_least_squares():
+def test_noise_is_taken_off_the_normal_equations_of_least_squares():
     rows = drawn(0.0)
     plain = np.linalg.lstsq(rows.columns[:, :3], rows.right, rcond=None)[0]
-    assert rows.solve() == pytest.approx([*plain, 0.0], rel=1e-9, abs=1e-12)
-    assert rows.trusted == 1.0
-
-
-def test_noise_is_taken_off_the_normal_equations():
+    assert (rows.solve(), rows.trusted) == (pytest.approx([*plain, 0.0], rel=1e-9, abs=1e-12), 1.0)
     rows = drawn(0.6, right=0.4)
     noise, own = rows.noise[:, :3], rows.noise[:, -1]
     gram = rows.columns[:, :3].T @ rows.columns[:, :3] - noise.T @ noise
     moment = rows.columns[:, :3].T @ rows.right - noise.T @ own
-    assert rows.trusted == 1.0
-    assert rows.solve()[:3] == pytest.approx(np.linalg.solve(gram, moment), rel=1e-8)
+    assert (rows.trusted, rows.solve()[:3]) == (1.0, pytest.approx(np.linalg.solve(gram, moment), rel=1e-8))
 
 
 def test_numbers_that_noise_shrinks_come_out_as_they_are():

@@ -42,16 +42,13 @@ def air():
     return Air(found, gusts_only=np.zeros(6, dtype=bool), split=split)
 
 
-def test_the_floor_of_the_flights_that_gusts_were_found_in_is_their_size(air):
+def test_the_floor_of_flights_in_gusts_is_their_size_and_seldom_exceeded_by_others(air):
     learned = flights(30.0, 30.0)
     floor = air.floor(learned, learned)
     np.testing.assert_allclose(floor[:3], averages(30.0, 400).std(), rtol=0.05)
     # Nothing is split off along the other axes, whose floor is that of the sensors.
     np.testing.assert_array_equal(floor[3:], 0.0)
     assert np.isinf(air.noise(WINDOWS)[3:]).all()
-
-
-def test_gusts_of_another_flight_seldom_exceed_its_floor(air):
     floor = air.floor(flights(1e6), flights(30.0))[0]
     above = (averages(30.0, 400) ** 2).mean(axis=1) > floor**2
     assert 0.01 < above.mean() < 0.08

@@ -38,13 +38,10 @@ def test_a_rich_flight_hides_little_and_says_which_signals_it_lacks():
         assert seen not in found
 
 
-def test_high_above_the_ground_its_effect_cannot_show():
+def test_an_effect_can_show_where_one_flight_has_its_signal_and_is_not_high_above_the_ground():
     high, low = fly(1), replace(fly(1), ground_height_m=29.5)
     assert "heights" in reasons([high])["ground_effect"]
     assert "ground_effect" not in reasons([low])
-
-
-def test_a_signal_of_one_flight_is_enough():
     blind = replace(fly(2), velocity=None)
     assert "the flights lack velocity" in reasons([blind])["rotor_drag"]
     assert "rotor_drag" not in reasons([blind, fly(1, speed=5.0)])
@@ -68,32 +65,20 @@ def test_hover_shows_a_bias_but_not_the_motion_that_is_missing():
     assert "torque_bias" not in found
 
 
-def test_what_is_chosen_or_the_vehicle_itself_is_not_unseen():
+def test_what_is_chosen_is_not_unseen_and_more_noise_hides_more():
     found = reasons([fly(1, tilt=1e-4, yaw=1e-4, speed=1e-3)], [candidate("linear_damping")])
     assert "linear_damping" not in found
     assert "parameter_error" not in found
-
-
-def test_more_noise_hides_more():
     quiet, loud = reasons([fly(1)], floor=0.1 * FLOOR), reasons([fly(1)], floor=100 * FLOOR)
     assert set(quiet) < set(loud)
 
 
-def test_damping_drains_and_its_opposite_feeds():
+def test_damping_drains_its_opposite_feeds_and_what_is_constant_or_noise_does_neither():
     noise = RNG.normal(size=(400, 3))
     torque = np.column_stack([-0.5 * RATE[:, 0], 0.5 * RATE[:, 1], np.zeros(400)]) + noise
     assert energy_directions(torque, RATE, BLOCK) == ["drains", "feeds", "neither"]
-
-
-def test_a_constant_torque_does_neither():
     assert energy_directions(np.ones((400, 3)), RATE + 1, BLOCK) == ["neither"] * 3
-
-
-def test_few_blocks_say_nothing():
     assert energy_directions(-RATE, RATE, BLOCK // 4) == ["neither"] * 3
-
-
-def test_noise_is_seldom_taken_for_either():
     found = [energy_directions(RNG.normal(size=(400, 3)), RATE, BLOCK) for _ in range(100)]
     assert sum(word != "neither" for words in found for word in words) < 15
 
@@ -178,20 +163,12 @@ def test_others_are_not(quiet):
     assert result(quiet) == ()
 
 
-def test_a_refit_that_takes_nothing_off_the_gap_shows_nothing():
-    assert result(SURE, share=0.04) == ()
-
-
-def test_a_residual_that_could_be_all_of_a_number_leaves_it_unnamed():
-    assert result(SURE, unknown=0.14) == ("inertia_x",)
+def test_what_a_refit_leaves_shows_in_the_channel_of_its_number():
+    assert (result(SURE, share=0.04), result(SURE, unknown=0.14)) == ((), ("inertia_x",))
     assert result(SURE, unknown=0.16) == ()
-
-
-def test_the_channel_of_the_number_has_to_shrink():
     elsewhere, there = np.zeros(6), np.zeros(6)
     elsewhere[1:], there[0] = 0.9, 0.9
-    assert result(SURE, share=elsewhere) == ()
-    assert result(SURE, share=there) == ("inertia_x",)
+    assert (result(SURE, share=elsewhere), result(SURE, share=there)) == ((), ("inertia_x",))
 
 
 def test_probability_is_that_of_a_normal_error_of_the_surest_number():
@@ -222,8 +199,7 @@ def test_a_wrong_drag_factor_accounts_for_as_much_of_izz():
     small, large, other = (
         number(name, value, 0.02) for name, value in (("inertia_z", -0.15), ("inertia_z", -0.25), ("inertia_x", -0.15))
     )
-    assert result(small, effects=(wrong,)) == ()
-    assert result(large, effects=(wrong,)) == ("inertia_z",)
+    assert (result(small, effects=(wrong,)), result(large, effects=(wrong,))) == ((), ("inertia_z",))
     assert result(other, effects=(wrong,)) == ("inertia_x",)
 
 
@@ -234,16 +210,10 @@ def test_where_rates_show_a_wrong_thrust_too_it_is_no_mass(inertia, said):
     assert ("A mass of" in effect.sentence) is said
 
 
-def test_a_load_accounts_for_any_thrust():
-    assert result(number("thrust_scale", 0.5, 0.01), effects=[named("payload")]) == ()
-
-
 def test_numbers_that_no_vehicle_has_are_ratios_to_the_config():
+    assert result(number("thrust_scale", 0.5, 0.01), effects=[named("payload")]) == ()
     surely = Estimate("inertia_z", "1", 11.0, 10.999, 11.001, (-0.7, 2.0))
     assert impossible_ratios([surely, number("inertia_y", 0.1, 0.01)]) == {"inertia_z": 12.0}
-
-
-def test_numbers_that_a_vehicle_can_have_are_not_impossible():
     assert impossible_ratios([number("inertia_x", 2.9, 0.2), number("coupling_x", 50.0, 0.01)]) == {}
 
 

@@ -111,12 +111,9 @@ def test_what_is_explained_is_the_share_of_the_motion():
     assert found.explained[:3][known] == pytest.approx(0.9, abs=0.1)
 
 
-def test_flights_of_other_paths_and_copies_are_not_split():
+def test_pairs_of_one_path_with_a_flight_that_no_fit_has_seen_are_split():
     assert split([run(0, 0), run(1, 0)]) is None
     assert split([run(0, 0), run(0, 0)]) is None
-
-
-def test_pairs_with_a_flight_that_no_fit_has_seen_are_preferred():
     runs = [run(0, draw) for draw in range(3)]
     assert RepeatedRuns.of(runs).pairs == ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
     assert RepeatedRuns.of(runs, 1).pairs == ((0, 2), (1, 2), (2, 0), (2, 1))

@@ -61,13 +61,10 @@ def test_torque_and_force_are_judged_each(shares, expected):
     assert verdict_of([BIG], [], False, shares, True, GapSettings()) is expected
 
 
-def test_shares_of_the_settings_decide():
+def test_shares_of_the_settings_decide_and_a_gap_that_remains_is_not_all_explained():
     strict = GapSettings(named_share=0.99, partial_share=0.97)
     assert verdict_of([BIG], [], False, (0.98,), True, strict) is GapVerdict.PARTIAL
     assert verdict_of([BIG], [], False, (0.96,), True, strict) is GapVerdict.UNEXPLAINED
-
-
-def test_a_gap_that_remains_is_not_all_explained():
     assert verdict_of([BIG], [], True, (0.99,), True, GapSettings()) is GapVerdict.PARTIAL
 
 
@@ -153,24 +150,13 @@ def refused(raised, after, monkeypatch, beyond=None):
         ({}, 2.4, None),
     ],
     ids=[
-        "small beside a formula that fits",
-        "small beside one that is off",
-        "hardly to be seen beside a large one",
-        "to be seen beside a large one",
-        "hardly to be seen beside one that is not much larger",
-        "not so small",
-        "needless",
-        "small in a channel of its own",
-        "of second order in a channel of its own",
-        "not so small in a channel of its own",
-        "needless alone",
-        "needed",
-        "what is noise without it",
-        "what just is not",
-        "harmful",
-        "nothing named",
+        "small beside a formula that fits", "small beside one that is off", "hardly to be seen beside a large one",
+        "to be seen beside a large one", "hardly to be seen beside one that is not much larger", "not so small",
+        "needless", "small in a channel of its own", "of second order in a channel of its own",
+        "not so small in a channel of its own", "needless alone", "needed", "what is noise without it",
+        "what just is not", "harmful", "nothing named",
     ],
-)
+)  # fmt: skip
 def test_names_stand_that_the_unseen_flights_need(raised, after, name, monkeypatch):
     found = refused(raised, after, monkeypatch)
     assert (found.name if found else None) == name

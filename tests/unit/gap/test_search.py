@@ -65,22 +65,14 @@ def rivals(step, own):
 
 def test_a_column_that_is_the_same_is_an_alternative_and_a_superset_is_none(step):
     found = rivals(step, "special")
-    assert set(found) == {"twin"}
-    assert found["twin"].instead_of == "special"
-    assert found["twin"].relative_gain == pytest.approx(1)
-    assert found["twin"].separated_by == "fly otherwise"
-
-
-def test_what_windows_do_not_show_has_no_rivals_by_them(step):
-    assert alternatives(replace(of(step, "special"), gain=-1.0), step.ranking, step.above_floor, SETTINGS) == []
+    assert (set(found), found["twin"].instead_of) == ({"twin"}, "special")
+    assert (found["twin"].relative_gain, found["twin"].separated_by) == (pytest.approx(1), "fly otherwise")
 
 
 def test_a_superset_explains_as_much_all_the_same(step):
+    assert alternatives(replace(of(step, "special"), gain=-1.0), step.ranking, step.above_floor, SETTINGS) == []
     names = {other.candidate.effect.name for other in unbeaten(of(step, "special"), step.ranking, step.above_floor)}
     assert names == {"twin", "general"}
-
-
-def test_the_special_case_is_an_alternative_of_its_superset(step):
     assert {"special", "twin"} <= set(rivals(step, "general"))
 
 
@@ -88,13 +80,7 @@ def test_the_fewest_numbers_win_among_equals(step):
     first = [of(step, name) for name in ("general", "special", "twin", "other")]
     assert simplest(first, step.above_floor, 8.0).candidate.effect.name in ("special", "twin")
     assert simplest([of(step, "general"), of(step, "other")], step.above_floor, 8.0).candidate.effect.name == "general"
-
-
-def test_more_numbers_alone_make_no_superset(step):
     assert "general" in rivals(step, "twin")
-
-
-def test_an_effect_with_next_to_no_gain_is_no_alternative(step):
     assert "other" not in rivals(step, "special")
 
 

@@ -192,14 +192,11 @@ def lagrange_torque(model):
     return torque
 
 
-def test_a_model_in_euler_coordinates_is_lagrange_turned_to_the_body():
+def test_a_model_in_euler_coordinates_is_lagrange_turned_to_the_body_and_needs_the_attitude():
     model = Patterned()
     expected = rotations.body_torque(ATTITUDE, lagrange_torque(model))
     np.testing.assert_allclose(averaged(rotation_balance(FLIGHT, model)), AVERAGED.average(expected), atol=2e-5)
     assert np.abs(expected - rotations.body_torque(ATTITUDE, SECOND @ TENSOR)).max() > 0.1
-
-
-def test_a_model_needs_the_attitude_and_a_body_does_not():
     blind = replace(FLIGHT, attitude=None)
     np.testing.assert_array_equal(rotation_balance(blind).momentum, rotation_balance(FLIGHT).momentum)
     with pytest.raises(InputError, match="needs the attitude"):

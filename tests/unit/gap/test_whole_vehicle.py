@@ -68,21 +68,15 @@ def test_torque_force_and_inertia_are_those_of_the_effects():
     np.testing.assert_allclose(whole.body.inertia, STATED + inertia_correction(numbers, QUAD), rtol=1e-12)
 
 
-def test_products_of_inertia_stand_in_the_inertia():
+def test_what_the_vehicle_holds_is_taken_and_what_is_not_simulated_with_the_state_is_named():
     products = fitted("products_of_inertia", 1e-4, 2e-4, 0)
     whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD)
     np.testing.assert_allclose(whole.body.inertia, STATED + symmetric([0, 0, 0, 1e-4, 2e-4, 0]), rtol=1e-12)
     assert whole.effects == ()
-
-
-def test_lag_and_delay_are_those_of_the_rotors():
     effects = (fitted("motor_lag", time_constant_s=0.04), fitted("command_delay", delay_s=0.02))
     whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD)
     assert (whole.response.lag_s, whole.response.delay_s) == (0.04, 0.02)
     assert whole.effects == ()
-
-
-def test_what_is_not_simulated_with_the_state_is_named():
     effects = (fitted("wind", 1.0, 0.0), fitted("torque_bias", 0.1, 0, 0), fitted("battery_sag", exponent=1.5))
     whole = whole_vehicle(ExtendedModel(None, parameters(), effects), QUAD)
     assert whole.unsimulated == ("battery_sag", "wind")
@@ -135,12 +129,9 @@ def test_what_is_left_out_is_measured_along_flights():
     assert Off.of(unseen.ends).sentence.endswith(" degrees")
 
 
-def test_a_plain_model_is_the_vehicle():
+def test_a_plain_model_is_the_vehicle_and_an_inertia_of_no_body_is_not_taken():
     whole = whole_vehicle(plain(None), QUAD)
     assert (whole.vehicle, whole.is_rigid_body) == (QUAD, True)
-
-
-def test_an_inertia_of_no_body_is_not_taken():
     products = fitted("products_of_inertia", 0.1, 0.0, 0.0)
     whole = whole_vehicle(ExtendedModel(None, parameters(), (products,)), QUAD)
     assert whole.vehicle == QUAD

@@ -29,15 +29,9 @@ def scores(model, rigid, zero=(1.0, 1.0, 1.0)):
     return Judged(models=names, parts=parts, samples=samples, outside=0 * samples, **measures)
 
 
-def test_the_smaller_mean_squared_error_wins_axis_by_axis():
+def test_the_smaller_mean_squared_error_wins_axis_by_axis_and_rounding_is_a_tie():
     assert scores((0.1, 0.3, 0.2), (0.2, 0.2, 0.2)).winners("training") == ["model", "rigid-body", "tie"]
-
-
-def test_a_difference_of_nothing_but_rounding_is_a_tie():
     assert scores((3e-28, 1e-30, 2e-29), (1e-33, 2e-34, 1e-33)).winners("training") == ["tie"] * 3
-
-
-def test_the_same_small_numbers_decide_where_the_torque_itself_is_small():
     small = (1e-26, 1e-26, 1e-26)
     assert scores((3e-28, 3e-28, 3e-28), (1e-33, 1e-33, 1e-33), small).winners("training") == ["rigid-body"] * 3
 
@@ -331,15 +325,12 @@ def test_a_constant_torque_is_named_with_its_size():
     assert "hardly" not in sentences
 
 
-def test_an_axis_that_does_not_move_is_called_hardly_excited():
+def test_an_axis_that_does_not_move_is_called_hardly_excited_and_one_that_does_is_not():
     data = small_angle_flight(yaw=0.01, tilt=0.05)
     noise = 0.2 * np.random.default_rng(3).standard_normal((300, 3)) * [0, 0, 1]
     sentences = result(with_torque(data, data.torque + noise))
     assert "yaw is hardly excited: motion and a constant explain less than half" in sentences
     assert "roll is" not in sentences
-
-
-def test_torque_on_a_moving_axis_that_is_not_inertia_is_not_called_unexcited():
     data = small_angle_flight()
     wrong = data.torque.copy()
     wrong[:, 1] = np.random.default_rng(4).standard_normal(300)
@@ -348,14 +339,11 @@ def test_torque_on_a_moving_axis_that_is_not_inertia_is_not_called_unexcited():
     assert "hardly excited" not in sentences
 
 
-def test_a_wrong_unit_shows_in_the_ratio_to_the_stated_inertia():
+def test_a_wrong_unit_and_another_vehicle_show_in_the_ratio_to_the_stated_inertia():
     data = small_angle_flight()
     assert "times those stated" in result(with_torque(data, 57.3 * data.torque))
     assert "times those stated" not in result(with_torque(data, 2.0 * data.torque))
     assert "times those stated" not in result(with_torque(data, 57.3 * data.torque), stated=None)
-
-
-def test_another_vehicle_is_said_on_held_out_flights():
     data, other = small_angle_flight(), small_angle_flight(seed=2)
     assert "other: the model explains less than half" in result(data, {"other": with_torque(other, 5 * other.torque)})
     assert "explains less than half" not in result(data, {"other": other})

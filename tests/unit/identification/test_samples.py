@@ -101,8 +101,7 @@ def test_products(case):
         A, y = case.rows[case.label == own].reshape(-1, case.rows.shape[2]), case.torque[case.label == own].ravel()
         assert_close(found.gram[own], A.T @ A)
         assert_close(found.moment[own], A.T @ y)
-        assert found.square[own] == pytest.approx(y @ y)
-        assert found.rows[own] == len(y)
+        assert (found.square[own], found.rows[own]) == (pytest.approx(y @ y), len(y))
     some = found.sum(np.array([True, False, True]))
     assert_close(some.gram[0], found.gram[0] + found.gram[2])
     assert some.rows.tolist() == [3 * np.sum(case.label != 1)]
@@ -221,8 +220,7 @@ def test_workers_are_sent_the_same_whether_or_not_samples_were_made_ready():
     samples = Samples.of(ready, STRUCTURE, data_ranges(STRUCTURE, attitude))
     before, partitions = pickle.dumps(samples), uniform_breakpoints(STRUCTURE)
     square = samples.products(partitions).square
-    assert pickle.dumps(samples) == before
-    assert pickle.loads(before).products(partitions).square == square
+    assert (pickle.dumps(samples), pickle.loads(before).products(partitions).square) == (before, square)
 
 
 STREAMED = {

@@ -66,8 +66,7 @@ def test_a_centre_of_mass_is_found():
     balance = balance_of(hovering(1 + ahead, gusts=0.005, **CURVE))
     (cause,) = (cause for cause in balance.causes if cause.kind == "centre of mass")
     assert cause.alone
-    assert cause.unit == "share of the arm"
-    assert cause.forward.value == pytest.approx(0.05, abs=0.0025)
+    assert (cause.unit, cause.forward.value) == ("share of the arm", pytest.approx(0.05, abs=0.0025))
     assert cause.right.value == pytest.approx(0, abs=0.0025)
     assert kinds(balance) == {("centre of mass", 0), ("wind", 0)}
 
@@ -103,8 +102,7 @@ def test_a_yaw_trim_is_positive_clockwise_and_roll_to_the_right():
 
 def test_sound_rotors_need_no_cause():
     balance = balance_of(hovering([1.01, 0.99, 1.005, 0.995], gusts=0.005, **CURVE))
-    assert balance.uneven == ()
-    assert balance.causes == ()
+    assert (balance.uneven, balance.causes) == ((), ())
     assert balance.even
     assert not balance_of(hovering([1.1, 0.9, 1.0, 1.0], gusts=0.005, **CURVE)).even
     # Wide intervals show neither.

@@ -59,23 +59,17 @@ def test_what_is_asked_of_the_state_is_no_instrument():
     assert found.instrument == "stick"
 
 
-def test_resting_sticks_identify_nothing(flight):
+def test_sticks_that_rest_or_move_nothing_identify_nothing(flight):
     found = axis_effectiveness(without_sticks(flight), 0)
     assert found.verdict == "none"
     assert "rests" in found.reason
     assert found.effectiveness is None
     assert found.draws.shape == (0, 5)
-
-
-def test_a_stick_that_does_not_move_the_vehicle_is_weak(flight):
     rng = np.random.default_rng(4)
     other = np.where(np.isnan(flight.stick), np.nan, 0.3 * rng.standard_normal(flight.stick.shape))
     found = axis_effectiveness(replace(flight, stick=other, rate_setpoint=0.1 * other), 0)
     assert found.verdict == "weak"
     assert found.effectiveness is None
-
-
-def test_silent_axes_are_not_identified(flight):
     assert [each.verdict for each in effectiveness(flight)][1:] == ["none", "none"]
 
 

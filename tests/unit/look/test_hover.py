@@ -33,8 +33,7 @@ def test_the_throttle_that_hovers_covers_the_truth():
         hover = hover_of(still_flight(60.0, RATE, collective=0.4 + 0.02 * noise))
         inside += hover.throttle.low <= 0.4 <= hover.throttle.high
     assert 88 <= inside <= 100
-    assert hover.found_by == "specific force"
-    assert hover.scatter == pytest.approx(0.015, abs=0.006)
+    assert (hover.found_by, hover.scatter) == ("specific force", pytest.approx(0.015, abs=0.006))
 
 
 def test_climbs_and_the_ground_are_no_hover():
@@ -44,8 +43,7 @@ def test_climbs_and_the_ground_are_no_hover():
     collective[:200] = 0.1
     collective[200:400], up[200:400] = 0.6, 1.5 * GRAVITY
     hover = hover_of(still_flight(60.0, RATE, collective=collective, specific_force=forces(up)))
-    assert hover.throttle.value == pytest.approx(0.4)
-    assert hover.hover_s == 40.0
+    assert (hover.throttle.value, hover.hover_s) == (pytest.approx(0.4), 40.0)
 
 
 def test_hover_without_an_accelerometer_is_level_flight_at_one_height():
@@ -56,8 +54,7 @@ def test_hover_without_an_accelerometer_is_level_flight_at_one_height():
     unknown = np.full((1200, 3), np.nan)
     flight = still_flight(60.0, RATE, climb_rate=climb, attitude=tilt, collective=collective, specific_force=unknown)
     hover = hover_of(flight)
-    assert hover.found_by == "climb rate"
-    assert hover.throttle.value == pytest.approx(0.4)
+    assert (hover.found_by, hover.throttle.value) == ("climb rate", pytest.approx(0.4))
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
@@ -82,14 +79,11 @@ def test_a_height_controller_hides_no_exponent():
     assert hover_of(still_flight(120.0, RATE, collective=only_gusts, specific_force=forces(up))).shape is None
 
 
-def test_a_loop_in_acro_is_no_hover():
+def test_a_loop_in_acro_is_no_hover_and_a_steady_collective_has_no_shape():
     """Where no attitude is logged, the mean force of a loop may be gravity all the same."""
     turning = np.tile([0.0, 6.0, 0.0], (1200, 1))
     flight = still_flight(60.0, RATE, body_rate=turning, attitude=np.full((1200, 3), np.nan))
     assert hover_of(flight).throttle is None
-
-
-def test_a_steady_collective_has_no_shape():
     assert hover_of(climbing(0, 1.5, by=0.02)).shape is None
 
 
@@ -113,8 +107,7 @@ def test_stated_hover_is_compared_as_thrust():
     """Of 0.4 of the range, a square curve makes 0.16 of thrust; what is asked of the mixer is thrust itself."""
     stated = {"MOT_THST_EXPO": 1.0, "MOT_SPIN_MIN": 0.0, "MOT_SPIN_MAX": 1.0, "MOT_THST_HOVER": 0.3}
     hover = hover_of(still_flight(60.0, RATE, autopilot="ardupilot", parameters=stated))
-    assert hover.stated.parameter == "MOT_THST_HOVER"
-    assert hover.stated.measured.value == pytest.approx(0.16)
+    assert (hover.stated.parameter, hover.stated.measured.value) == ("MOT_THST_HOVER", pytest.approx(0.16))
     assert hover.stated.differs
     # Thin air and force within 5 % of gravity: no finding.
     for value, differs in ((0.14, False), (0.12, True), (0.165, False)):
@@ -137,7 +130,7 @@ def battery(seed=0, resistance=0.05, varied=5.0, seconds=120.0, noise=0.03):
     return still_flight(seconds, RATE, voltage=voltage, current=current)
 
 
-def test_resistance_and_open_circuit_voltage_cover_the_truth():
+def test_resistance_and_open_circuit_voltage_cover_the_truth_where_the_current_varies():
     found = [hover_of(battery(seed)).battery for seed in range(60)]
     assert sum(each.slope.low <= 0.05 <= each.slope.high for each in found) >= 54
     assert sum(each.open_circuit_begin.low <= 16.5 <= each.open_circuit_begin.high for each in found) >= 54
@@ -145,9 +138,6 @@ def test_resistance_and_open_circuit_voltage_cover_the_truth():
     assert found[0].used_mah == pytest.approx(20 * 120 / 3.6, rel=0.1)
     assert found[0].sag_hover.value == pytest.approx(0.05 * 20, rel=0.15)
     assert found[0].sag_full is None
-
-
-def test_a_current_that_hardly_varies_shows_no_resistance():
     assert hover_of(battery(varied=0.3)).battery.slope is None
 
 
@@ -156,7 +146,6 @@ def test_without_current_voltage_is_compared_with_the_collective():
     collective = 0.4 + 0.08 * correlated(generator, 1200, RATE, 2.0)[:, 0]
     voltage = 16 - 2.0 * collective + 0.01 * generator.normal(size=1200)
     battery = hover_of(still_flight(60.0, RATE, collective=collective, voltage=voltage)).battery
-    assert battery.against == "collective"
-    assert battery.slope.value == pytest.approx(2.0, abs=0.05)
+    assert (battery.against, battery.slope.value) == ("collective", pytest.approx(2.0, abs=0.05))
     assert battery.open_circuit_begin is None
     assert np.isnan(battery.used_mah)

@@ -13,16 +13,10 @@ from tests.builders.looked import looked_flight
 
 RATE, COUNT = 1000, 40_000
 STATED = {
-    "p_roll": 50.0,
-    "i_roll": 80.0,
-    "d_roll": 40.0,
-    "looptime": 1000.0,
-    "pid_process_denom": 1.0,
-    "gyro_lpf1_dyn_min_hz": 80.0,
-    "gyro_lpf2_static_hz": 0.0,
-    "dterm_lpf1_dyn_min_hz": 100.0,
+    "p_roll": 50.0, "i_roll": 80.0, "d_roll": 40.0, "looptime": 1000.0, "pid_process_denom": 1.0,
+    "gyro_lpf1_dyn_min_hz": 80.0, "gyro_lpf2_static_hz": 0.0, "dterm_lpf1_dyn_min_hz": 100.0,
     "dterm_lpf2_static_hz": 0.0,
-}
+}  # fmt: skip
 
 
 def low_pass(values, hz):
@@ -86,17 +80,10 @@ def test_what_rounding_hides_is_not_judged():
 
 def test_older_names_and_kinds_of_filters_are_read_once():
     header = {
-        "rollPID": "45,40,25",
-        "dterm_filter_type": 1.0,
-        "dterm_lpf_hz": 100.0,
-        "dterm_notch_hz": 260.0,
-        "dterm_notch_cutoff": 160.0,
-        "gyro_lowpass_hz": 90.0,
-        "gyro_notch_hz": "400,200",
-        "gyro_notch_cutoff": "300,100",
-        "looptime": 125.0,
-        "pid_process_denom": 1.0,
-    }
+        "rollPID": "45,40,25", "dterm_filter_type": 1.0, "dterm_lpf_hz": 100.0, "dterm_notch_hz": 260.0,
+        "dterm_notch_cutoff": 160.0, "gyro_lowpass_hz": 90.0, "gyro_notch_hz": "400,200",
+        "gyro_notch_cutoff": "300,100", "looptime": 125.0, "pid_process_denom": 1.0,
+    }  # fmt: skip
     log = replace(looked_flight("betaflight", system="Betaflight 3.1.3"), parameters=header)
     own = flown_law(log).axes[0]
     assert [(each.kind, each.hz) for each in own.slope] == [("notch", 260.0), ("second", 100.0)]

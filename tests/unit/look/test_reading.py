@@ -39,8 +39,7 @@ def turning(found):
 @pytest.mark.parametrize("autopilot", logs.WRITERS)
 def test_one_flight_is_the_same_in_every_log(autopilot):
     found = read(logs.WRITERS[autopilot](OWN))
-    assert found.autopilot == autopilot
-    assert found.rate_hz == pytest.approx(200.0, rel=1e-3)
+    assert (found.autopilot, found.rate_hz) == (autopilot, pytest.approx(200.0, rel=1e-3))
     # Of a sample every 0.01 s: exact where there is one.
     np.testing.assert_allclose(found.body_rate[::2], on(found, OWN.rate @ FLIP)[::2], atol=1e-6)
     np.testing.assert_allclose(found.gyroscope.values, OWN.rate @ FLIP, atol=1e-6)
@@ -202,20 +201,14 @@ def test_sticks_are_positive_as_the_rate():
             assert np.corrcoef(found.stick[known, axis], found.body_rate[known, axis])[0, 1] > 0.9
 
 
-def test_motion_alone_is_not_enough():
+def test_motion_a_log_without_a_gyroscope_and_heights_alone_are_not_enough():
     with pytest.raises(InputError, match=r"neither rotors nor anything that was asked.*SDLOG_PROFILE"):
         read(logs.px4(OWN, motors=0, outputs=0))
-
-
-def test_a_log_without_a_gyroscope():
     contents = logs.px4(OWN)
     for name in ("sensor_combined", "vehicle_angular_velocity"):
         del contents.topics[name]
     with pytest.raises(InputError, match=r"^a log without a gyroscope.*SDLOG_PROFILE"):
         read(contents)
-
-
-def test_a_log_of_heights_and_a_voltage_alone():
     contents = logs.ardupilot(OWN)
     for name in set(contents.topics) - {"BAT"}:
         del contents.topics[name]

@@ -69,12 +69,10 @@ def test_what_px4_states():
         "vehicle_imu_status": state([6, 7, 8], **{f"accel_clipping[{axis}]": [0, axis, axis] for axis in range(3)})
     }
     assert of(events(logs.px4(HOP, more=counted)), "clipping")[0][1].endswith("(vehicle_imu_status: y 1, z 2 times)")
-    assert of(found, "take-off") == [(5.9, "takes off")]
-    assert of(found, "landing") == [(24.2, "lands")]
+    assert (of(found, "take-off"), of(found, "landing")) == ([(5.9, "takes off")], [(24.2, "lands")])
     assert of(found, "armed") == [(4.5, "armed"), (27.0, "disarmed")]
     assert of(found, "mode") == [(0.0, "mode position"), (8.0, "mode mission"), (15.0, "mode return")]
-    assert of(found, "failsafe") == [(15.0, "failsafe")]
-    assert of(found, "message") == [(9.0, "“wind”")]
+    assert (of(found, "failsafe"), of(found, "message")) == ([(15.0, "failsafe")], [(9.0, "“wind”")])
     assert [event.time_s for event in found] == sorted(event.time_s for event in found)
 
 
@@ -218,13 +216,10 @@ def test_clipping_gaps_and_the_battery():
     assert not [e for e in events(logs.betaflight(OWN)) if e.kind in ("clipping", "gap", "battery")]
 
 
-def test_a_log_that_ends_in_the_air():
+def test_a_log_that_ends_in_the_air_is_said_and_who_disarms_with_the_rotors_on_may_touch_down():
     found = events(logs.px4(OWN))
     assert [text for _, text in of(found, "end")] == ["the log ends in the air"]
     assert not of(found, "landing")
-
-
-def test_who_disarms_with_the_rotors_on_may_touch_down():
     armed = {"flightModeFlags": (OWN.time < OWN.time[-1] - 0.05).astype(float)}
     found = events(logs.betaflight(OWN, more=armed))
     assert [text for _, text in of(found, "end")] == ["disarmed as it flies or touches down"]
@@ -242,8 +237,7 @@ def test_what_is_logged_and_how_fast():
     log = LookedLog(contents.topics, contents.units, contents.system)
     logged = what_is_logged(found, log, recognition, 1.7e9, ("one", "two"))
     assert (logged.rotors, logged.frame, logged.system) == (4, "quad X", "PX4 1.15.0")
-    assert logged.date == "2023-11-14 22:13"
-    assert logged.flown_s == pytest.approx(19.0, abs=0.6)
+    assert (logged.date, logged.flown_s) == ("2023-11-14 22:13", pytest.approx(19.0, abs=0.6))
     assert logged.spans_s.shape == (1, 2)
     assert logged.voltage_begin == pytest.approx(16 - 0.01 * logged.spans_s[0, 0], abs=0.01)
     rows = {row.signal: row for row in logged.signals}

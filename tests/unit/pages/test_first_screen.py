@@ -91,8 +91,7 @@ def next_steps(found):
 )
 def test_every_verdict_has_a_headline(given, words):
     box, *_ = screen(diagnosis(**given))
-    assert box.label == given.get("verdict", "NAMED").replace("_", " ")
-    assert box.title == words
+    assert (box.label, box.title) == (given.get("verdict", "NAMED").replace("_", " "), words)
 
 
 def test_a_name_comes_with_its_size_its_interval_and_how_sure_it_is():
@@ -299,8 +298,7 @@ def test_the_closest_effects_are_not_the_answer_and_say_how_little_they_do():
 
 def test_flights_held_out_and_why_stand_below():
     *_, below = screen(diagnosis())
-    assert dict(below)["Fitted to"] == "one.csv"
-    assert dict(below)["Held out"] == "two.csv"
+    assert (dict(below)["Fitted to"], dict(below)["Held out"]) == ("one.csv", "two.csv")
     assert dict(below)["Why"] == "No flight was held out by name."
 
 
@@ -308,8 +306,7 @@ def test_remarks_are_said_but_those_that_are_said_elsewhere():
     notes = ("A note that readers need.", WRONG, *made.AUDIT.notes)
     record = diagnosis("CONTRADICTED", named=(), notes=notes, contradictions=(WRONG,))
     assert remarks(record) == ["A note that readers need."]
-    assert plain(record)["contradictions"] == [WRONG]
-    assert plain(record)["notes"] == list(notes)
+    assert (plain(record)["contradictions"], plain(record)["notes"]) == ([WRONG], list(notes))
 
 
 def test_what_is_gone_is_said_of_torque_and_force_where_both_had_a_gap():
@@ -388,5 +385,4 @@ def test_machines_read_what_people_read():
     }  # fmt: skip
     assert set(summary["playback"]["models"]) == {"after", "nothing-moves", "rate-stays", "before"}
     assert summary["playback"]["models"]["before"]["attitude"]["mae"][-1] == pytest.approx(0.3)
-    assert summary["warnings"] == ["a.csv: gaps"]
-    assert summary["contradictions"] == []
+    assert (summary["warnings"], summary["contradictions"]) == (["a.csv: gaps"], [])

@@ -1,7 +1,9 @@
 """Pages of the gap workflow: its forms, effects, disagreement, repeats and disturbance."""
 
+import json
 import re
 from dataclasses import replace
+from html import unescape
 from itertools import starmap
 
 import numpy as np
@@ -11,23 +13,26 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 from cpfls_cli import page
+from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.naming.results import Estimate, LikelySet, Unexplained
 from cpfls_cli.pages.gap import BEFORE, MEASURED, effect_title, keep_in_view, leaves_view, marked
 from cpfls_cli.pages.gap_words import NOT_SPLIT, WHAT_TO_FLY, repeatability_drawn
+from cpfls_cli.pages.page import report_page
 from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.playback.errors import PREDICTIONS, WITH_PAST
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import Observer, free_runs, player_of
 from cpfls_cli.playback.replay import Played, replay
 from cpfls_cli.report.canvas import HELD, picture_of
-from cpfls_cli.report.content import Box, Facts, Folded, Table, Text, unfolded
+from cpfls_cli.report.content import Box, Facts, Folded, Form, Table, Text, unfolded
+from cpfls_cli.report.source import Sources
+from cpfls_cli.report.terminal import terminal_lines
 from cpfls_cli.result import plain
 from cpfls_cli.stages.compare import _offsets, _signal_words
 from cpfls_cli.stages.vehicle import vehicle
 from cpfls_cli.stages.vehicle import vehicle as stage
 from tests.builders import gap_artifacts as made
-from tests.builders.forms import in_all_forms, phrases, words
 from tests.builders.gusty_flights import SMALL, STORM, Flight, gusty_flights
 from tests.builders.vehicle_models import QUAD, source_of_vehicle, vehicle_of, whole
 
@@ -69,6 +74,66 @@ LEFT = (
     Unexplained("force x", 2.0, None, 0.0, None, "neither"),
 )
 _WIDE = 80
+
+
+def phrases(block):
+    """List what a block says: sentences, rows of tables, facts."""
+    match block:
+        case Box():
+            return [block.title, *block.sentences]
+        case Table():
+            return [" ".join(cell.text for cell in row) for row in block.cells]
+        case Facts():
+            return [value for _, value in block.rows]
+        case Text():
+            return [block.text]
+        case Folded():
+            return [phrase for inner in block.blocks for phrase in phrases(inner)]
+    return []
+
+
+def words(text):
+    """Let case, spaces, the marks of what is code and the end of a sentence be."""
+    return " ".join(text.replace("`", "").split()).lower().rstrip(".")
+
+
+def in_all_forms(source, blocks):
+    """Tell a record on a page; give the text of each form, one line for each row of a table."""
+    sources = Sources([source], source.vehicle, Study().report)
+    html, markdown, data = (report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON))
+    texts = {
+        "terminal": "\n".join(terminal_lines(blocks, whole=True)),
+        "html": _of_html(html),
+        "markdown": _of_markdown(markdown),
+        "json": "\n".join(_of_json(json.loads(data))),
+    }
+    return {form: "\n".join(" ".join(line.split()) for line in text.splitlines()) for form, text in texts.items()}
+
+
+def _of_html(page):
+    body = re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", page, flags=re.DOTALL)
+    rows = re.sub(r"\s*\n\s*", " ", body)
+    return unescape(re.sub(r"<[^>]+>", " ", re.sub(r"</(tr|p|div|li|dd|h\d|caption|figcaption|thead)>", "\n", rows)))
+
+
+def _of_markdown(page):
+    plain = re.sub(r"^> ", "", page, flags=re.MULTILINE)
+    plain = plain.replace("**", "").replace(" | ", " ").replace("| ", "").replace(" |", "")
+    return unescape(re.sub(r"\\(.)", r"\1", plain))
+
+
+def _of_json(value):
+    """List all text, the cells of a row on one line."""
+    if isinstance(value, dict):
+        for item in value.values():
+            yield from _of_json(item)
+    elif isinstance(value, list) and value and all(isinstance(item, str) for item in value):
+        yield " ".join(value)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _of_json(item)
+    elif isinstance(value, str):
+        yield value
 
 
 @pytest.mark.parametrize(
@@ -308,18 +373,12 @@ def test_where_nothing_is_repeatable_no_effect_explains_the_gap():
     assert sentences[0].startswith("Torque about x (roll): nothing is repeatable (at most 4 %).")
 
 
-def test_what_runs_do_not_tell_is_open():
+def test_what_runs_do_not_show_is_open_chance_is_no_effect_and_larger_noise_is_named():
     box, sentences = again_box(made.repeatability(NOTHING, error=0.5))
     assert box.title == "These runs do not show whether the gap is repeatable: up to 100 % of it may be."
     assert "nothing is surely repeatable" in sentences[0]
-
-
-def test_chance_is_not_taken_for_an_effect():
-    """Twice the error, in one of 36 numbers, is nothing."""
+    # Twice the error, in one of 36 numbers, is nothing.
     assert not made.repeatability(shares(yaw=[0.0, 0.0, 0.0, 0.2, 0.0, 0.0]), error=0.1).repeating
-
-
-def test_noise_that_is_larger_than_gusts_is_named():
     _, sentences = again_box(made.repeatability(NOTHING, noise=3.9))
     assert "The rest: noise of the sensors of about 3.9 rad/s²." in sentences[0]
 

@@ -106,8 +106,7 @@ def test_a_contradiction_comes_first():
     wrong = ("a.csv: the gyroscope is mirrored", "b.csv: so is this")
     box, _ = answer(result_of(contradictions=wrong, roll=estimate()))
     assert box.title == "The log contradicts itself: a.csv: the gyroscope is mirrored."
-    assert box.sentences == ("b.csv: so is this.",)
-    assert box.tone == "warning"
+    assert (box.sentences, box.tone) == (("b.csv: so is this.",), "warning")
 
 
 @pytest.mark.usefixtures("drawn")

@@ -66,12 +66,9 @@ def of_inertia(own, *moments):
     return replace(own, model=replace(own.model, vehicle=replace(own.model.vehicle, inertia_kg_m2=moments)))
 
 
-def test_numbers_without_a_meaning_of_their_own_are_counted_and_not_listed():
+def test_numbers_without_a_meaning_of_their_own_are_counted_and_warned_of_where_they_stand_for_one_with_a_name():
     assert [row[0] for row in rows_of(learned(), "Number")] == ["rotor drag k_d"]
     assert any("3 more form the learned remainder" in text for text in texts(learned()))
-
-
-def test_they_are_warned_of_only_where_they_stand_for_a_number_with_a_name():
     said = " ".join(texts(learned()))
     assert "only together (correlation): rotor drag k_d and remainder force 3_0_0 (-0.970)" in said
     assert "remainder_force.3_0_1" not in said
@@ -153,8 +150,7 @@ def test_headline_table_and_section_follow_from_one_judgement_of_what_is_identif
     """Where instruments identify the constants, the body that a forecast turns by is no word against them."""
     own = instrumented(vehicle_of(whole()))
     own = replace(own, forecast=of_inertia(own, 3.0, 3.0, 5.0).model)
-    assert own.unreal == ("inertia.Ixx",)
-    assert own.not_determined == ()
+    assert (own.unreal, own.not_determined) == (("inertia.Ixx",), ())
     assert title(own).endswith("its constants are identified.")
     assert all(each.determined for each in own.parameters.values() if each.low is not None)
     assert vehicle_section(own)["inertia_kg_m2"][0] == own.model.vehicle.inertia_kg_m2[0]
@@ -281,8 +277,7 @@ def instrumented(own, cost=12.0, **given):
 def test_constants_that_repeats_identify_are_judged_by_what_is_repeatable_and_not_by_a_forecast():
     own = instrumented(vehicle_of(whole(), loop=LOOP))
     assert own.held_out is None
-    assert own.forecast_verdict == Trust.NOT_JUDGED
-    assert own.verdict == Trust.SIMULATION
+    assert (own.forecast_verdict, own.verdict) == (Trust.NOT_JUDGED, Trust.SIMULATION)
     first, cost, *_ = evidence(own)
     assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in first
     assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in first

@@ -148,8 +148,7 @@ def test_runs_of_a_path_are_found_however_late_they_begin(has_velocity):
         _flown(2, late=-1.5, has_velocity=has_velocity),
     ]
     found = instruments(flights)
-    assert found.kind == "repeats"
-    assert found.repeats.paths() == ((0, 2), (1, 3))
+    assert (found.kind, found.repeats.paths()) == ("repeats", ((0, 2), (1, 3)))
     assert min(found.repeats.likeness.values()) > 0.95
 
 
@@ -172,8 +171,7 @@ def test_a_flight_that_is_asked_its_path_again_is_cut_into_its_runs():
     found = instruments([flight, _flown(2)])
     assert [run.flight for run in found.runs] == [0, 0, 0, 0, 1]
     assert [run.part.start for run in found.runs[:4]] == pytest.approx([0, 1500, 3000, 4500], abs=10)
-    assert found.repeats.paths() == ((0, 1, 2, 3),)
-    assert found.flights == {0}
+    assert (found.repeats.paths(), found.flights) == (((0, 1, 2, 3),), {0})
     beside, none = found.by_flight([flight.motion.rate[:, 0], motion.rate[:, 0]])
     assert none is None
     known = np.isfinite(beside[:, 0])

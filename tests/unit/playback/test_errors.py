@@ -144,8 +144,7 @@ def test_predictions_are_found_by_their_names():
     mixed = ("with-past", "stated", "rate-stays", "model", "nothing-moves")
     rows = {"model": good(HORIZON), "nothing-moves": 3 * HORIZON, "rate-stays": 2 * HORIZON}
     errors = errors_of(HORIZON, body_rate={name: rows.get(name, 9 * HORIZON) for name in mixed})
-    assert errors.rival("body_rate") == "rate-stays"
-    assert errors.better_to("body_rate") == 0.4
+    assert (errors.rival("body_rate"), errors.better_to("body_rate")) == ("rate-stays", 0.4)
 
 
 @dataclass(frozen=True)

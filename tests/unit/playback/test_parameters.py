@@ -102,8 +102,7 @@ def test_the_stated_numbers_make_the_stated_vehicle():
     free = numbers(STATED, ("inertia", "thrust_factor", "drag_factor", "products"), RULES["one rule"])
     model = free.at(free.starts).model
     assert model.vehicle.inertia_kg_m2[:3] == pytest.approx(STATED.inertia_kg_m2)
-    assert model.vehicle.rotors == STATED.rotors
-    assert model.effects == ()
+    assert (model.vehicle.rotors, model.effects) == (STATED.rotors, ())
 
 
 def test_numbers_are_read_in_si():

@@ -110,18 +110,12 @@ def test_an_estimate_that_is_no_vehicle_is_refused():
         spread_of(found_record(model))
 
 
-def test_few_vehicles_are_drawn_where_many_draws_are_impossible():
+def test_what_leaves_few_draws_or_no_interval_is_said():
     # Of two draws both are often impossible here, which says nothing against the estimate.
     for seed in range(8):
         assert len(spread_of(found_record(loop=([0.5, 0.5, 0.3], [2, 2, 4]), relative=0.3), 2, seed).models) == 2
-
-
-def test_one_block_shows_no_interval():
     with pytest.raises(InputError, match="too short to show how sure its numbers are"):
         spread_of(found_record(blocks=1))
-
-
-def test_a_number_that_no_vehicle_has_is_named():
     far = ModelEffect("com_offset", {}, np.array([0.4, 0.0]))
     with pytest.raises(ComputationError, match="no vehicle has such a com_offset"):
         spread_of(found_record(replace(flat(truth()), effects=(far,))))

@@ -42,13 +42,10 @@ def stopping_at(number):
     return progress
 
 
-def test_a_stopped_search_gives_what_it_has(flights):
+def test_a_stopped_search_gives_what_it_has_and_lacks_baselines_that_were_not_judged(flights):
     choice = chosen(flights, stopping_at(4))
     assert (choice.complete, choice.evaluated) == (False, 4)
     assert choice.best.error <= choice.chosen.error < choice.nothing.error
-
-
-def test_a_search_stopped_before_all_blocks_were_judged_lacks_these_baselines(flights):
     choice = chosen(flights, stopping_at(2))
     assert (choice.added, choice.everything) == (None, None)
     assert {each.name for each in choice.tried} == {"chosen", "best", "nothing", "front"}
@@ -254,27 +251,21 @@ def test_flights_of_one_axis_each_are_cut(flights):
         assert first.starts[-1] + first.horizon < second.starts[0]
 
 
-def test_flights_that_do_not_translate_are_asked_for_rotation_alone(flights):
+def test_flights_that_can_be_parted_and_judged_are_asked_for_what_they_show(flights):
     still = [replace(flight, has_velocity=False) for flight in flights]
     assert set(tried_blocks(STATED, flights, QUICK)) == set(TRIED)
     assert set(tried_blocks(STATED, still, QUICK)) == {"linear_damping", "quadratic_damping", "inertia"}
-
-
-def test_parts_are_flights_or_pieces_of_a_single_one(flights):
     parts = parts_of(flights, QUICK)
     assert [[windows.flight.name for windows in part] for part in parts] == [[each.name] for each in flights]
     first, second = (part[0].starts for part in parts_of(flights[:1], QUICK))
     assert first[-1] + 50 < second[0]
 
 
-def test_a_flight_of_one_window_is_too_short_to_be_judged(flights):
+def test_flights_that_show_nothing_to_judge_by_are_refused(flights):
     motion, speed = flights[0].motion, flights[0].speed
     short = replace(flights[0], motion=motion_at(motion, slice(55)), speed=speed[:55], stretches=(slice(0, 55),))
     with pytest.raises(InputError, match=r"figure-2-0: too short for a horizon of 0\.5 s to be judged"):
         parts_of([short], QUICK)
-
-
-def test_flights_that_show_nothing_that_is_predicted_are_refused(flights):
     motion = flights[0].motion
     unseen = replace(flights[0], motion=motion._replace(rate=0.0 * motion.rate), has_attitude=False)
     with pytest.raises(InputError, match="figure-2-0: no body rate changes, and no attitude was measured"):

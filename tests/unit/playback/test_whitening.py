@@ -148,20 +148,16 @@ def test_what_stands_still_grows_with_nothing():
 def test_a_gust_has_its_size_and_falls_to_37_percent_within_its_memory():
     step, count = 0.02, 200_000
     drawn = GUSTS.drawn(np.random.default_rng(1), step, count)
-    assert drawn.shape == (count, len(GUST_AXES))
-    assert drawn.std(axis=0) == pytest.approx(GUSTS.size, rel=0.05)
+    assert (drawn.shape, drawn.std(axis=0)) == ((count, len(GUST_AXES)), pytest.approx(GUSTS.size, rel=0.05))
     for column, size, memory in zip(drawn.T, GUSTS.size, GUSTS.memory, strict=True):
         late = round(memory / step)
         assert np.mean(column[late:] * column[:-late]) == pytest.approx(size**2 / np.e, rel=0.12)
 
 
-def test_the_first_is_as_large_as_any():
+def test_the_first_gust_is_as_large_as_any_and_comes_again_with_its_seed():
     rng = np.random.default_rng(2)
     first = np.array([GUSTS.drawn(rng, 0.01, 1)[0] for _ in range(4000)])
     assert first.std(axis=0) == pytest.approx(GUSTS.size, rel=0.05)
-
-
-def test_gusts_come_again_with_their_seed():
     one, other = (GUSTS.drawn(np.random.default_rng(3), 0.01, 50) for _ in range(2))
     np.testing.assert_array_equal(one, other)
 
@@ -192,8 +188,7 @@ def pieces(rest):
 
 def test_shares_the_rest_and_the_memory_are_found(pieces, rest):
     found = lack_of(*pieces, KNOWN, rest, (0.05, 8.0))
-    assert found.share[:2] == pytest.approx(SHARE[:2], rel=0.15)
-    assert found.share[2] == 0.0
+    assert (found.share[:2], found.share[2]) == (pytest.approx(SHARE[:2], rel=0.15), 0.0)
     assert found.rest < 3 * REST
     assert found.memory == pytest.approx(MEMORY_S, rel=0.15)
 

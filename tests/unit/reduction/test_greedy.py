@@ -129,8 +129,7 @@ def test_condition_number_stops_as_soon_as_it_is_reached():
 def test_unreachable_condition_number_takes_all_samples(criterion):
     Q = problem(2)
     selection = reduce(Q, ReductionSettings(criterion=criterion, size=None, condition_number=1.01))
-    assert selection.stop_reason == "all-samples"
-    assert sorted(selection.indices) == list(range(40))
+    assert (selection.stop_reason, sorted(selection.indices)) == ("all-samples", list(range(40)))
 
 
 def test_progress_counts_to_the_size():

@@ -121,13 +121,10 @@ def test_a_pool_too_small_for_the_rank_is_refused():
             refuse(surveyed, settings, generator())
 
 
-def test_size_must_fit_the_pool():
+def test_size_must_fit_the_pool_and_a_target_that_it_does_not_reach_is_said():
     with pytest.raises(SettingError, match="at least size = 30") as caught:
         ReductionSettings(size=30, pool=20)
     assert caught.value.key == "pool"
-
-
-def test_a_target_that_the_pool_does_not_reach_says_so():
     surveyed = survey(lambda: [regressor(samples=200)], 1e-10)
     settings = ReductionSettings(criterion="D", size=None, condition_number=1.001, pool=50)
     selection = reduce_streamed(surveyed, settings, generator())

@@ -79,13 +79,10 @@ def test_a_table_fits_the_terminal_and_loses_nothing(width):
             assert any(word in line.split() for line in shown)
 
 
-def test_facts_stand_in_two_columns_and_long_ones_are_broken_under_themselves():
+def test_facts_stand_in_two_columns_and_tables_without_titles_have_no_header():
     facts = Facts([("Source", "simulated along a path with a long name"), ("Samples", "549")])
     assert lines(facts) == ["Source   simulated along a path with a long name", "Samples  549"]
     assert lines(facts, width=30) == ["Source   simulated along a", "         path with a long name", "Samples  549"]
-
-
-def test_a_table_without_titles_has_no_header():
     assert lines(Table("t", "", ("", ""), [["a", "1"], ["bc", "23"]])) == ["a    1", "bc  23"]
 
 
@@ -96,14 +93,11 @@ def test_sentences_stand_as_they_are_and_pictures_stay_on_the_page():
     assert shown == ["a sentence", "a heading", "Verdict: good", "  one reason", "  another", "one", "two"]
 
 
-def test_what_warns_is_apart():
+def test_what_warns_is_apart_and_what_is_folded_away_is_named():
     blocks = [Text("all is well"), Text("beware", "warning"), Text("note this", "note")]
     assert lines(*blocks) == ["all is well", "note this"]
     assert warnings_of(blocks) == (Text("beware", "warning"),)
     assert warnings_of([Folded("More", blocks)]) == warnings_of(blocks)
-
-
-def test_what_is_folded_away_is_named_and_shown_on_request():
     blocks = [Text("the answer"), Folded("why", [Text("because"), Folded("numbers", [Facts([("one", "1")])])])]
     assert lines(*blocks) == ["the answer"]
     assert folded_words(blocks) == ("why",)
@@ -201,8 +195,7 @@ def test_a_change_in_words(cause, sizes, words, shows):
 
 def test_names_and_checks():
     assert cause_name("unbalance M2") == "another balance of rotor M2"
-    assert cause_name("unbalance") == "another balance of rotors"
-    assert cause_name("odd thing") == "odd thing"
+    assert (cause_name("unbalance"), cause_name("odd thing")) == ("another balance of rotors", "odd thing")
     assert what_to_check("scale z").startswith("see whether the gyroscope's range")
     assert what_to_check("odd thing") == "look at the numbers that changed"
 
@@ -265,8 +258,7 @@ def test_verdicts_of_a_trend(more, verdict, title):
 def test_each_has_a_figure_and_tables(name):
     result = made[name]()
     section = loaded(name).section(source_of(result, name), 1)
-    assert section.plots == [f"{name}-1-numbers"]
-    assert len(section.tables) == 2
+    assert (section.plots, len(section.tables)) == ([f"{name}-1-numbers"], 2)
     (fold,) = [block for block in section.blocks if isinstance(block, Folded)]
     assert fold.shown
     assert not [block for block in unfolded(section.blocks) if isinstance(block, Box)]
@@ -275,16 +267,10 @@ def test_each_has_a_figure_and_tables(name):
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (0.0, "0"),
-        (5153.338, "5153"),
-        (0.0123456, "0.01235"),
-        (-0.5, "−0.5000"),
-        (6.3e-9, "6.300 × 10⁻⁹"),
-        (9.9999e5, "1.000 × 10⁶"),
-        (math.inf, "∞"),
-        (math.nan, "—"),
+        (0.0, "0"), (5153.338, "5153"), (0.0123456, "0.01235"), (-0.5, "−0.5000"), (6.3e-9, "6.300 × 10⁻⁹"),
+        (9.9999e5, "1.000 × 10⁶"), (math.inf, "∞"), (math.nan, "—"),
     ],
-)
+)  # fmt: skip
 def test_a_number_keeps_its_significant_digits(value, text):
     assert number(value) == text
 
@@ -297,24 +283,13 @@ def test_settings_read_as_the_paper_prints_them(value, text):
 
 
 def test_a_share_of_variance_reads_one_only_when_nothing_is_missing():
-    assert r_squared(1.0) == "1"
-    assert r_squared(1.0 - 1e-6) == "> 0.9999"
-    assert r_squared(0.98765) == "0.9877"
-    assert r_squared(-1e-9) == "0.0000"
-    assert r_squared(-56730.0) == "−56730"
-    assert r_squared(math.nan) == "—"
+    assert (r_squared(1.0), r_squared(1.0 - 1e-6), r_squared(0.98765)) == ("1", "> 0.9999", "0.9877")
+    assert (r_squared(-1e-9), r_squared(-56730.0), r_squared(math.nan)) == ("0.0000", "−56730", "—")
 
 
-def test_rounding_is_written_as_zero_and_a_small_error_is_not():
-    assert percent(1.5e-15) == "0 %"
-    assert percent(1.5e-6) == "0.000150 %"
-    assert percent(0.01706) == "1.71 %"
-
-
-def test_a_change_carries_its_sign():
-    assert change(56805 / 56254 - 1) == "+0.98 %"
-    assert change(-0.348) == "−34.80 %"
-    assert change(-1e-9) == "0 %"
+def test_rounding_is_written_as_zero_and_a_change_with_its_sign():
+    assert (percent(1.5e-15), percent(1.5e-6), percent(0.01706)) == ("0 %", "0.000150 %", "1.71 %")
+    assert (change(56805 / 56254 - 1), change(-0.348), change(-1e-9)) == ("+0.98 %", "−34.80 %", "0 %")
 
 
 @pytest.mark.parametrize(
@@ -346,20 +321,17 @@ def test_ends_are_distinguished_and_right_to_a_tenth_of_the_width(value, width, 
 
 
 def test_print():
-    assert printed("-1.40e-4") == "−1.40 × 10⁻⁴"
-    assert printed("0.25") == "0.25"
+    assert (printed("-1.40e-4"), printed("0.25")) == ("−1.40 × 10⁻⁴", "0.25")
 
 
 def test_numbers_are_not_rounded_into_certainty():
     assert [whole_percent(share) for share in (0.0, 0.001, 0.42, 0.9961, 1.0)] == [
         "0 %", "< 1 %", "42 %", "> 99 %", "100 %",
     ]  # fmt: skip
-    assert probability(1e-9) == "< 10⁻⁶"
-    assert probability(0.0123) == "0.012"
+    assert (probability(1e-9), probability(0.0123)) == ("< 10⁻⁶", "0.012")
 
 
 def test_words_become_phrases_and_sentences():
-    assert joined(["a", "b", "c", "a"]) == "a, b and c"
-    assert joined(["a", "b"], "or") == "a or b"
+    assert (joined(["a", "b", "c", "a"]), joined(["a", "b"], "or")) == ("a, b and c", "a or b")
     assert sentence("no rotors") == "No rotors."
     assert sentence("log_1.csv: saturated?") == "log_1.csv: saturated?"

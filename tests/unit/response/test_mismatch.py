@@ -72,12 +72,9 @@ def test_a_model_is_off_where_it_is():
     assert late.phase == pytest.approx(-20.0)
 
 
-def test_what_chance_explains_is_not_off():
+def test_what_chance_explains_is_not_off_nor_is_a_single_point():
     assert all(each.right for each in mismatch(response(1.5, error=0.3)).deviations)
     assert not any(each.right for each in mismatch(response(1.5, error=0.1)).deviations)
-
-
-def test_a_single_point_is_scatter():
     ratio = np.ones(49)
     ratio[[20, 21]] = 4.0
     (only,) = mismatch(response(ratio)).deviations

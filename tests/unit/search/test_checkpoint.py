@@ -45,8 +45,7 @@ def evolved(generations=3):
 
 
 def assert_same(one, other):
-    assert one.index == other.index
-    assert one.rng.bit_generator.state == other.rng.bit_generator.state
+    assert (one.index, one.rng.bit_generator.state) == (other.index, other.rng.bit_generator.state)
     pairs = [(vars(one), vars(other)), (vars(one.history), vars(other.history))]
     pairs += [({"submitted": s.archive.submitted, **vars(s.archive.results)} for s in (one, other))]
     for first, second in pairs:
@@ -64,8 +63,7 @@ def checkpoint(tmp_path):
 
 
 def test_it_lies_next_to_the_output(checkpoint, tmp_path):
-    assert checkpoint.path == tmp_path / "model.h5.checkpoint"
-    assert checkpoint.output == tmp_path / "model.h5"
+    assert (checkpoint.path, checkpoint.output) == (tmp_path / "model.h5.checkpoint", tmp_path / "model.h5")
     checkpoint.remove()
     checkpoint.remove()
     assert list(tmp_path.iterdir()) == []

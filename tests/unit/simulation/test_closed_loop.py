@@ -231,14 +231,11 @@ def test_more_than_four_rotors_fly_too():
     assert flight.tracking.position_rms_m < 0.05
 
 
-def test_vehicle_that_cannot_stay_on_its_path_is_given_up():
+def test_a_vehicle_off_its_path_and_a_path_of_changing_rate_are_given_up():
     with pytest.raises(ComputationError, match=r"m away from the path at t = .* fly more gently"):
         flown(deviation_max_m=0.2, effects={"parameter_error": {"thrust_scale": -0.5}})
     with pytest.raises(ComputationError, match=r"tilts beyond 90 degrees|out of control"):
         flown(attitude_frequency_hz=8.0, effects={"command_delay": [0.12]})
-
-
-def test_trajectory_of_changing_rate_is_refused():
     time, plan = planned(0.5)
     settings = SimulationSettings(mode="closed-loop")
     with pytest.raises(ComputationError, match="at one rate"):
@@ -299,20 +296,14 @@ def flown_along(path, added, factor=1.0):
     return added.of_sizes(factor * added.sizes).onto(path, USUAL.gravity_m_s2)
 
 
-def test_what_fits_is_left_as_it_is():
+def test_limits_of_tilt_and_velocity_are_kept_and_reached():
     _, added, _, room = of(size_rad=0.03)
     np.testing.assert_array_equal(room.added.sizes, added.sizes)
     assert room.limits == ("", "")
-
-
-def test_tilt_is_kept_and_reached():
     path, _, _, room = of(size_rad=0.4, tilt_max=0.1, band_hz=(0.5, 1.0))
     assert room.limits == ("tilt (trajectory.tilt_max_rad = 0.1)",) * 2
     tilt = tilt_of(flown_along(path, room.added).attitude).max()
     assert 0.0995 < tilt <= 0.1
-
-
-def test_velocity_is_kept_and_reached():
     _, _, _, room = of(size_rad=0.4, velocity_max_m_s=0.2, band_hz=(0.5, 1.0))
     assert all("trajectory.excite.velocity_max_m_s = 0.2" in limit for limit in room.limits)
     velocity = np.linalg.norm(room.added.motion[1], axis=1).max()

@@ -85,8 +85,7 @@ def test_rotors_give_back_the_torque_and_the_weight():
     np.testing.assert_allclose(wrench.body_torque, flight.signals["body_torque"], atol=1e-9)
     force = planned()["acceleration"] + np.array([0, 0, 9.81])
     np.testing.assert_allclose(wrench.thrust, 6.0 * np.linalg.norm(force, axis=1), rtol=1e-12)
-    assert flight.infeasible == ()
-    assert flight.noise_std == {}
+    assert (flight.infeasible, flight.noise_std) == ((), {})
 
 
 def test_planned_signals_pass_unchanged_without_noise():
@@ -223,11 +222,8 @@ def test_collective_thrust_is_the_least_that_turns_every_rotor_forwards(vehicle)
         assert found == pytest.approx(least.x[0], rel=1e-9)
 
 
-def test_a_held_vehicle_that_does_not_turn_needs_no_thrust():
+def test_a_held_vehicle_needs_no_thrust_and_its_rotors_give_its_torque():
     assert collective_thrust(VehicleSettings(), np.zeros((3, 3)), None).max() == 0.0
-
-
-def test_rotors_of_a_held_vehicle_give_its_torque():
     vehicle = VehicleSettings(inertia_kg_m2=(0.06, 0.05, 0.08))
     signals = held(vehicle).signals
     given = body_wrench(vehicle, signals["rotor_speed"]).body_torque
@@ -243,9 +239,7 @@ def asked(vehicle, tilt_max=None, **settings):
 def test_thrust_carries_and_accelerates_the_mass():
     found, trajectory = asked(VehicleSettings())
     np.testing.assert_allclose(found.thrust, 6.0 * (9.81 + trajectory.acceleration[:, 2]), rtol=1e-12)
-    assert found.too_much == ()
-    assert found.rotors == ()
-    assert found.tilt.max() == 0.0
+    assert (found.too_much, found.rotors, found.tilt.max()) == ((), (), 0.0)
 
 
 def test_too_much_thrust_is_said_with_its_time():
@@ -253,8 +247,7 @@ def test_too_much_thrust_is_said_with_its_time():
     vehicle = VehicleSettings(rotor_speed_max_rad_s=np.sqrt(6 * 10.81 / (4 * 121.5e-6)))
     found, trajectory = asked(vehicle)
     (thrust,) = found.too_much
-    assert thrust.limit == pytest.approx(6 * 10.81)
-    assert thrust.worst == pytest.approx(6 * 11.81, rel=1e-9)
+    assert (thrust.limit, thrust.worst) == (pytest.approx(6 * 10.81), pytest.approx(6 * 11.81, rel=1e-9))
     assert trajectory.time[thrust.at] == pytest.approx(4.0)
     beyond = np.flatnonzero(trajectory.acceleration[:, 2] > 1.0)
     assert (thrust.first, thrust.count) == (beyond[0], len(beyond))
@@ -266,8 +259,7 @@ def test_tilt_is_that_of_the_thrust():
     found, trajectory = asked(VehicleSettings(), tilt_max=0.1, direction=(1.0, 0.0, 0.0))
     np.testing.assert_allclose(found.tilt, np.arctan(np.abs(trajectory.acceleration[:, 0]) / 9.81), atol=1e-9)
     (tilt,) = found.too_much
-    assert tilt.what == "tilt, rad"
-    assert tilt.worst == pytest.approx(np.arctan(2 / 9.81), rel=1e-9)
+    assert (tilt.what, tilt.worst) == ("tilt, rad", pytest.approx(np.arctan(2 / 9.81), rel=1e-9))
 
 
 def test_a_held_vehicle_has_its_thrust_free():

@@ -153,13 +153,10 @@ def test_wind_is_air_that_moves():
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ({"linear_damping": [0.1, 0.1]}, r"takes 3 values: d_x \(N m s/rad\), d_y .*; 2 given"),
         ({"linear_damping": [-0.1, 0.1, 0.1]}, r"d_x = -0.1 is not possible on this vehicle: 0 to 1.8 N m s/rad"),
-        ({"linear_damping": {"d_q": 0.1}}, r"has no d_q; takes 3 values"),
         ({"payload": {"mass": 0.5}}, r"needs length_m, damping_1_s"),
         ({"motor_lag": [0.5]}, r"time_constant_s = 0.5 is not possible on this vehicle: 0.005 to 0.15 s"),
         ({"euler_axis_torque": [1.0]}, r"takes no values; 1 given"),
-        ({"ground_effect": [4.0]}, r"needs vehicle.rotors.radius_m of every rotor"),
         ({"motor_lag": [0.05], "channel_delay": [0.02]}, r"shifts measured rotor speeds"),
     ],
 )

@@ -128,8 +128,7 @@ def test_plugins_of_urdf_are_corrected_and_put_in(tmp_path):
     said, new = correct(path, *found)
     assert [each.element for each in said.changes] == ["motorConstant", "ixx", "rotorDragCoefficient"]
     for rotor in new.rotors:
-        assert rotor.thrust.value == pytest.approx(0.83 * SMALL.thrust_factor)
-        assert rotor.drag.value == 2e-5
+        assert (rotor.thrust.value, rotor.drag.value) == (pytest.approx(0.83 * SMALL.thrust_factor), 2e-5)
     assert new.inertia[0, 0] == pytest.approx(0.8 * 0.83 * SMALL.inertia[0], rel=1e-3)
     assert any(each.startswith("ixy = ") and each.endswith("write it there") for each in said.elsewhere)
 
@@ -178,14 +177,11 @@ def test_inertia_alone_is_that_of_the_whole_vehicle(mine):
     assert any("iyy" in sentence and "agrees with the flights" in sentence for sentence in said.unchanged)
 
 
-def test_centre_of_mass_moves(mine):
+def test_centre_of_mass_moves_and_is_put_in_where_there_is_none(mine):
     said, new = correct(mine, effect("com_offset", c_x=(0.004, 1e-4), c_y=(-0.002, 1e-4), c_z=(0.001, 0.005)))
     np.testing.assert_allclose(new.centre, [0.004, -0.002, 0], atol=3e-6)
     assert [each.element for each in said.changes] == ["pose x", "pose y"]
     assert "4 mm forward" in said.changes[0].sentence
-
-
-def test_a_centre_is_put_in_where_there_is_none(mine):
     mine.write_text(mine.read_text().replace("        <pose>0 0 0 0 0 0</pose>\n", ""))
     said, new = correct(mine, effect("com_offset", c_x=(0.004, 1e-4), c_y=(-0.002, 1e-4)))
     np.testing.assert_allclose(new.centre, [0.004, -0.002, 0], atol=3e-6)
@@ -262,12 +258,9 @@ def test_one_weak_rotor_with_what_the_force_shows(mine):
     assert [each.sentence.partition(" is ")[0] for each in said.changes] == ["thrust of M3"]
 
 
-def test_torque_of_the_rotors(mine):
+def test_torque_of_the_rotors_and_a_product_of_inertia(mine):
     _, new = correct(mine, effect("drag_factor_error", error=0.3))
     assert [rotor.ratio.value for rotor in new.rotors] == pytest.approx([0.0078] * 4)
-
-
-def test_a_product_of_inertia(mine):
     _, new = correct(mine, effect("products_of_inertia", I_xy=(2e-6, 1e-7), I_xz=(0.0, 1e-7), I_yz=(0.0, 1e-7)))
     assert new.inertia[0, 1] == pytest.approx(2e-6, rel=1e-3)
 
@@ -277,8 +270,7 @@ def test_what_is_not_determined_stays(mine):
     rival = Alternative("torque_bias", "com_offset", 0.9, "change the thrust")
     offset = effect("com_offset", c_x=(0.004, 1e-4), c_y=(0.0, 1e-4))
     said, new = correct(mine, offset, effect("parasitic_drag", c_x=(0.02, 0.001)), alternatives=[rival])
-    assert said.changes == ()
-    assert said.diff == ""
+    assert (said.changes, said.diff) == ((), "")
     assert "these flights cannot separate it from" in said.unchanged[0]
     assert "the format has no number for it: a plugin of your own" in said.elsewhere[0]
     np.testing.assert_allclose(new.centre, 0, atol=1e-12)
@@ -630,8 +622,7 @@ def test_rotors_of_rotorpy_move_around_its_centre(tmp_path):
     path.write_text(text.replace("d * np.array([-0.5**0.5, -0.5**0.5, 0])", "[-side, -side, 0]"))
     said, new, before = shifted(path)
     np.testing.assert_allclose(new.hubs, before.hubs - SHIFT, rtol=0, atol=1e-5)
-    assert said.elsewhere == ()
-    assert len(said.changes) == 12
+    assert (said.elsewhere, len(said.changes)) == ((), 12)
     assert said.changes[0].sentence == "centre of mass of the vehicle is 4 mm forward, and the place of M1 is from it"
     rng, wrenches = np.random.default_rng(1), []
     speeds, rate, air = rng.uniform(800, 2500, 4), rng.normal(0, 0.0, 3), rng.normal(0, 3, 3)

@@ -73,8 +73,7 @@ def test_single_rotors_turn_as_the_log_has_them(tmp_path, turned, sure, has_log)
     spins = [-spin if index in turned else spin for index, spin in enumerate(true)]
     vehicle = of(tmp_path, spins, [(*place, spin) for place, spin in zip(X, true, strict=True)], sure)
     assert list(vehicle.spins) == (true if has_log else spins)
-    assert list(vehicle.turned) == (turned if has_log else [])
-    assert len(vehicle.warnings) == len(turned)
+    assert (list(vehicle.turned), len(vehicle.warnings)) == (turned if has_log else [], len(turned))
 
 
 def test_a_largest_speed_that_a_log_let_one_guess_is_that_of_the_model(tmp_path):
@@ -151,8 +150,7 @@ def test_a_file_without_rotors_flies_those_of_the_log(tmp_path):
     of = of_log(read_model(tmp_path / "v.xml"), None, None)
     assert not of.model.rotors
     flies = vehicle_of(of, of, STATED)
-    assert flies.vehicle.rotors == STATED.rotors
-    assert flies.vehicle.mass_kg == 1.5
+    assert (flies.vehicle.rotors, flies.vehicle.mass_kg) == (STATED.rotors, 1.5)
 
 
 def test_a_frame_of_ardupilot_flies_the_thrust_that_is_corrected(tmp_path):

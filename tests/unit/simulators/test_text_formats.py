@@ -136,8 +136,7 @@ def test_numbers_of_python_that_no_vehicle_has(mine, old, new, words):
 def test_a_section_of_toml(mine):
     path = mine("params.toml", SECTION.format(name="a") + SECTION.format(name="b").replace("0.0319", "0.04"))
     read = read_model(path.with_name("params.toml:b"))
-    assert read.mass_kg == 0.04
-    assert read.file == path
+    assert (read.mass_kg, read.file) == (0.04, path)
     a = read_model(path.with_name("params.toml:a"))
     hover = a.rotors[0].thrust.value
     # By the curve itself: what it lifts at the speed of hover is a quarter of the weight.

@@ -40,8 +40,7 @@ def test_axes_that_get_worse_are_warned_of():
     before, gap = np.array([2.0, 1.4, 10.0, 3.0, np.nan, 1.0]), made.extended().gap
     for factor, axes in ((1.3, [0, 2]), (1.1, [])):
         grown = replace(made.extended(), gap=replace(gap, before_floors=before, after_floors=factor * before))
-        assert grown.gap.worse_axes == axes
-        assert len(grown.warnings) == len(axes)
+        assert (grown.gap.worse_axes, len(grown.warnings)) == (axes, len(axes))
 
 
 def test_numbers_that_overflow_are_an_error_that_names_the_flight():

@@ -265,12 +265,9 @@ def test_moves_of_all_runs_and_the_ways_back_are_listed():
     np.testing.assert_allclose([leg.start for leg in mission.legs[1:]], ends[:-1], atol=1e-9)
 
 
-def test_one_run_is_the_path_itself():
+def test_one_run_is_the_path_itself_and_more_samples_than_memory_holds_are_refused():
     run, mission = flown(count=1, legs=1)
     assert mission is run
-
-
-def test_more_samples_than_memory_holds_are_refused():
     with pytest.raises(SettingError, match="more than") as caught:
         flown(count=1000, sample_time_s=0.002)
     assert caught.value.key == "sample_time_s"

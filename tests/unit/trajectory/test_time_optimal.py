@@ -12,8 +12,7 @@ PAPER = {"velocity": 8.0, "acceleration": 2.0, "jerk": 1.0, "snap": 1.0, "crackl
 def test_the_papers_limits_give_the_papers_move():
     move = plan_move(64.0, Limits(**PAPER))
     assert move.duration == pytest.approx(16.0, rel=1e-14)
-    assert move.profile.period == pytest.approx(1.0, rel=1e-14)
-    assert move.active == LIMIT_NAMES
+    assert (move.profile.period, move.active) == (pytest.approx(1.0, rel=1e-14), LIMIT_NAMES)
     assert move.profile.integral_of_absolute_jerk == pytest.approx(8.0, rel=1e-14)
 
 
@@ -57,9 +56,7 @@ def test_limits_up_to_the_jerk_give_the_move_of_seven_segments():
 
 def test_a_given_period_is_kept_and_the_amplitude_chosen():
     move = plan_move(3.0, Limits(velocity=100.0), period=0.5)
-    assert move.duration == 16 * 0.5
-    assert move.active == ()
-    assert move.peaks.displacement == 3.0
+    assert (move.duration, move.active, move.peaks.displacement) == (16 * 0.5, (), 3.0)
     assert plan_move(3.0, Limits(), period=0.5).profile == move.profile
 
 
@@ -92,14 +89,11 @@ def test_times_that_numbers_cannot_hold_are_no_solution(displacement, limit):
     assert "bring the displacement and the limits closer to 1" in move.outcome.words
 
 
-def test_a_negative_displacement_is_the_mirror_image():
+def test_a_negative_displacement_is_the_mirror_image_and_many_moves_are_planned_as_one():
     there, back = plan_move(7.0, Limits(**PAPER)), plan_move(-7.0, Limits(**PAPER))
     assert (back.duration, back.peaks, back.active) == (there.duration, there.peaks, there.active)
     time = np.linspace(0, there.duration, 100)
     np.testing.assert_array_equal(back.profile.sample(time), -there.profile.sample(time))
-
-
-def test_many_moves_are_planned_as_one_is():
     displacements, snaps = np.array([64.0, -1.0, 0.0, 3.0]), np.array([1.0, 2.0, 3.0, np.inf])
     moves = plan_moves(displacements, Limits(velocity=2.0, snap=snaps), period=np.array([1.0, 2.0, 3.0, 4.0]))
     for index, (displacement, snap) in enumerate(zip(displacements, snaps, strict=True)):

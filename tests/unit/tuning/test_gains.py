@@ -72,13 +72,10 @@ def test_what_flights_leave_open_costs_gain():
         assert other.roll.bandwidth_hz < 0.95 * sure.roll.bandwidth_hz
 
 
-def test_one_disk_holds_all_margins_that_are_asked_for():
+def test_one_disk_holds_all_margins_and_no_proposal_leaves_the_documented_range():
     asked = AskedMargins(6.0, 45.0, 35.0)
     assert np.degrees(2 * np.arctan(asked.disk / 2)) == pytest.approx(45.0)
     assert AskedMargins(12.0, 30.0, 20.0).disk == pytest.approx(2 * (10**0.6 - 1) / (10**0.6 + 1))
-
-
-def test_no_proposal_leaves_the_documented_range():
     parameter = AUTOPILOTS["ardupilot"].named("ATC_ANG_YAW_P")
     low, inside = proposal_of(parameter, 1.3), proposal_of(parameter, 4.567)
     assert (low.value, low.clipped) == (3.0, True)
@@ -191,8 +188,7 @@ def test_intervals_become_the_corners_of_the_plant():
     intervals = {"I": (0.9, 1.2), "k": (0.95, 1.05), "lag": (0.5, 1.5)}
     spread = spread_of(intervals, "I", "k")
     corners = list(spread.corners(plant))
-    assert corners[0] == plant
-    assert len(corners) == 5
+    assert (corners[0], len(corners)) == (plant, 5)
     assert sorted({each.gain for each in corners}) == pytest.approx([95 / 1.2, 100.0, 105 / 0.9])
     assert list(Spread().corners(plant)) == [plant]
 

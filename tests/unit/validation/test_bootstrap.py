@@ -90,8 +90,7 @@ def test_draws_are_those_of_all_rows_solved_again(base, every):
     best, expected = brute_force(alone, np.zeros(RIGID), y, label)
     np.testing.assert_allclose(fit_baselines(learned, fit.row_scale, 1e-10)[0].parameters, best, atol=1e-10)
     np.testing.assert_allclose(draws.best_rigid_body, expected, atol=1e-9)
-    assert draws.blocks == BLOCKS
-    assert draws.block_duration == pytest.approx(0.2)
+    assert (draws.blocks, draws.block_duration) == (BLOCKS, pytest.approx(0.2))
 
 
 def test_a_fuzzy_part_that_is_off_stays_off():

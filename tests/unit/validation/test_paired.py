@@ -132,14 +132,11 @@ def test_equal_models_differ_by_chance_as_often_as_they_should():
     assert 0 < sum(one.higher for one in found) < most
 
 
-def test_a_better_model_is_found_though_blocks_differ_by_orders_of_magnitude():
+def test_a_better_model_is_found_and_one_bad_block_of_twenty_is_not_better():
     theirs = np.logspace(-6, 0, MOST_COMPARED)
     found = compare_errors(0.8 * theirs * np.random.default_rng(62).uniform(0.9, 1.1, MOST_COMPARED), theirs, 1.0)
     assert (found.lower, found.higher) == (True, False)
     assert found.ratio == pytest.approx(0.8, abs=0.08)
-
-
-def test_one_bad_block_of_twenty_is_not_better():
     theirs = np.ones(MOST_COMPARED)
     ours = np.where(np.arange(MOST_COMPARED) == 3, 100.0, 0.9)
     found = compare_errors(ours, theirs, 1.0)
@@ -152,12 +149,9 @@ def test_rounding_is_no_difference(ours, theirs):
     assert (found.ratio, found.lower, found.higher) == (1.0, False, False)
 
 
-def test_errors_next_to_rounding_are_higher():
+def test_errors_next_to_rounding_are_higher_and_three_blocks_prove_nothing():
     found = compare_errors(np.full(MOST_COMPARED, 1e-3), np.full(MOST_COMPARED, 1e-30), 1.0)
     assert (found.ratio, found.higher) == (np.inf, True)
-
-
-def test_three_blocks_prove_nothing():
     found = compare_errors(np.full(3, 0.1), np.ones(3), 1.0)
     assert (found.lower, found.blocks) == (False, 3)
 
@@ -205,8 +199,7 @@ def test_torque_is_scaled_by_axis_and_left_out_where_the_pitch_is_vertical():
         lambda motion: 0.8 * torque[: len(motion)],
     )
     scaled = np.sum((0.1 * torque[result]) ** 2 / np.mean(torque[result] ** 2, axis=0), axis=1)
-    assert found.ours == pytest.approx(np.mean(scaled), rel=0.01)
-    assert found.ratio == pytest.approx(0.25)
+    assert (found.ours, found.ratio) == (pytest.approx(np.mean(scaled), rel=0.01), pytest.approx(0.25))
     assert found.lower
     # 342 samples are left, and a block has 20.
     assert found.blocks == 17
@@ -265,17 +258,11 @@ def predicted(motion):
     return 2 * motion.rate
 
 
-def test_a_constant_is_found_in_body_axes_whatever_the_attitude():
+def test_a_constant_is_found_in_body_axes_and_put_back_nothing_is_missing():
     both = Flights((pushed_flight(), pushed_flight(93)))
     np.testing.assert_allclose(mean_missing_torque(both, predicted), CONSTANT, rtol=1e-9)
-
-
-def test_put_back_nothing_is_missing():
     data = pushed_flight()
     np.testing.assert_allclose(with_constant(predicted, CONSTANT)(data.motion), data.torque, atol=1e-12)
-
-
-def test_a_vertical_pitch_throughout_shows_nothing():
     np.testing.assert_array_equal(mean_missing_torque(pushed_flight()[::9], predicted), np.zeros(3))
 
 
@@ -304,11 +291,8 @@ def test_the_own_structure_comes_first_and_every_name_once(keys):
     assert all(model_structure(structure).parameters > 0 for structure in listed)
 
 
-def test_settings_of_an_identification_are_a_structure_too():
+def test_settings_of_an_identification_are_a_structure_and_one_rule_has_no_use_for_an_input_map():
     assert candidate_structures(IdentificationSettings()) == candidate_structures(StructureSettings())
-
-
-def test_one_rule_of_harmonics_has_no_use_for_an_input_map():
     one_rule = [
         s for s in candidate_structures(StructureSettings()) if s.membership_functions == 1 and s.harmonic_order == 2
     ]

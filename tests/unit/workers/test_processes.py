@@ -54,12 +54,9 @@ def test_parts_say_which_rows_they_are(two):
     assert sorted(seen) == list(range(len(GENES)))
 
 
-def test_one_chromosome_and_many_follow_each_other(two):
+def test_streams_follow_each_other_and_one_that_is_given_up_leaves_nothing(two):
     for count in (1, 3, 40):
         assert two(GENES[:count]).genes.tolist() == (GENES[:count, ::-1] + 1).tolist()
-
-
-def test_a_stream_that_is_given_up_leaves_nothing_to_the_next(two):
     stream = two.stream(GENES)
     next(stream)
     stream.close()
@@ -159,8 +156,7 @@ def exists(process):
 def test_workers_are_closed_to_interrupts_take_one_thread_and_end_when_their_parent_is_killed(parent):
     processes = [int(text) for text in parent.stdout.readline().split()]
     most_threads, closed = parent.stdout.readline().split()
-    assert float(most_threads) == 1.0
-    assert float(closed) == 1.0
+    assert (float(most_threads), float(closed)) == (1.0, 1.0)
     assert all(exists(process) for process in processes)
     parent.kill()
     deadline = time.monotonic() + 10.0
@@ -197,8 +193,7 @@ def test_each_row_is_in_one_chunk_and_chunks_shrink_to_one_row(rows, workers):
     parts = chunks(rows, workers)
     lengths = [len(part) for part in parts]
     assert np.concatenate(parts).tolist() == list(range(rows))
-    assert lengths == sorted(lengths, reverse=True)
-    assert lengths[-1] == 1
+    assert (lengths, lengths[-1]) == (sorted(lengths, reverse=True), 1)
     assert lengths[0] <= -(-rows // (4 * workers))
 
 
@@ -223,17 +218,11 @@ def test_an_error_of_the_domain_keeps_its_message(kind):
     assert not isinstance(caught.value, WorkerError)
 
 
-def test_too_little_memory_has_a_remedy():
+def test_failures_have_a_remedy_or_their_origin_and_survive_being_pickled():
     with pytest.raises(WorkerError, match="ran out of memory: use fewer workers"):
         result_of(failing(MemoryError()))
-
-
-def test_any_other_error_is_named_and_its_origin_is_a_note():
     with pytest.raises(WorkerError, match="ZeroDivisionError: by nothing") as caught:
         result_of(failing(ZeroDivisionError("by nothing")))
     assert "test_processes.py" in caught.value.__notes__[0]
-
-
-def test_a_failure_survives_being_pickled():
     failure = failing(ZeroDivisionError("by nothing"))
     assert pickle.loads(pickle.dumps(failure)) == failure
