@@ -314,7 +314,15 @@ def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Name
             if each.effect.is_lag
         ]
     sure = {**named.sure, **lags.chances}
-    return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure)
+    differ = named.differ
+    if differ:
+        # Numbers of a fit are the loop's, and what instruments name may be in both.
+        last, unconfirmed = named.judge.confirmed(judgement)
+        differ = differences(judgement, last, named.steps[0], named.judge)
+        if unconfirmed and not differ:
+            judgement = named.judge.judge(with_lean(by_instruments(last.found, given), across))
+            refusals = refusals + unconfirmed
+    return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure, differ=differ)
 
 
 def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) -> _Named:
