@@ -212,6 +212,7 @@ class Judge:
                 worst,
                 f"on the held-out flights it makes the {CHANNELS[channel]} worse, "
                 f"{compared[worst].left[channel]:.2g} floors without it and {after[channel]:.2g} with it",
+                harms=True,
             )
         least = smallest(compared, lambda each: compared[each].visibly)
         if compared[least].visibly < VISIBLE**2:
