@@ -116,17 +116,17 @@ def diagnose(
     gusts, quiet = None, named.judgement.found.floor
     if unexplained_channels(named.judgement.found, rng):
         given = known_motion(training)
-        gusts = _gusts(named, given, settings)
+        gusts = _gusts(named.learned, given, settings)
         if gusts is not None and gusts.split.any():
             quiet = np.minimum(quiet, gusts.noise(windows))
-            flights = flights.in_air(gusts, unidentified_axes(named.judgement.found, given))
+            flights = flights.in_air(gusts, unidentified_axes(named.learned, given))
             across = gusts.found.size[3:5]
             searched = _named(flights, settings, rng, progress)
             named = _judged_with_lags(_significant(searched, given), given, across)
             if _wrong_inertia(named):
                 named = _at_stated_inertia(searched, flights, given, across) or named
             named = _with_small(named, gusts, given, across)
-            gusts = _gusts(named, given, settings)
+            gusts = _gusts(named.judgement.found, given, settings)
     losses = _losses(flights, named, settings, rng)
     if losses:
         # What else flights differ by may be these.
@@ -212,6 +212,8 @@ class _Named(NamedTuple):
     steps: list[RankedStep]
     judge: Judge
     judgement: Judgement
+    learned: NamedFit
+    """With what these flights have, and those held out surely have not."""
     refusals: list[Refusal]
     differ: tuple[str, ...]
     alike: tuple[Alternative, ...] = ()
@@ -242,7 +244,8 @@ def _named(
     first = judge.judge(found)
     judgement, unconfirmed = judge.confirmed(first)
     differ = differences(first, judgement, steps[0], judge)
-    return _Named(effects, steps, judge, first if differ else judgement, [*refusals, *unconfirmed], differ)
+    learned = first.found if any(each.harms for each in unconfirmed) else judgement.found
+    return _Named(effects, steps, judge, first if differ else judgement, learned, [*refusals, *unconfirmed], differ)
 
 
 def _losses(flights: _Flights, named: _Named, settings: GapSettings, rng: np.random.Generator) -> tuple[RotorLoss, ...]:
@@ -262,9 +265,8 @@ def _losses(flights: _Flights, named: _Named, settings: GapSettings, rng: np.ran
     return tuple(each for each in given if (each.flight, each.rotor) in left)
 
 
-def _gusts(named: _Named, given: Instruments, settings: GapSettings) -> Air | None:
+def _gusts(found: NamedFit, given: Instruments, settings: GapSettings) -> Air | None:
     """Find gusts in the residual of the training flights."""
-    found = named.judgement.found
     return air(found.hypothesis, found.estimates.linear, found.block, given, settings)
 
 
@@ -314,7 +316,15 @@ def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Name
             if each.effect.is_lag
         ]
     sure = {**named.sure, **lags.chances}
-    return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure)
+    differ = named.differ
+    if differ:
+        # Numbers of a fit are the loop's, and what instruments name may be in both.
+        last, unconfirmed = named.judge.confirmed(judgement)
+        differ = differences(judgement, last, named.steps[0], named.judge)
+        if unconfirmed and not differ:
+            judgement = named.judge.judge(with_lean(by_instruments(last.found, given), across))
+            refusals = refusals + unconfirmed
+    return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure, differ=differ)
 
 
 def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) -> _Named:

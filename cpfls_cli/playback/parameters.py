@@ -70,6 +70,11 @@ class Number:
         return self.name.split(".")[0]
 
     @property
+    def believed(self) -> float:
+        """Half of an interval that says no more than what is believed of any such vehicle."""
+        return min(self.scale, (self.high - self.low) / (2 * ROOM if self.block in CATALOGUE else 2))
+
+    @property
     def absent(self) -> float:
         """What it is in a model without its block."""
         return 0.0 if self.block in ("lag", "delay", "slow_actuation") else self.start

@@ -52,7 +52,8 @@ class FoundNumber(NamedTuple):
     """A number of a vehicle that was free.
 
     It is determined where the flights say more of it than what was believed before: to a factor of two where it cannot
-    be negative, else to its natural size. What turns torque into rotation is not where it makes a body that cannot be.
+    be negative, else to its natural size, or half of the range that is possible if that is less. What turns torque into
+    rotation is not where it makes a body that cannot be.
     """
 
     name: Annotated[str, About("block and number")]
@@ -278,7 +279,7 @@ def found_numbers(fitted: Fitted, spread: Uncertainty) -> Iterator[FoundNumber]:
         ends = _interval(found.value, float(half[place]), positive=found.positive)
         low, high = np.clip(ends, *_bounds(free, values, place)).tolist()
         known = stated[name].value if found.stated else np.nan
-        wide = high > KNOWN * low if found.positive else own[place] > number.scale
+        wide = high > KNOWN * low if found.positive else own[place] > number.believed
         determined = spread.determined[place] and not wide
         yield FoundNumber(name, found.unit, found.value, low, high, known, bool(determined), bool(bound))
 

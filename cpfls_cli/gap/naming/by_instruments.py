@@ -33,22 +33,27 @@ class _Source(NamedTuple):
     numbers: BoolArray  # Shape (number,): those that are free and that it identifies, and no source before it does.
 
 
-def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
+def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None = None) -> NamedFit:
     """Fit a hypothesis anew by instruments.
 
     With the regressors X, the residual r and the prediction Z of X by instruments, the numbers change by d with
     ``sum Z^T (r - X d) = 0``. A gust correlates with X, which the loop moves to answer it, and not with Z. Weakly
     identified numbers stay as they were, but for inertia and couplings, which are those of the config then; all stay
-    where the flights are too short for errors. Bounds count as standard deviations of a normal prior, as in the search.
+    where the flights are too short for errors. So does what nothing identifies any more where a long step has taken it.
+    Bounds count as standard deviations of a normal prior, as in the search.
+
+    `held`, shape (number,): numbers that stay.
 
     Reference: Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak
     instruments).
     """
     stated = at = _of_config(found)
-    sources = _sources(at, given)
+    held = np.zeros(len(found.values), dtype=bool) if held is None else held
+    sources = _sources(at, given, held)
     if not sources:
         return found
-    moved, before = np.zeros(len(found.values), dtype=bool), None
+    moved, far = np.zeros((2, len(found.values)), dtype=bool)
+    before = None
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
         values, left_out = _stepped(at, sources)
@@ -59,10 +64,13 @@ def by_instruments(found: NamedFit, given: Instruments) -> NamedFit:
             left_out[:, ~now] = before[:, ~now]
         moved, before = moved | now, left_out
         step, error, shapes = np.abs(values - at.values), jackknife_error(left_out), values[len(at.estimates.linear) :]
+        far = np.where(now, step > error, far)
         hypothesis = at.hypothesis.with_shapes(shapes) if len(shapes) else at.hypothesis
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
-        if np.all(10 * step <= error) or not (sources := _sources(at, given)):
+        if np.all(10 * step <= error) or not (sources := _sources(at, given, held)):
             break
+    if (lost := far & ~now).any():
+        return by_instruments(found, given, held | lost)
     return at._replace(estimates=_with_unidentified(stated, at.estimates, moved))
 
 
@@ -199,7 +207,7 @@ def predictable_residual(found: NamedFit, given: Instruments) -> Array:
     return np.array([products[block == number].sum() for number in np.unique(block)])
 
 
-def _sources(found: NamedFit, given: Instruments) -> list[_Source]:
+def _sources(found: NamedFit, given: Instruments, held: BoolArray | None = None) -> list[_Source]:
     """List what identifies numbers: repeats or setpoints; and the past, for lags and what the first does not identify.
 
     Of the vehicle only the numbers of the config: the place of a sensor and the coupling of rates show where several
@@ -212,6 +220,8 @@ def _sources(found: NamedFit, given: Instruments) -> list[_Source]:
     free[of_vehicle] &= np.isin([each.name for each in vehicle.effect.coefficients], list(NUMBERS))
     lags = np.array([each.effect.is_lag for each in hypothesis.chosen for _ in each.effect.shapes], dtype=bool)
     own = np.isnan(hypothesis.following(found.estimates.linear))
+    if held is not None:
+        free, own = free & ~held[: len(free)], own & ~held[len(free) :]
     open_, early = np.append(free, own), np.append(np.ones_like(free), ~lags)
     windows = _windows_of_runs(found, given)
     blocks = np.unique(np.concatenate([run.block for run in chain(*windows)]))

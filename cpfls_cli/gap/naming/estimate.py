@@ -277,6 +277,8 @@ class Refusal(NamedTuple):
     reason: str
     # Whether others are to be looked for without it: on a bound it may take the place of another one.
     in_the_way: bool = False
+    # Whether flights held out are surely worse with it: it is in those that it was found in, and not in these.
+    harms: bool = False
 
     @property
     def sentence(self) -> str:

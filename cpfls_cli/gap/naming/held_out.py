@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.effects.catalogue.parameter_error import shown
 from cpfls_cli.errors import InputError
@@ -212,6 +212,7 @@ class Judge:
                 worst,
                 f"on the held-out flights it makes the {CHANNELS[channel]} worse, "
                 f"{compared[worst].left[channel]:.2g} floors without it and {after[channel]:.2g} with it",
+                harms=True,
             )
         least = smallest(compared, lambda each: compared[each].visibly)
         if compared[least].visibly < VISIBLE**2:
@@ -312,28 +313,43 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
     """
     if last.found.hypothesis.chosen:
         return _other_numbers(first, judge)
-    seen = size_in_floors(start.hypothesis.residual_at(fit(start.hypothesis, start.floor)), start.floor)
-    held = last.held_out
+    learned, held = start.hypothesis.residual_at(fit(start.hypothesis, start.floor)) / start.floor, last.held_out
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
-    unseen = smallest(
-        (held.size(each).floors for each in (held.before, held.parameters)), lambda each: float(np.nanmax(each))
-    )
+    left = smallest((held.before, held.parameters), lambda each: float(np.nanmax(held.size(each).floors)))
+    seen, unseen = size_in_floors(learned, np.ones(6)), held.size(left).floors
     names = [each.effect.name for each in first.found.hypothesis.chosen]
     there, here = (int(np.nan_to_num(each, nan=-1.0).argmax()) for each in (seen, unseen))
-    if seen[there] > CLEAR and not unseen[here] > CLEAR:
+    (in_training, error), (in_held, other) = (
+        _mean_square(learned, start.hypothesis.known, start.block),
+        _mean_square(left / held.noise, held.known, block_index(system(judge.repaired), first.found.settings)),
+    )
+    surely = np.abs(in_training - in_held) > ERRORS * np.hypot(error, other)
+    if seen[there] > CLEAR and not unseen[here] > CLEAR and surely[there]:
         what = f" of what would be {' and '.join(names)}" if names else ""
         return (
             f"the training flights have a gap of {seen[there]:.2g} floors in the {CHANNELS[there]}{what}, and the"
             f" held-out flights have none ({unseen[here]:.2g} floors at most): something changed between them, or the"
             " held-out flights do not move in a way that shows it",
         )
-    if unseen[here] > CLEAR and not seen[there] > CLEAR and not unexplained_channels(last.found, judge.rng):
+    if (
+        unseen[here] > CLEAR
+        and not seen[there] > CLEAR
+        and surely[here]
+        and not unexplained_channels(last.found, judge.rng)
+    ):
         return (
             f"the held-out flights have a gap of {unseen[here]:.2g} floors in the {CHANNELS[here]}, and the training"
             f" flights have none ({seen[there]:.2g} floors at most): something changed between them, or only the"
             " held-out flights move in a way that shows it; learn from one of them",
         )
     return _other_numbers(first, judge) if names else ()
+
+
+def _mean_square(residual: Array, known: BoolArray, block: IntArray) -> tuple[Array, Array]:
+    """Compute the mean square of each channel of a residual, and its error over blocks; endless of a single block."""
+    each = [(residual[own] ** 2 * known[own], known[own]) for own in (block == number for number in np.unique(block))]
+    squares = np.array([square.sum(axis=0) / np.maximum(there.sum(axis=0), 1) for square, there in each])
+    return squares.mean(axis=0), mean_error(squares) if len(squares) > 1 else np.full(6, np.inf)
 
 
 def _other_numbers(first: Judgement, judge: Judge) -> tuple[str, ...]:

@@ -221,6 +221,19 @@ def test_numbers_that_took_up_what_the_others_lack_hide_no_difference():
     )
 
 
+@pytest.mark.parametrize(("quiet", "loud", "says"), [(1.0, 1.0, True), (0.0, 2.0, False)], ids=["even", "in parts"])
+def test_a_gap_that_scatters_beyond_the_difference_of_two_roles_is_none_of_them(quiet, loud, says):
+    """Gusts of held-out flights are drawn anew: a gap of 1.6 floors here and one of 1.4 there differ by nothing."""
+    training = flights((candidate("com_offset"), [2.5e-4, 0.0]))
+    there = judge(training, flights(seeds=(3,)))
+    start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
+    first = there.judge(fitted(training, [], start.floor, SETTINGS))
+    held = first.held_out
+    halves = np.where(np.arange(len(held.before)) < len(held.before) // 2, quiet, loud)[:, None]
+    last = first._replace(held_out=replace(held, before=halves * held.noise, parameters=halves * held.noise))
+    assert bool(differences(first, last, start, there)) == says
+
+
 def test_what_makes_a_channel_worse_goes():
     """Drag is in the flights learned from, and the offset in all."""
     last, refusals, _ = judged(flights(OFFSET, DRAG), flights(OFFSET, seeds=(3,)), "com_offset", "rotor_drag")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap import diagnose as diagnose_module
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import Candidate, weak_flight
 from cpfls_cli.gap.diagnose import diagnose
@@ -170,8 +171,15 @@ def test_an_inertia_that_nothing_was_asked_of_is_said_by_what_was_before(flown, 
         assert numbers["inertia_y"].low < 1 / heavy - 1 < numbers["inertia_y"].high
 
 
-def test_a_lag_is_distinguished_from_a_delay_and_from_the_loop_by_what_was_before(flown):
+@pytest.mark.parametrize("differs", [False, True])
+def test_a_lag_is_distinguished_from_a_delay_and_from_the_loop_by_what_was_before(flown, monkeypatch, differs):
+    """Also where a fit to all motion, which is the loop's, says that flights differ."""
     recordings = recorded(flown["late"], TRUE.vehicle, setpoints=True, commanded=True)
+    if differs:
+        named = diagnose_module._named
+        monkeypatch.setattr(
+            diagnose_module, "_named", lambda *given: named(*given)._replace(differ=("the flights differ",))
+        )
     run = diagnosed(recordings)
     assert run.diagnosis.verdict is GapVerdict.NAMED
     assert not run.diagnosis.alternatives
@@ -180,6 +188,17 @@ def test_a_lag_is_distinguished_from_a_delay_and_from_the_loop_by_what_was_befor
     assert effect.name == "motor_lag"
     # The gyroscope's noise is inside of the loop.
     assert number.low < TRUE.lag_s < number.high < 1.25 * TRUE.lag_s
+
+
+def test_flights_that_differ_in_gusts_are_said_to(flown):
+    """The centre of mass of those that were learned from is 4 mm farther back than that of the one held out."""
+    rotors = [
+        replace(each, position_m=(each.position_m[0] + 0.004, *each.position_m[1:])) for each in TRUE.vehicle.rotors
+    ]
+    behind = recorded(flown["asked"], replace(TRUE.vehicle, rotors=tuple(rotors)), setpoints=True)[:3]
+    found = diagnosed([*behind, *recorded(flown["asked"], TRUE.vehicle, setpoints=True)[3:]]).diagnosis
+    assert found.verdict is GapVerdict.FLIGHTS_DIFFER
+    assert "the held-out flights have none" in found.differences[0]
 
 
 @pytest.mark.parametrize("setpoints", [True, False])

@@ -7,7 +7,17 @@ import pytest
 
 from cpfls_cli.playback import vehicle
 from cpfls_cli.playback.evaluation import Group, JointNumbers
-from cpfls_cli.playback.fit import FitWindows, WindowSet, fit, loss_of, rate_stays, uncertainty, windows_of
+from cpfls_cli.playback.fit import (
+    Fitted,
+    FitWindows,
+    Uncertainty,
+    WindowSet,
+    fit,
+    loss_of,
+    rate_stays,
+    uncertainty,
+    windows_of,
+)
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import FreeNumbers, Rules, blocks_of
 from cpfls_cli.playback.player import free_runs, player_of
@@ -121,6 +131,16 @@ def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
     quiet = windows_of([replace(flight, speed=still)], 0.2, 0.2)
     spread = uncertainty(fit(free, quiet, {}, 20, 1e-4), quiet)
     assert spread.determined.tolist() == [False, True, True, True]
+
+
+@pytest.mark.parametrize(("of_arm", "determined"), [(0.15, True), (0.3, False)])
+def test_a_centre_of_mass_is_determined_where_its_interval_is_less_than_all_that_is_possible(of_arm, determined):
+    """Of an arm it can be off by 0.4, whatever the natural size of its number is."""
+    free = numbers(STATED, ("com_offset",), RULES["one rule"])
+    error = of_arm * free.numbers[0].scale
+    spread = Uncertainty(np.eye(2) * error**2, 12, np.ones(2, dtype=bool))
+    fitted = Fitted(free, free.starts, 0.0, np.eye(2))
+    assert [number.determined for number in vehicle.found_numbers(fitted, spread)] == [determined] * 2
 
 
 def test_an_interval_ends_at_the_bound_on_which_its_number_sits():
