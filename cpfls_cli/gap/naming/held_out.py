@@ -120,8 +120,7 @@ def held_out(
     `floor`, shape (6,): of the training flights, above which the effects scatter there.
     Raises InputError if they lack a signal that the effects need.
     """
-    # What a fit shows of the vehicle holds for a flight that would not show it by itself.
-    repaired = [replace(flight, turns=fitted.turns) for flight in repaired]
+    repaired = _as_shown(fitted, repaired)
     raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
     if not all(full.can(candidate) for candidate in (*full.free, *full.chosen)):
         raise InputError("the held-out flights lack a signal that a named effect needs; hold out others")
@@ -144,6 +143,11 @@ def held_out(
         full.most_noise,
         {name: share for name, there in beyond.items() if (share := float(there.any(axis=1).mean()))},
     )
+
+
+def _as_shown(fitted: System, flights: Sequence[WeakFlight]) -> list[WeakFlight]:
+    """Hold flights to what a fit shows of the vehicle, also one that would not show it by itself."""
+    return [replace(flight, turns=fitted.turns) for flight in flights]
 
 
 def _own_numbers(own: System, with_effects: Array) -> Array:
@@ -222,7 +226,7 @@ class Judge:
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
         without = judgement.found.without([name])
-        there = system(self.repaired, without.hypothesis.chosen)
+        there = system(_as_shown(without.hypothesis, self.repaired), without.hypothesis.chosen)
         residual, unseen = there.residual_at(without.estimates.linear), judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
         count = np.maximum(unseen.known.sum(axis=0), 1)
