@@ -14,7 +14,6 @@ from typing import Any, Literal, NamedTuple
 
 import h5py
 import numpy as np
-import scipy.io
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
@@ -179,6 +178,9 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, Any, str]]:
 
 def _variables(path: Path) -> dict[str, Any]:
     """Load a .mat of before 7.3: structures as mappings."""
+    # A flight of this program is asked whether it is a matrix too, and needs none of this.
+    import scipy.io
+
     _refuse_inflated(path)
     with warnings.catch_warnings():
         # Objects of MATLAB's own classes have no names, so that of several the last is kept: none of them is read.
@@ -252,6 +254,8 @@ def _on_one_clock(
 
 def _refuse_inflated(path: Path) -> None:
     """Refuse a .mat whose compressed variables hold more than memory may, out of proportion to the file."""
+    import scipy.io
+
     size = path.stat().st_size
     # What is stored in a byte each is read as numbers of eight. What MATLAB alone reads has no shape.
     with contextlib.suppress(TypeError):
