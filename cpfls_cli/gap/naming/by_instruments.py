@@ -69,7 +69,7 @@ def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None =
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error) or not (sources := _sources(at, given, held)):
             break
-    if (lost := far & ~now).any():
+    if (lost := far & ~now & ~held).any():
         return by_instruments(found, given, held | lost)
     return at._replace(estimates=_with_unidentified(stated, at.estimates, moved))
 

@@ -249,10 +249,10 @@ def test_a_number_that_instruments_moved_has_the_error_that_it_was_moved_with(fl
     found = fitted(flights, [], best_floor(system(flights)), FEW)
     calls = []
 
-    def once(at, given, own=by_instruments_module._sources):
+    def once(at, given, held, own=by_instruments_module._sources):
         calls.append(at)
         x = np.arange(len(at.values)) == 0
-        return [each._replace(numbers=each.numbers & ~(x & (len(calls) > 1))) for each in own(at, given)]
+        return [each._replace(numbers=each.numbers & ~(x & (len(calls) > 1))) for each in own(at, given, held)]
 
     monkeypatch.setattr(by_instruments_module, "_sources", once)
     number = by_instruments(found, known_motion(recordings)).estimates.parameters[0]
