@@ -331,7 +331,8 @@ def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Name
 
 def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) -> _Named:
     """Add what is significant by samples, which averages over windows do not resolve in gusts."""
-    found, last, judged = named.judgement.found, named.steps[-1], named.judge.repaired
+    found, last = named.judgement.found, named.steps[-1]
+    judged = found.hypothesis.shown_in(named.judge.repaired)
     signals = (*found.hypothesis.signals, *(flight.signals for flight in judged))
 
     def known(effect: Effect) -> bool:

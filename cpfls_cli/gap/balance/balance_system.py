@@ -43,6 +43,10 @@ class System:
         """Numbers of the vehicle, shape (parameter,), 1 for those that any flight can show: they are those of all."""
         return np.asarray(np.max([flight.turns for flight in self.flights], axis=0))
 
+    def shown_in(self, flights: Sequence[WeakFlight]) -> list[WeakFlight]:
+        """Hold other flights to what these show of the vehicle, also one that would not show it by itself."""
+        return [replace(flight, turns=self.turns) for flight in flights]
+
     def by_flight(self, make: Callable[[WeakFlight, Signals], Array]) -> Array:
         """Compute rows from each flight and its signals, shape (window, ...)."""
         return np.concatenate(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
 
@@ -120,8 +120,7 @@ def held_out(
     `floor`, shape (6,): of the training flights, above which the effects scatter there.
     Raises InputError if they lack a signal that the effects need.
     """
-    # What a fit shows of the vehicle holds for a flight that would not show it by itself.
-    repaired = [replace(flight, turns=fitted.turns) for flight in repaired]
+    repaired = fitted.shown_in(repaired)
     raw, plain, full = system(logged), system(repaired), system(repaired, fitted.chosen)
     if not all(full.can(candidate) for candidate in (*full.free, *full.chosen)):
         raise InputError("the held-out flights lack a signal that a named effect needs; hold out others")
@@ -222,7 +221,7 @@ class Judge:
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
         without = judgement.found.without([name])
-        there = system(self.repaired, without.hypothesis.chosen)
+        there = system(without.hypothesis.shown_in(self.repaired), without.hypothesis.chosen)
         residual, unseen = there.residual_at(without.estimates.linear), judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
         count = np.maximum(unseen.known.sum(axis=0), 1)
