@@ -234,6 +234,29 @@ def test_a_gap_that_scatters_beyond_the_difference_of_two_roles_is_none_of_them(
     assert bool(differences(first, last, start, there)) == says
 
 
+def test_a_single_block_that_is_held_out_shows_that_flights_differ():
+    """Blocks of the others say how much one scatters; the flights learned from have no gap, and 20 floors are one."""
+    training = flights()
+    there = judge(training, flights(OFFSET, seeds=(3,), seconds=5.0))
+    start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
+    first = there.judge(fitted(training, [], start.floor, SETTINGS))
+    assert "the training flights have none" in differences(first, first, start, there)[0]
+
+
+@pytest.mark.parametrize(("unknown", "says"), [(0.5, True), (1.0, False)], ids=["half of them", "all"])
+def test_windows_of_held_out_flights_that_do_not_know_a_channel_say_nothing_of_it(unknown, says):
+    """Of the flights learned from a drag is a gap in the forces; blocks that know none have none of any size."""
+    training = flights(DRAG, force=True)
+    there = judge(training, flights(seeds=(3,), force=True))
+    start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
+    first = there.judge(fitted(training, [], start.floor, SETTINGS))
+    held = first.held_out
+    known = held.known.copy()
+    known[: round(unknown * len(known)), 3:] = False
+    last = first._replace(held_out=replace(held, known=known))
+    assert bool(differences(first, last, start, there)) == says
+
+
 def test_an_axis_that_flights_held_out_hardly_turn_about_makes_nothing_needed():
     """Izz is a fifth too small in the config: the fit shows it, and the flights held out do not by themselves."""
     x, y, z, *products = VEHICLE.inertia_kg_m2
