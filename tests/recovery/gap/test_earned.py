@@ -243,17 +243,22 @@ def test_a_single_block_that_is_held_out_shows_that_flights_differ():
     assert "the training flights have none" in differences(first, first, start, there)[0]
 
 
-@pytest.mark.parametrize(("unknown", "says"), [(0.5, True), (1.0, False)], ids=["half of them", "all"])
-def test_windows_of_held_out_flights_that_do_not_know_a_channel_say_nothing_of_it(unknown, says):
-    """Of the flights learned from a drag is a gap in the forces; blocks that know none have none of any size."""
-    training = flights(DRAG, force=True)
-    there = judge(training, flights(seeds=(3,), force=True))
+@pytest.mark.parametrize(
+    ("learned", "effects", "seconds", "unknown", "says"),
+    [((), (OFFSET,), 8.0, (0.5, slice(3)), True), ((DRAG,), (), 24.0, (1.0, slice(3, 6)), False)],
+    ids=["one block of two", "all"],
+)
+def test_windows_of_held_out_flights_that_do_not_know_a_channel_say_nothing_of_it(
+    learned, effects, seconds, unknown, says
+):
+    """Neither that a gap scatters, between 0 in those and its size in others, nor that there is none."""
+    training = flights(*learned, force=True)
+    there = judge(training, flights(*effects, seeds=(3,), force=True, seconds=seconds))
     start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
     first = there.judge(fitted(training, [], start.floor, SETTINGS))
-    held = first.held_out
-    known = held.known.copy()
-    known[: round(unknown * len(known)), 3:] = False
-    last = first._replace(held_out=replace(held, known=known))
+    known, (share, channels) = first.held_out.known.copy(), unknown
+    known[: round(share * len(known)), channels] = False
+    last = first._replace(held_out=replace(first.held_out, known=known))
     assert bool(differences(first, last, start, there)) == says
 
 

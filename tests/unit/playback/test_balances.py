@@ -204,7 +204,7 @@ def test_a_path_flown_again_with_another_heading_is_no_run_of_it(begin):
 @pytest.mark.parametrize("heading", [0.0, 3.1])
 def test_a_heading_that_gusts_move_makes_no_other_path(heading):
     """In storms it swings by 0.18 rad, also about the half turn where its angle jumps."""
-    swings = 0.25 * np.sin(0.37 * np.arange(6000) * PERIOD) + heading
+    swings = 0.25 * np.sin(np.pi / 6.0 * np.arange(6000) * PERIOD) + heading
     assert len(instruments([_in_turn(swings)]).runs) == 4
 
 
