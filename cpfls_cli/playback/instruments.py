@@ -321,7 +321,8 @@ def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
     """
     found: tuple[dict[int, Array], ...] = tuple({} for _ in flights)
     likeness = {}
-    paths, asked, ahead = ([of(flight) for flight in flights] for of in (_paths, _asked, _ahead))
+    paths, asked = [_paths(flight) for flight in flights], [_asked(flight) for flight in flights]
+    ahead = [_ahead(flight) for flight in flights]
     for one, other in combinations(range(len(flights)), 2):
         period = flights[one].motion.period
         shifts = [_best_shift(*pair, period, _COMMON_S) for pair in zip(paths[one], paths[other], strict=False)]

@@ -54,9 +54,10 @@ def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None =
     if not sources:
         return found
     moved, far = np.zeros((2, len(found.values)), dtype=bool)
+    # Slopes of all others are the same wherever they come to.
     before, bends = None, np.zeros_like(moved)
-    for own, shapes in places_of(found.hypothesis):
-        bends[own] = bends[shapes] = bool(found.values[shapes].size)
+    for own, curved in places_of(found.hypothesis):
+        bends[own] = bends[curved] = bool(found.values[curved].size)
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
         values, left_out = _stepped(at, sources)

@@ -344,7 +344,8 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
 
 def _squares(residual: Array, known: BoolArray, block: IntArray) -> Array:
     """Compute the mean square of each channel in each block, shape (block, 6); NaN where no window knows it."""
-    return np.array([known_size(residual[own], known[own]) ** 2 for own in (block == each for each in np.unique(block))])
+    each = (block == number for number in np.unique(block))
+    return np.array([known_size(residual[own], known[own]) ** 2 for own in each])
 
 
 def _surely_differ(one: Array, other: Array) -> bool:
@@ -352,7 +353,7 @@ def _surely_differ(one: Array, other: Array) -> bool:
     one, other = (each[np.isfinite(each)] for each in (one, other))
     if not len(one) or not len(other):
         return False
-    widths = [np.std(each, ddof=1) for each in (one, other) if len(each) > 1] or [0.0]
+    widths = [float(np.std(each, ddof=1)) for each in (one, other) if len(each) > 1] or [0.0]
     error = np.hypot(widths[0] / np.sqrt(len(one)), widths[-1] / np.sqrt(len(other)))
     return bool(abs(one.mean() - other.mean()) > ERRORS * error)
 
