@@ -324,7 +324,9 @@ def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Name
         if unconfirmed and not differ:
             judgement = named.judge.judge(with_lean(by_instruments(last.found, given), across))
             refusals = refusals + unconfirmed
-    return named._replace(judgement=judgement, refusals=refusals, alike=lags.alike, sure=sure, differ=differ)
+    names = {each.effect.name for each in judgement.found.hypothesis.chosen}
+    alike = tuple(each for each in lags.alike if each.instead_of in names)
+    return named._replace(judgement=judgement, refusals=refusals, alike=alike, sure=sure, differ=differ)
 
 
 def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) -> _Named:

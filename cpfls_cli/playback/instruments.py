@@ -23,6 +23,9 @@ _COMMON_S = 8.0
 _SAME, _FARTHEST = 0.98, 0.6
 """Correlation of what was asked from which on it is the same path, of two flights or of one that is asked it again, and
 the share of a flight up to which that is sought."""
+_AHEAD = 0.95
+"""Mean cosine of the angles between two headings from which on they are one: 18 degrees, or 13 that gusts do to each. A
+body that is turned otherwise moves otherwise about its own axes."""
 _COARSE_HZ = 20.0
 """Of the search over all shifts, which paths do not exceed."""
 _PIECE_S, _DRIFT_S = 5.0, 0.15
@@ -156,7 +159,7 @@ def past_setpoints(asked: Array, period: float, apart: int) -> Array:
 def _runs(flight: PlaybackFlight) -> list[slice]:
     """Cut a flight where what was asked of it begins again; one that is asked its path once stays whole."""
     part, step = _longest(flight), _step(flight.motion.period)
-    again = step * _again(_asked(flight), flight.motion.period * step) if "position" in flight.setpoints else 0
+    again = step * _again(_asked(flight), _ahead(flight), flight.motion.period * step)
     if not again:
         return [slice(0, len(flight))]
     begins = [*range(part.start, part.stop - again // 2, again), part.stop]
@@ -164,13 +167,15 @@ def _runs(flight: PlaybackFlight) -> list[slice]:
     return [slice(first, min(last, first + again)) for first, last in pairwise(begins)]
 
 
-def _again(path: Array, length: float) -> int:
-    """Find after how many coarse samples a path begins again; 0 where it does not."""
-    shifts = range(round(_COMMON_S / length), round(_FARTHEST * len(path)))
+def _again(path: Array, ahead: Array, length: float) -> int:
+    """Find after how many coarse samples a path begins again with the same heading; 0 where it does not."""
+    shifts = range(round(_COMMON_S / length), round(_FARTHEST * len(path))) if path.any() else ()
     alike = np.array([_correlation(path[:-shift], path[shift:]) for shift in shifts])
-    if not len(alike) or alike.max() < _SAME:
+    pairs = zip(alike, shifts, strict=True)
+    alike *= [each >= _SAME and _of_one_heading(ahead[:-shift], ahead[shift:]) for each, shift in pairs]
+    if not alike.any():
         return 0
-    first = int(np.flatnonzero(alike >= _SAME)[0])
+    first = int(np.flatnonzero(alike)[0])
     return shifts[first + int(np.argmax(alike[first : first + round(1 / length)]))]
 
 
@@ -308,23 +313,25 @@ class Repeats:
 
 
 def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
-    """Find flights of one sampling period that fly the same path, and align them; of each the longest stretch is taken.
+    """Find flights that fly the same path with the same heading, and align them; of each the longest stretch is taken.
 
-    Velocities and changes of the rates are correlated over all shifts, or else the positions that were asked for; then
-    rates piece by piece, and a straight line through the shifts is taken, so that clocks may drift.
+    All are of one sampling period. Velocities and changes of the rates are correlated over all shifts, or else the
+    positions that were asked for; then rates piece by piece, and a straight line through the shifts is taken, so that
+    clocks may drift.
     """
     found: tuple[dict[int, Array], ...] = tuple({} for _ in flights)
     likeness = {}
     paths, asked = [_paths(flight) for flight in flights], [_asked(flight) for flight in flights]
+    ahead = [_ahead(flight) for flight in flights]
     for one, other in combinations(range(len(flights)), 2):
         period = flights[one].motion.period
         shifts = [_best_shift(*pair, period, _COMMON_S) for pair in zip(paths[one], paths[other], strict=False)]
         shift, alike = max(shifts, key=lambda found: found[1])
         if alike < _ALIKE:
             shift, _ = _best_shift(asked[one], asked[other], period, 0.0)
-            alike = _same_size(asked[one], asked[other], round(shift / _step(period)))
+            alike = _same_size(*_common(asked[one], asked[other], round(shift / _step(period))))
             alike *= alike >= _SAME
-        if alike >= _ALIKE:
+        if alike >= _ALIKE and _of_one_heading(*_common(ahead[one], ahead[other], round(shift / _step(period)))):
             likeness[one, other] = alike
             found[one][other] = _aligned(flights[one], flights[other], shift)
             found[other][one] = _inverse(found[one][other], len(flights[other]))
@@ -350,16 +357,21 @@ def _changes(flight: PlaybackFlight) -> Array:
 
 
 def _asked(flight: PlaybackFlight) -> Array:
-    """Give the positions that were asked for and the heading as flown, as wide as these, at the coarse rate.
+    """Give the positions that were asked for, at the coarse rate; all 0 where none were, or one all the time."""
+    asked = flight.setpoints.get("position", np.zeros((len(flight), 3)))[_longest(flight)]
+    # The mean of equal numbers is not always that number.
+    coarse = _coarse(asked - asked[0], _step(flight.motion.period))
+    return np.asarray(coarse - coarse.mean(axis=0))
 
-    All 0 where no positions were asked for, or one all the time. A body that is turned otherwise moves otherwise.
-    """
-    asked, part = flight.setpoints.get("position", np.zeros((len(flight), 3))), _longest(flight)
-    ahead = flight.motion.rotation[part, :2, 0]
-    both = _coarse(np.hstack([asked[part], ahead]), _step(flight.motion.period))
-    both -= both.mean(axis=0)
-    both[:, 3:] *= np.sqrt((both[:, :3] ** 2).sum(axis=1).mean())
-    return np.asarray(both)
+
+def _ahead(flight: PlaybackFlight) -> Array:
+    """Give where the x axis of the body points in the plane, at the coarse rate; all 0 where that is not known."""
+    ahead = flight.motion.rotation[_longest(flight), :2, 0] * flight.has_attitude
+    return _coarse(ahead, _step(flight.motion.period))
+
+
+def _of_one_heading(one: Array, other: Array) -> bool:
+    return bool(np.sum(one * other) >= _AHEAD * np.sqrt(np.sum(one**2) * np.sum(other**2)))
 
 
 def _coarse(values: Array, step: int) -> Array:
@@ -388,11 +400,15 @@ def _best_shift(one: Array, other: Array, period: float, least_s: float) -> tupl
     return float(shifts[best] * _step(period)), float(alike[best])
 
 
-def _same_size(one: Array, other: Array, shift: int) -> float:
-    """Correlate signals with another that is ahead; less than 1 where it has the same shape and another size."""
+def _common(one: Array, other: Array, shift: int) -> tuple[Array, Array]:
+    """Take what signals have in common with others that are ahead."""
     mine, theirs = one[max(0, -shift) :], other[max(0, shift) :]
     common = min(len(mine), len(theirs))
-    mine, theirs = mine[:common], theirs[:common]
+    return mine[:common], theirs[:common]
+
+
+def _same_size(mine: Array, theirs: Array) -> float:
+    """Correlate signals; less than 1 where they have the same shape and another size."""
     return float(2 * np.sum(mine * theirs) / max(np.sum(mine**2) + np.sum(theirs**2), np.finfo(float).tiny))
 
 

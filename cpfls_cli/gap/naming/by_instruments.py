@@ -39,8 +39,9 @@ def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None =
     With the regressors X, the residual r and the prediction Z of X by instruments, the numbers change by d with
     ``sum Z^T (r - X d) = 0``. A gust correlates with X, which the loop moves to answer it, and not with Z. Weakly
     identified numbers stay as they were, but for inertia and couplings, which are those of the config then; all stay
-    where the flights are too short for errors. So does what nothing identifies any more where a long step has taken it.
-    Bounds count as standard deviations of a normal prior, as in the search.
+    where the flights are too short for errors. So does a number of an effect with shapes that nothing identifies any
+    more where a long step has taken it: its slopes were others. Bounds count as standard deviations of a normal prior,
+    as in the search.
 
     `held`, shape (number,): numbers that stay.
 
@@ -53,7 +54,10 @@ def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None =
     if not sources:
         return found
     moved, far = np.zeros((2, len(found.values)), dtype=bool)
-    before = None
+    # Slopes of all others are the same wherever they come to.
+    before, bends = None, np.zeros_like(moved)
+    for own, curved in places_of(found.hypothesis):
+        bends[own] = bends[curved] = bool(found.values[curved].size)
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
         values, left_out = _stepped(at, sources)
@@ -64,12 +68,12 @@ def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None =
             left_out[:, ~now] = before[:, ~now]
         moved, before = moved | now, left_out
         step, error, shapes = np.abs(values - at.values), jackknife_error(left_out), values[len(at.estimates.linear) :]
-        far = np.where(now, step > error, far)
+        far = np.where(now & bends, step > error, far)
         hypothesis = at.hypothesis.with_shapes(shapes) if len(shapes) else at.hypothesis
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error) or not (sources := _sources(at, given, held)):
             break
-    if (lost := far & ~now).any():
+    if (lost := far & ~now & ~held).any():
         return by_instruments(found, given, held | lost)
     return at._replace(estimates=_with_unidentified(stated, at.estimates, moved))
 

@@ -318,11 +318,9 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
     seen, unseen = size_in_floors(learned, np.ones(6)), held.size(left).floors
     names = [each.effect.name for each in first.found.hypothesis.chosen]
     there, here = (int(np.nan_to_num(each, nan=-1.0).argmax()) for each in (seen, unseen))
-    (in_training, error), (in_held, other) = (
-        _mean_square(learned, start.hypothesis.known, start.block),
-        _mean_square(left / held.noise, held.known, block_index(system(judge.repaired), first.found.settings)),
-    )
-    surely = np.abs(in_training - in_held) > ERRORS * np.hypot(error, other)
+    in_training = _squares(learned, start.hypothesis.known, start.block)
+    in_held = _squares(left / held.noise, held.known, block_index(system(judge.repaired), first.found.settings))
+    surely = [_surely_differ(*of_channel) for of_channel in zip(in_training.T, in_held.T, strict=True)]
     if seen[there] > CLEAR and not unseen[here] > CLEAR and surely[there]:
         what = f" of what would be {' and '.join(names)}" if names else ""
         return (
@@ -344,11 +342,20 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
     return _other_numbers(first, judge) if names else ()
 
 
-def _mean_square(residual: Array, known: BoolArray, block: IntArray) -> tuple[Array, Array]:
-    """Compute the mean square of each channel of a residual, and its error over blocks; endless of a single block."""
-    each = [(residual[own] ** 2 * known[own], known[own]) for own in (block == number for number in np.unique(block))]
-    squares = np.array([square.sum(axis=0) / np.maximum(there.sum(axis=0), 1) for square, there in each])
-    return squares.mean(axis=0), mean_error(squares) if len(squares) > 1 else np.full(6, np.inf)
+def _squares(residual: Array, known: BoolArray, block: IntArray) -> Array:
+    """Compute the mean square of each channel in each block, shape (block, 6); NaN where no window knows it."""
+    each = (block == number for number in np.unique(block))
+    return np.array([known_size(residual[own], known[own]) ** 2 for own in each])
+
+
+def _surely_differ(one: Array, other: Array) -> bool:
+    """Check whether means over blocks differ by more than these scatter; a single block scatters as the others do."""
+    one, other = (each[np.isfinite(each)] for each in (one, other))
+    if not len(one) or not len(other):
+        return False
+    widths = [float(np.std(each, ddof=1)) for each in (one, other) if len(each) > 1] or [0.0]
+    error = np.hypot(widths[0] / np.sqrt(len(one)), widths[-1] / np.sqrt(len(other)))
+    return bool(abs(one.mean() - other.mean()) > ERRORS * error)
 
 
 def _other_numbers(first: Judgement, judge: Judge) -> tuple[str, ...]:

@@ -234,6 +234,34 @@ def test_a_gap_that_scatters_beyond_the_difference_of_two_roles_is_none_of_them(
     assert bool(differences(first, last, start, there)) == says
 
 
+def test_a_single_block_that_is_held_out_shows_that_flights_differ():
+    """Blocks of the others say how much one scatters; the flights learned from have no gap, and 20 floors are one."""
+    training = flights()
+    there = judge(training, flights(OFFSET, seeds=(3,), seconds=5.0))
+    start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
+    first = there.judge(fitted(training, [], start.floor, SETTINGS))
+    assert "the training flights have none" in differences(first, first, start, there)[0]
+
+
+@pytest.mark.parametrize(
+    ("learned", "effects", "seconds", "unknown", "says"),
+    [((), (OFFSET,), 8.0, (0.5, slice(3)), True), ((DRAG,), (), 24.0, (1.0, slice(3, 6)), False)],
+    ids=["one block of two", "all"],
+)
+def test_windows_of_held_out_flights_that_do_not_know_a_channel_say_nothing_of_it(
+    learned, effects, seconds, unknown, says
+):
+    """Neither that a gap scatters, between 0 in those and its size in others, nor that there is none."""
+    training = flights(*learned, force=True)
+    there = judge(training, flights(*effects, seeds=(3,), force=True, seconds=seconds))
+    start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
+    first = there.judge(fitted(training, [], start.floor, SETTINGS))
+    known, (share, channels) = first.held_out.known.copy(), unknown
+    known[: round(share * len(known)), channels] = False
+    last = first._replace(held_out=replace(first.held_out, known=known))
+    assert bool(differences(first, last, start, there)) == says
+
+
 def test_an_axis_that_flights_held_out_hardly_turn_about_makes_nothing_needed():
     """Izz is a fifth too small in the config: the fit shows it, and the flights held out do not by themselves."""
     x, y, z, *products = VEHICLE.inertia_kg_m2

@@ -249,16 +249,33 @@ def test_a_number_that_instruments_moved_has_the_error_that_it_was_moved_with(fl
     found = fitted(flights, [], best_floor(system(flights)), FEW)
     calls = []
 
-    def once(at, given, own=by_instruments_module._sources):
+    def once(at, given, held, own=by_instruments_module._sources):
         calls.append(at)
         x = np.arange(len(at.values)) == 0
-        return [each._replace(numbers=each.numbers & ~(x & (len(calls) > 1))) for each in own(at, given)]
+        return [each._replace(numbers=each.numbers & ~(x & (len(calls) > 1))) for each in own(at, given, held)]
 
     monkeypatch.setattr(by_instruments_module, "_sources", once)
     number = by_instruments(found, known_motion(recordings)).estimates.parameters[0]
     assert len(calls) > 1
     assert number.low < 1 / HEAVY - 1 < number.high < 0
     assert 0 < number.high - number.low < 0.2
+
+
+def test_a_shape_that_instruments_lose_where_a_long_step_has_taken_it_stays(flown, monkeypatch):
+    """Its slopes were others where it was identified: the lag of 20 ms is begun at 60 ms, and known there alone."""
+    recordings = recorded(flown["late"], TRUE.vehicle, setpoints=True, commanded=True)
+    windows = common_windows(recordings, FEW)
+    flights = [weak_flight(each, windows, None, force=True) for each in recordings]
+    lag = Candidate(CATALOGUE["motor_lag"], {"time_constant_s": 0.06})
+    given, found = known_motion(recordings), fitted(flights, [lag], best_floor(system(flights)), FEW)
+    assert by_instruments(found, given).estimates.effects[0][0].high < 0.05
+
+    def there(at, given, held, own=by_instruments_module._sources):
+        known = (at.values == found.values) | (np.arange(len(at.values)) < len(at.values) - 1)
+        return [each._replace(numbers=each.numbers & known) for each in own(at, given, held)]
+
+    monkeypatch.setattr(by_instruments_module, "_sources", there)
+    assert by_instruments(found, given).estimates.effects[0] == found.estimates.effects[0]
 
 
 @pytest.mark.parametrize("kind", ["asked", "again"])

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.gap import diagnose
 from cpfls_cli.gap.naming import actuation
-from cpfls_cli.gap.naming.actuation import decided_by_instruments
+from cpfls_cli.gap.naming.actuation import ActuationFit, decided_by_instruments
 from cpfls_cli.gap.naming.by_instruments import unidentified
-from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.gap.naming.estimate import Refusal
+from cpfls_cli.gap.naming.held_out import Judgement
+from cpfls_cli.gap.naming.results import Alternative, Estimate
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate
 
@@ -168,3 +171,21 @@ def test_numbers_that_instruments_do_not_tell_are_listed():
         hypothesis=before.hypothesis, estimates=SimpleNamespace(effects=[(), *before.estimates.effects[1:]])
     )
     assert [effect.name for effect in unidentified(before, after)] == ["command_delay"]
+
+
+@pytest.mark.parametrize("unconfirmed", [False, True])
+def test_a_lag_that_held_out_flights_do_not_confirm_has_no_rival(unconfirmed, monkeypatch):
+    """What instruments name is asked again of these where a fit to all motion says that flights differ."""
+    lag, none = found_with(LAG, [SURE]), found_with((), [])
+    rival = Alternative("command_delay", "motor_lag", 1.0, "fly steps")
+    refusals = [Refusal("motor_lag", "on the held-out flights the gap is as small without it")] * unconfirmed
+    last = Judgement(none if unconfirmed else lag, None)
+    judge = SimpleNamespace(judge=lambda found: Judgement(found, None), confirmed=lambda _: (last, refusals))
+    monkeypatch.setattr(diagnose, "decided_by_instruments", lambda *_: ActuationFit(lag, {"motor_lag": 1e-3}, (rival,)))
+    monkeypatch.setattr(diagnose, "differences", lambda *_: ())
+    for name in ("by_instruments", "with_lean"):
+        monkeypatch.setattr(diagnose, name, lambda found, _: found)
+    named = diagnose._Named([], [None], judge, Judgement(lag, None), lag, [], ("the flights differ",))
+    judged = diagnose._judged_with_lags(named, None, np.zeros(2))
+    assert (judged.differ, judged.refusals) == ((), refusals)
+    assert judged.alike == (() if unconfirmed else (rival,))

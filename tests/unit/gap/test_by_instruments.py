@@ -162,3 +162,21 @@ def test_the_hook_of_a_load_follows_its_torque_and_mass(monkeypatch):
         depth, _, _, mass = moved[linear - 4 : linear]
         assert moved[-1] == pytest.approx(np.clip(depth / mass, 0.0, 0.3))
     assert np.ptp(left_out[:, -1]) > 0
+
+
+def test_what_follows_from_others_that_did_not_go_far_is_not_asked_for_again_and_again(monkeypatch):
+    """A depth that a small mass turns a short step into a long one of cannot be held: it follows."""
+    load = candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.1)
+    flights = [weak(fly(1, [(load, [0.06, 0.0, 0.0, 0.6])], seconds=30.0, speed=1.0), force=True)]
+    found = fitted(flights, [load], np.full(6, 0.1), GapSettings())
+    depth, count = found.values[-1], len(found.values)
+
+    def stepped(at, _):
+        begins = at.values[-1] == depth
+        values = at.values + 0.05 * begins * (np.arange(count) == count - 1)
+        return values, values + np.outer(np.arange(20.0), begins * 1e-4 * (np.arange(count) == count - 1))
+
+    nothing = [_Source(np.zeros((20, count + 1, count + 1)), np.zeros(count, dtype=bool))]
+    monkeypatch.setattr(by_instruments, "_sources", lambda *_: nothing)
+    monkeypatch.setattr(by_instruments, "_stepped", stepped)
+    assert by_instruments.by_instruments(found, None).values[-1] == pytest.approx(depth + 0.05)

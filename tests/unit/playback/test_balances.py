@@ -179,17 +179,57 @@ def test_a_flight_that_is_asked_its_path_again_is_cut_into_its_runs():
     assert np.corrcoef(beside[known, 0], flight.motion.rate[known, 0])[0, 1] > 0.95
 
 
-def test_a_path_flown_again_with_another_heading_is_no_run_of_it():
-    """About its own axes a body moves otherwise then, and what its model lacks in yaw is not repeatable there."""
+def _turned(flight, heading):
+    """Turn a flight about the vertical, shape (time,), as the same place of its path flown with another heading."""
+    none = np.zeros_like(heading)
+    turn = rotation_matrix(np.column_stack([none, none, heading]))
+    rate = np.einsum("tji,tj->ti", turn, flight.motion.rate)
+    return replace(flight, motion=flight.motion._replace(rotation=turn @ flight.motion.rotation, rate=rate))
+
+
+def _in_turn(heading):
+    """A flight that is asked for its path of 15 s four times."""
     whole = _flown(1, seconds=60.0)
-    position, velocity, rotation, rate, *_ = ([values[:1500]] * 4 for values in whole.motion[:-1])
-    turn = np.linspace(0.0, 8.0 * np.pi / 3.0, 6000)
-    turned = rotation_matrix(np.column_stack([0.0 * turn, 0.0 * turn, turn])) @ np.concatenate(rotation)
-    motion = whole.motion._replace(
-        position=np.concatenate(position), velocity=np.concatenate(velocity), rotation=turned, rate=np.concatenate(rate)
-    )
-    flight = replace(whole, motion=motion, setpoints={"position": motion.position})
+    motion = MeasuredMotion(*(np.concatenate([values[:1500]] * 4) for values in whole.motion[:-1]), PERIOD)
+    return _turned(replace(whole, motion=motion, setpoints={"position": motion.position}), heading)
+
+
+@pytest.mark.parametrize("begin", [0.0, 3.1])
+def test_a_path_flown_again_with_another_heading_is_no_run_of_it(begin):
+    """About its own axes a body moves otherwise then, and what its model lacks in yaw is not repeatable there."""
+    flight = _in_turn(begin + np.linspace(0.0, 8.0 * np.pi / 3.0, 6000))
     assert len(instruments([flight]).runs) == 1
+
+
+@pytest.mark.parametrize("heading", [0.0, 3.1])
+def test_a_heading_that_gusts_move_makes_no_other_path(heading):
+    """In storms it swings by 0.18 rad, also about the half turn where its angle jumps."""
+    swings = 0.25 * np.sin(np.pi / 6.0 * np.arange(6000) * PERIOD) + heading
+    assert len(instruments([_in_turn(swings)]).runs) == 4
+
+
+@pytest.mark.parametrize(("turned", "result"), [(0.0, 1), (0.3, 1), (0.5, 0), (np.pi / 2, 0), (np.pi, 0), (6.2, 1)])
+@pytest.mark.parametrize("has_velocity", [True, False])
+def test_flights_of_one_path_with_other_headings_repeat_nothing(turned, result, has_velocity):
+    first, second = (
+        replace(each, has_velocity=has_velocity, setpoints={"position": each.motion.position})
+        for each in (_flown(1), _flown(1, late=1.0))
+    )
+    assert len(instruments([first, _turned(second, np.full(3000, turned))]).repeats.likeness) == result
+
+
+def test_a_heading_that_is_not_known_makes_no_other_path():
+    """What a flight without attitude has for one is no rotation, which says nothing against that of another."""
+    known, unknown = _turned(_flown(1), np.full(3000, 2.0)), replace(_flown(1, late=1.0), has_attitude=False)
+    assert instruments([known, unknown]).repeats.paths() == ((0, 1),)
+
+
+@pytest.mark.parametrize("place", [1.0, 0.1, -2.3])
+def test_a_flight_that_holds_its_place_repeats_nothing(place):
+    """The mean of equal numbers is not that number everywhere, and what rounding leaves is no path."""
+    flights = [replace(_flown(path), setpoints={"position": np.full((3000, 3), place)}) for path in (1, 2)]
+    found = instruments(flights)
+    assert (len(found.runs), found.kind) == (2, "none")
 
 
 def test_what_other_runs_have_at_the_same_place_is_averaged():
