@@ -331,8 +331,8 @@ _TEXTS: Final = (
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )
-# A line of three numbers or more, or its beginning, also as Python prints a tuple; or two lines of two numbers. No match
-# is tried again in parts, which took seconds where a text goes on otherwise.
+# A line of three numbers or more, or its beginning, also as Python prints a tuple; or two lines of two numbers. No
+# match is tried again in parts, which took seconds where text goes on otherwise.
 _NUMBER: Final = rb"[-+]?\d[\d.]*+(e[-+]?\d+)?+"
 _NUMBERS: Final = re.compile(
     rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.e \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n){2}" % ((_NUMBER,) * 3)
