@@ -317,7 +317,7 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
     time, values = seen.log.values(named.group.columns)
     witnesses = _witnesses(seen, time, bool(named.known))
     flown = (time >= witnesses.grid[0]) & (time <= witnesses.grid[-1])
-    unit, reason, sure, rivals = _angle_unit(named, named.scale * values[flown if flown.any() else slice(None)])
+    unit, reason, sure, rivals = angle_unit(named, named.scale * values[flown if flown.any() else slice(None)])
     if named.unit not in (None, unit):
         seen.disagree(named, unit)
     for _ in range(2):
@@ -355,7 +355,8 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
     return verdict
 
 
-def _angle_unit(named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple[Rival, ...]]:
+def angle_unit(named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple[Rival, ...]]:
+    """Give the unit of roll, pitch and yaw, shape (time, 3), with the reason, how sure it is, and its rivals."""
     largest = np.quantile(np.abs(values), 0.999, axis=0)
     tilt, turn = float(largest[:2].max()), float(largest[2])
     if named.unit == "rad" and tilt > _LARGEST_ANGLE:

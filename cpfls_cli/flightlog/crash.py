@@ -291,7 +291,7 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
         until = after - first + round(_TURN_S / signs.period)
         marked = marked[0][:until], marked[1][:until], marked[2][:until]
     troubled, hits, strained = (first + np.flatnonzero(own) for own in marked)
-    stops = _stops_in_the_air(signs, after)
+    stops = _stops_in_the_air(signs, part)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
     # What falls since its rotors stopped hits the ground later.
     lost = lost and not (stops and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S)
@@ -400,13 +400,14 @@ def _ignores_rotors(signs: Signs, part: tuple[int, int], troubled: int) -> bool:
     return bool((left**2).sum() > _NOT_FOLLOWED * (turned[begin:after] ** 2).sum())
 
 
-def _stops_in_the_air(signs: Signs, after: int) -> bool:
-    """Tell whether rotors stop while the vehicle is high, or feels itself fall."""
+def _stops_in_the_air(signs: Signs, part: tuple[int, int]) -> bool:
+    """Tell whether rotors stop at the end of a stretch while the vehicle is high, or feels itself fall."""
+    after = part[1]
     if signs.level is None or after >= len(signs.time):
         return False
     second = slice(after, after + max(1, round(1.0 / signs.period)))
     if signs.level[second].min() >= ALIVE:
-        return _falls_to_the_end(signs, after)
+        return _falls_to_the_end(signs, part)
     if signs.height is not None and float(signs.height[after] - signs.height[second].min()) > _DROP_M:
         return True
     if signs.felt is not None:
@@ -415,15 +416,20 @@ def _stops_in_the_air(signs: Signs, after: int) -> bool:
     return False
 
 
-def _falls_to_the_end(signs: Signs, after: int) -> bool:
+def _falls_to_the_end(signs: Signs, part: tuple[int, int]) -> bool:
     """Tell whether a vehicle whose rotors idle feels much less than its weight until the log ends: nothing carries it.
 
-    Its drag and rotors that idle give it some of its weight back.
+    Its drag and rotors that idle give it some of its weight back. In flight it may feel more than its weight, as it
+    turns and climbs, and less for as long in dives that it flew out of.
     """
+    first, after = part
     if signs.felt is None or (len(signs.felt) - after) * signs.period < _FALL_S:
         return False
     size = np.linalg.norm(signs.felt, axis=1)
-    return bool(size[after:].mean() < _HARDLY_CARRIED * np.median(size[:after]))
+    light = _HARDLY_CARRIED * min(1.0, float(np.median(size[first:after])))
+    dives = runs(averaged(size[first:after], signs.period, _FALL_S) < light)
+    longest = max((end - begin for begin, end in dives), default=0)
+    return bool(size[after:].mean() < light and len(size) - after > longest)
 
 
 def _falls(signs: Signs) -> list[tuple[int, int]]:

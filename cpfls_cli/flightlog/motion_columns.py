@@ -15,7 +15,7 @@ from cpfls_cli.flightlog.agreement import (
     slow,
 )
 from cpfls_cli.flightlog.airframe import explained_by_rotors
-from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, SENSED, Reading, nearest
+from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, SENSED, Reading, angle_unit, nearest
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import Guess, LogTable, Rival, Seen, Sure, called
 from cpfls_cli.flightlog.settings import SignalName
@@ -175,13 +175,16 @@ def without_other_axes(log: LogTable, candidates: Mapping[SignalName, list[Named
 
 
 def without_euler_rates(log: LogTable, candidates: Mapping[SignalName, list[Named]]) -> dict[SignalName, list[Named]]:
-    """Leave out derivatives of roll, pitch and yaw, but where they follow the attitude as rates of the body do."""
+    """Leave out derivatives of roll, pitch and yaw, but where they follow the attitude as rates of the body do.
+
+    What is called by another name comes first.
+    """
     angles = next(iter(candidates.get("attitude", ())), None)
-    rates = [
-        own
-        for own in candidates.get("body_rate", ())
-        if own.group.words[-1:] != _DERIVATIVE or (angles is not None and _turns_as_body(log, angles, own))
-    ]
+    others, derivatives = (
+        [own for own in candidates.get("body_rate", ()) if (own.group.words[-1:] == _DERIVATIVE) is derived]
+        for derived in (False, True)
+    )
+    rates = others + [own for own in derivatives if angles is not None and _turns_as_body(log, angles, own)]
     kept = {name: own for name, own in candidates.items() if name != "body_rate"}
     return kept | ({"body_rate": rates} if rates else {})
 
@@ -189,9 +192,9 @@ def without_euler_rates(log: LogTable, candidates: Mapping[SignalName, list[Name
 def _turns_as_body(log: LogTable, angles: Named, rates: Named) -> bool:
     rate_hz = 1 / float(log.grid[1] - log.grid[0])
     time, values = log.values(angles.group.columns)
-    degrees = angles.unit == "deg" or float(np.abs(values).max()) > 2 * np.pi
+    unit = known_unit(angle_unit(angles, angles.scale * values)[0])
     # Between two samples on either side of a full turn lies no angle.
-    turned = np.unwrap(np.radians(values) if degrees else values, axis=0)
+    turned = np.unwrap(unit.factor * angles.scale * values, axis=0)
     attitude = np.column_stack([np.interp(log.grid, time, column) for column in turned.T])
     measured, derived = slow(log.on_grid(rates.group.columns), rate_hz), first_derivative(attitude, rate_hz)
     # A pitch may count the other way than roll and yaw do.

@@ -157,9 +157,9 @@ _STATES: Final = (
 )
 
 
-# What PX4 says of its arming, and what of that lets its rotors turn: armed, and on its way back from a fault.
-_ARMING: Final = (("actuator_armed", "armed", (1,)), ("vehicle_status", "arming_state", (2, 3, 6)))
-_SAID_S: Final = 3.0  # From the ends of a log it is said at most.
+# What PX4 says of its arming, and what of that lets no rotor turn, whichever its version: it starts, or stands by.
+_ARMING: Final = (("actuator_armed", "armed", (0,)), ("vehicle_status", "arming_state", (0, 1)))
+_SAID_S: Final = 3.0  # So often it is said, to the ends of a log.
 
 
 class VehicleKind(NamedTuple):
@@ -180,13 +180,17 @@ def refuse_other_vehicle(topics: Topics, parameters: Parameters, system: str) ->
 def refuse_disarmed(topics: Topics) -> None:
     """Refuse a log in which PX4 says from begin to end that no rotor may turn: a vehicle that is carried moves too."""
     stamps = {topic: own[STAMP] for topic, own in topics.items() if len(own.get(STAMP, ()))}
-    for topic, name, armed in _ARMING:
-        states, said = np.asarray(topics.get(topic, {}).get(name, ()), dtype=float), stamps.get(topic, np.empty(0))
-        if not len(states) or len(states) != len(said) or np.isin(states, armed).any():
-            continue
-        begin, end = min(float(own[0]) for own in stamps.values()), max(float(own[-1]) for own in stamps.values())
-        if said[0] - begin < _SAID_S and end - said[-1] < _SAID_S:
-            raise InputError(f"no flight in it: PX4 is not armed throughout ({topic}.{name})")
+    said = [
+        (f"{topic}.{name}", np.isin(states, disarmed).all(), stamps[topic])
+        for topic, name, disarmed in _ARMING
+        if len(states := topics.get(topic, {}).get(name, ())) and len(states) == len(stamps.get(topic, ()))
+    ]
+    if said and all(disarmed for _, disarmed, _ in said):
+        ends = min(float(own[0]) for own in stamps.values()), max(float(own[-1]) for own in stamps.values())
+        # In a pause of what it says it may have flown.
+        by = [name for name, _, own in said if np.diff(own, prepend=ends[0], append=ends[1]).max() < _SAID_S]
+        if by:
+            raise InputError(f"no flight in it: PX4 is not armed throughout ({by[0]})")
 
 
 def _evidence(topics: Topics, parameters: Parameters, system: str) -> Iterator[VehicleKind]:

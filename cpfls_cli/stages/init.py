@@ -16,6 +16,7 @@ import typer
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from cpfls_cli.arguments import moments
+from cpfls_cli.artifacts.vehicle_model import FOUND_AS, name_of
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.config.load import ASK, how_to_fill_in, parse_config, validate
 from cpfls_cli.consistency.findings import Finding
@@ -288,8 +289,11 @@ def taken(run: Run, model: Path, role: str) -> SimulatorModel:
     """Read a simulator's file, which is an input of the run with all that it includes, or a vehicle that was found."""
     run.take({role: file_of(model)})
     if is_found(model):
-        found = found_vehicle(model).model
-        return of_settings(model, found.vehicle, found.response.lag_s)
+        record = found_vehicle(model)
+        made = of_settings(model, record.model.vehicle, record.model.response.lag_s)
+        weak = joined(name_of(name) for name in record.not_determined if name in FOUND_AS.values())
+        note = f"{weak}: not identified by the flights of {model.name}, so maybe not the vehicle's own"
+        return replace(made, notes=(note,)) if weak else made
     read = read_model(model)
     run.take({f"{role}-include-{at}": file for at, file in enumerate(read.files[1:], start=1)})
     return read

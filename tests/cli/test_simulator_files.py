@@ -17,7 +17,7 @@ from cpfls_cli.stages import extend
 from tests.builders.gusty_flights import CALM, SMALL, Flight, gusty_flights
 from tests.builders.simulator_files import sdf_of, write_log
 from tests.builders.studies import put_file
-from tests.builders.vehicle_models import vehicle_of, write_vehicle
+from tests.builders.vehicle_models import number_of, vehicle_of, whole, write_vehicle
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 ROOT = Path(__file__).parents[2]
@@ -181,6 +181,16 @@ def test_an_included_file_in_the_output_folder_is_never_written_over(cpfls, fold
     result = cpfls("init", "--from", mine, "-o", body, "--force")
     assert "body.sdf: is an input of this command" in result.stderr
     assert body.read_bytes() == before
+
+
+def test_what_flights_did_not_identify_of_a_vehicle_is_said_with_the_config(cpfls, tmp_path):
+    numbers = (number_of("inertia.Ixx", 0.02, determined=False), number_of("thrust_factor", 1e-6))
+    found = write_vehicle(tmp_path / "found.h5", vehicle_of(whole(effects=()), numbers=numbers))
+    said = cpfls.done("init", "--from", found, "-o", tmp_path / "study.yaml").stderr
+    assert "Ixx: not identified by the flights of found.h5, so maybe not the vehicle's own" in " ".join(said.split())
+    sure = (number_of("inertia.Ixx", 0.02),)
+    found = write_vehicle(tmp_path / "sure.h5", vehicle_of(whole(effects=()), numbers=sure, correlation=np.eye(1)))
+    assert "not identified" not in cpfls.done("init", "--from", found, "-o", tmp_path / "sure.yaml").stderr
 
 
 ROUND = """<mujoco><worldbody><body name="b"><freejoint/>

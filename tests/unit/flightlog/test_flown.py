@@ -440,6 +440,20 @@ def cut_at_the_end(felt, until):
     return made
 
 
+def turns_hard(time):
+    """It feels 1.7 weights throughout, and lands."""
+    flies = inside(time, 0, 24, 1.0)
+    force = np.outer(inside(time, 0, 24, 1.7, 1.0), UP)
+    return {"rotors": 0.08 + 0.42 * flies, "rate": 1.5 * flies, "force": force, "shakes": 0.02}
+
+
+def dives(time):
+    """Its throttle is cut for 0.8 s in each six, and the log ends in such a dive."""
+    cut = time % 6 > 5.2
+    force = np.outer(np.where(cut, 0.2, 1.15), UP)
+    return {"rotors": np.where(cut, 0.06, 0.5), "rate": 2.0, "force": force, "shakes": 0.02}
+
+
 def tumbles(known):
     """Its rotors stop at 40 s, 30 m up; or it is hit there, and nothing is known of rotors and height."""
 
@@ -638,6 +652,8 @@ READ = {
     "idling that falls until the log ends": (30, cut_at_the_end(0.4, 0.6), ((0, 29.4),), ("rotors stop in the air",)),
     "idling that touches the ground": (30, cut_at_the_end(0.4, 0.2), ((0, 29.4),)),
     "idling on the ground until the log ends": (30, cut_at_the_end(0.9, 0.6), ((0, 29.4),)),
+    "idling on the ground after turns that feel more than a weight": (30, turns_hard, ((0, 24),)),
+    "idling in a dive, as before": (29.9, dives, ((0, 29.2),)),
     "rotors that stop high up, and a tumble": (60, tumbles(True), ((5, 40),), ("rotors stop in the air", "impact")),
     "likewise without its rotors": (60, tumbles(False), ((5, 40),), ("impact",)),
     "a throttle cut": (

@@ -247,6 +247,19 @@ def test_derivatives_of_angles_are_body_rates_where_they_follow_the_attitude_as_
     assert known_unit(found.columns.unit).factor * found.columns.scale == pytest.approx(1 / unit)
 
 
+def test_a_calm_flight_whose_angles_are_small_in_degrees_keeps_its_body_rates():
+    calm = flight(seconds=20.0, angle=0.02)
+    log = flat_log(calm, attitude=named(np.degrees(calm.angles), "roll", "pitch", "yaw"), rate=named(calm.rate, *DOTS))
+    assert seen(log).signal("body_rate").columns.columns == DOTS
+
+
+def test_a_gyroscope_is_taken_before_what_is_called_a_derivative(own):
+    """Where the vehicle hardly leans both are alike, but for noise of the attitude."""
+    log = flat_log(own)
+    log.topics[""] = {**named(own.rate + 0.01, *DOTS), **log.topics[""]}
+    assert seen(log).signal("body_rate").columns.columns == GYRO
+
+
 def test_derivatives_of_angles_that_are_no_body_rates_are_left_out(own):
     angles = own.rotation.as_euler("ZYX")[:, ::-1]
     rates = np.gradient(np.unwrap(angles, axis=0), 0.01, axis=0)

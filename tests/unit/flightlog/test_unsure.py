@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.airframe import airframe_from_motion
-from cpfls_cli.flightlog.attitude_columns import _angle_unit, doubt_reading
+from cpfls_cli.flightlog.attitude_columns import angle_unit, doubt_reading
 from cpfls_cli.flightlog.names import column_groups, named_signals
 from cpfls_cli.flightlog.proposal import known_log, propose
 from cpfls_cli.flightlog.recognised import LogTable, Seen
@@ -338,9 +338,9 @@ def test_angles_that_jump_by_a_full_turn_are_in_rad():
     (angles,) = (own for own in named_signals(column_groups(("roll", "pitch", "yaw"))) if own.signal == "attitude")
     time = np.linspace(0, 10, 1001)
     rolls = np.column_stack([np.angle(np.exp(1j * 3 * time)), 0.2 * np.sin(time), 0.1 * time])
-    assert _angle_unit(angles, rolls)[0] == "rad"
-    assert _angle_unit(angles, np.degrees(rolls))[0] == "deg"
-    assert _angle_unit(angles, np.column_stack([3.0 * np.sin(time), np.sin(time), time]))[0] == "deg"
+    assert angle_unit(angles, rolls)[0] == "rad"
+    assert angle_unit(angles, np.degrees(rolls))[0] == "deg"
+    assert angle_unit(angles, np.column_stack([3.0 * np.sin(time), np.sin(time), time]))[0] == "deg"
 
 
 @pytest.mark.parametrize(("name", "factor", "unit"), [("Tiempo", 1.0, "s"), ("currentT", 1e6, "us")])

@@ -96,8 +96,14 @@ def test_forward_flight_is_said_by_states_and_modes():
         ({"actuator_armed": {"timestamp": np.arange(4.0), "armed": np.zeros(4)}}, True),
         (status(arming_state=[1, 1, 2, 1]), False),
         (status(arming_state=[1, 6, 6, 6]), False),
+        # On its way back from a fault, of a younger version; nothing said; in words; and where two topics disagree.
+        (status(arming_state=[1, 5, 5, 5]), False),
+        (status(arming_state=[np.nan] * 4), False),
+        ({"vehicle_status": {"timestamp": np.arange(4.0), "arming_state": np.array(["armed"] * 4)}}, False),
+        (status(arming_state=[2] * 4) | {"actuator_armed": {"timestamp": np.arange(4.0), "armed": np.zeros(4)}}, False),
         (status(nav_state=[0, 0, 0, 0]), False),
-        # Of another length than its stamps it says nothing, and what ends early or begins late not all.
+        # Of another length than its stamps it says nothing, and what ends early, begins late or pauses not all.
+        ({"vehicle_status": {"timestamp": np.array([0.0, 60.0]), "arming_state": np.ones(2)}}, False),
         ({"vehicle_status": {"timestamp": np.arange(4.0), "arming_state": np.ones(3)}}, False),
         (status(arming_state=[1, 1]) | {"sensor_gyro": {"timestamp": np.array([0.0, 60.0])}}, False),
         (status(arming_state=[1, 1]) | {"sensor_gyro": {"timestamp": np.array([-60.0, 1.0])}}, False),

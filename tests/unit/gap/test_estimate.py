@@ -110,6 +110,8 @@ def test_formulas_are_off_by_what_is_left_above_the_floor_and_a_tenth_at_most(ex
 
 def test_a_set_alone_is_certain_two_that_predict_alike_are_not_and_even_odds_multiply():
     assert (likely([]).tolist(), likely([np.zeros(12), np.zeros(12)])) == ([1.0], pytest.approx([1 / 3] * 3))
+    # How far blocks differ is not known of one.
+    assert likely([np.array([5.0])]) == pytest.approx([0.5, 0.5])
     # Where all blocks say the same their weights do not matter: Bayes' rule remains.
     odds = np.log([1 / 4, 1 / 19])
     assert likely([np.full(12, each / 12) for each in odds]) == pytest.approx(

@@ -6,6 +6,7 @@ import struct
 import subprocess
 import sys
 import tarfile
+import time
 import tomllib
 import zipfile
 from importlib import import_module
@@ -771,6 +772,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.log", b"1,2,3,4,\r\n", "a table of numbers without names", "let its name end in .csv"),
         ("a.dat", 999 * b"0.25 ", "a table of numbers without names", "let its name end in .csv"),
         ("a.dat", b"12.1 -0.5\n12.2 0.25\n", "a table of numbers without names", "names each column"),
+        ("a.dat", b"12.1 -0.5 1\n12.2 0.25 1\n", "a table of numbers without names", "names each column"),
         ("a.txt", b"\n(0.5, -1.0, 1000, 1)\n(0.4, -1e-3, 1000, 1)\n", "a table of numbers without names", "brackets"),
         ("a.txt", 99 * b"(0.5, -1.0, 1000, 0.25)\n", "a table of numbers without names", "names each column"),
         (
@@ -795,6 +797,16 @@ def test_a_file_that_is_no_log_is_named_with_the_way_to_one(tmp_path, name, cont
     said = str(caught.value)
     assert said.startswith(f"{path}: {what}")
     assert way in said
+
+
+@pytest.mark.parametrize("begins", [b"1, 2, 3, ", b"x= 1, y= 2", b"1 2", b"(1, 2, 3)", b"1\t, 2", 300 * b"1 "])
+def test_what_begins_as_numbers_and_goes_on_otherwise_is_said_at_once(tmp_path, begins):
+    """Some of these took four seconds and more."""
+    path = tmp_path / "a.txt"
+    path.write_bytes(begins.ljust(1000) + b"?")
+    begun = time.process_time()
+    assert foreign_file(path) is None
+    assert time.process_time() - begun < 0.5
 
 
 @pytest.mark.parametrize("line", ["t,x\n0,1\n", "2025-08-14 15:48:34.1,0.1\n", "2025-08-14 15:48:34 UTC,0.1\n"])
