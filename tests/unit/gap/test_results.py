@@ -150,8 +150,8 @@ def refused(raised, after, monkeypatch, beyond=None):
         ({}, 2.4, None),
     ],
     ids=[
-        "small beside a formula that fits", "small beside one that is off", "hardly to be seen beside a large one",
-        "to be seen beside a large one", "hardly to be seen beside one that is not much larger", "not so small",
+        "small next to a formula that fits", "small next to one that is off", "hardly to be seen next to a large one",
+        "to be seen next to a large one", "hardly to be seen next to one that is not much larger", "not so small",
         "needless", "small in a channel of its own", "of second order in a channel of its own",
         "not so small in a channel of its own", "needless alone", "needed", "what is noise without it",
         "what just is not", "harmful", "nothing named",
