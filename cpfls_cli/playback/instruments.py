@@ -23,9 +23,9 @@ _COMMON_S = 8.0
 _SAME, _FARTHEST = 0.98, 0.6
 """Correlation of what was asked from which on it is the same path, of two flights or of one that is asked it again, and
 the share of a flight up to which that is sought."""
-_AHEAD = 0.95
-"""Mean cosine of the angles between two headings from which on they are one: 18 degrees, or 13 that gusts do to each. A
-body that is turned otherwise moves otherwise about its own axes."""
+_AHEAD = 0.5
+"""Mean cosine of the angles between the headings of two runs of a flight from which on they are one: 60 degrees. A body
+that is turned otherwise moves otherwise about its own axes, and gusts turn many a body by half of that."""
 _COARSE_HZ = 20.0
 """Of the search over all shifts, which paths do not exceed."""
 _PIECE_S, _DRIFT_S = 5.0, 0.15
@@ -313,25 +313,23 @@ class Repeats:
 
 
 def repeats(flights: Sequence[PlaybackFlight]) -> Repeats:
-    """Find flights that fly the same path with the same heading, and align them; of each the longest stretch is taken.
+    """Find flights of one sampling period that fly the same path, and align them; of each the longest stretch is taken.
 
-    All are of one sampling period. Velocities and changes of the rates are correlated over all shifts, or else the
-    positions that were asked for; then rates piece by piece, and a straight line through the shifts is taken, so that
-    clocks may drift.
+    Velocities and changes of the rates are correlated over all shifts, or else the positions that were asked for; then
+    rates piece by piece, and a straight line through the shifts is taken, so that clocks may drift.
     """
     found: tuple[dict[int, Array], ...] = tuple({} for _ in flights)
     likeness = {}
     paths, asked = [_paths(flight) for flight in flights], [_asked(flight) for flight in flights]
-    ahead = [_ahead(flight) for flight in flights]
     for one, other in combinations(range(len(flights)), 2):
         period = flights[one].motion.period
         shifts = [_best_shift(*pair, period, _COMMON_S) for pair in zip(paths[one], paths[other], strict=False)]
         shift, alike = max(shifts, key=lambda found: found[1])
         if alike < _ALIKE:
             shift, _ = _best_shift(asked[one], asked[other], period, 0.0)
-            alike = _same_size(*_common(asked[one], asked[other], round(shift / _step(period))))
+            alike = _same_size(asked[one], asked[other], round(shift / _step(period)))
             alike *= alike >= _SAME
-        if alike >= _ALIKE and _of_one_heading(*_common(ahead[one], ahead[other], round(shift / _step(period)))):
+        if alike >= _ALIKE:
             likeness[one, other] = alike
             found[one][other] = _aligned(flights[one], flights[other], shift)
             found[other][one] = _inverse(found[one][other], len(flights[other]))
@@ -400,15 +398,11 @@ def _best_shift(one: Array, other: Array, period: float, least_s: float) -> tupl
     return float(shifts[best] * _step(period)), float(alike[best])
 
 
-def _common(one: Array, other: Array, shift: int) -> tuple[Array, Array]:
-    """Take what signals have in common with others that are ahead."""
+def _same_size(one: Array, other: Array, shift: int) -> float:
+    """Correlate signals with another that is ahead; less than 1 where it has the same shape and another size."""
     mine, theirs = one[max(0, -shift) :], other[max(0, shift) :]
     common = min(len(mine), len(theirs))
-    return mine[:common], theirs[:common]
-
-
-def _same_size(mine: Array, theirs: Array) -> float:
-    """Correlate signals; less than 1 where they have the same shape and another size."""
+    mine, theirs = mine[:common], theirs[:common]
     return float(2 * np.sum(mine * theirs) / max(np.sum(mine**2) + np.sum(theirs**2), np.finfo(float).tiny))
 
 

@@ -203,25 +203,14 @@ def test_a_path_flown_again_with_another_heading_is_no_run_of_it(begin):
 
 @pytest.mark.parametrize("heading", [0.0, 3.1])
 def test_a_heading_that_gusts_move_makes_no_other_path(heading):
-    """In storms it swings by 0.18 rad, also about the half turn where its angle jumps."""
-    swings = 0.25 * np.sin(np.pi / 6.0 * np.arange(6000) * PERIOD) + heading
+    """In storms it swings by half a radian, also about the half turn where its angle jumps."""
+    swings = 0.7 * np.sin(np.pi / 6.0 * np.arange(6000) * PERIOD) + heading
     assert len(instruments([_in_turn(swings)]).runs) == 4
 
 
-@pytest.mark.parametrize(("turned", "result"), [(0.0, 1), (0.3, 1), (0.5, 0), (np.pi / 2, 0), (np.pi, 0), (6.2, 1)])
-@pytest.mark.parametrize("has_velocity", [True, False])
-def test_flights_of_one_path_with_other_headings_repeat_nothing(turned, result, has_velocity):
-    first, second = (
-        replace(each, has_velocity=has_velocity, setpoints={"position": each.motion.position})
-        for each in (_flown(1), _flown(1, late=1.0))
-    )
-    assert len(instruments([first, _turned(second, np.full(3000, turned))]).repeats.likeness) == result
-
-
 def test_a_heading_that_is_not_known_makes_no_other_path():
-    """What a flight without attitude has for one is no rotation, which says nothing against that of another."""
-    known, unknown = _turned(_flown(1), np.full(3000, 2.0)), replace(_flown(1, late=1.0), has_attitude=False)
-    assert instruments([known, unknown]).repeats.paths() == ((0, 1),)
+    """What a flight without attitude has for one is no rotation, which says nothing against its own later one."""
+    assert len(instruments([replace(_in_turn(np.linspace(0.0, 8.4, 6000)), has_attitude=False)]).runs) == 4
 
 
 @pytest.mark.parametrize("place", [1.0, 0.1, -2.3])
