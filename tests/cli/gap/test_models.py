@@ -87,10 +87,10 @@ def test_an_identified_model_holds_the_stated_vehicle(pipeline):
     assert made.model.effects == ()
 
 
-def test_the_json_of_an_extended_model_says_what_it_is_worth(cpfls, extended, tmp_path):
+def test_the_json_of_an_extended_model_says_what_it_is_good_for(cpfls, extended, tmp_path):
     cpfls.done("export", extended, "-o", tmp_path / "m.json")
     document = json.loads((tmp_path / "m.json").read_text())
-    assert any(line.startswith("On held-out flights its largest gap is ") for line in document["worth"])
+    assert any(line.startswith("On held-out flights its largest gap is ") for line in document["usage"])
     assert "com_offset" in document["effects"]
 
 
