@@ -157,7 +157,7 @@ _STATES: Final = (
 )
 
 
-# What PX4 says of its arming, and what of that lets no rotor turn, whichever its version: it starts, or stands by.
+# What PX4 says of its arming, and what of that lets no rotor turn, whichever its version: it starts, or is on standby.
 _ARMING: Final = (("actuator_armed", "armed", (0,)), ("vehicle_status", "arming_state", (0, 1)))
 _SAID_S: Final = 3.0  # So often it is said, to the ends of a log.
 
