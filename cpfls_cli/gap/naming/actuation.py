@@ -1,7 +1,7 @@
 """Lags, delays and filters between command and rotors in gusts: a loop that answers these looks alike."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -68,7 +68,7 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
     # One number is judged by its own size, several by how much less they leave.
     less = chance_of_ranks(more_residual(sets.predictable[()], sets.predictable[best]))
     chances = {name: sets.chance_of(own[0]) if len(own) == 1 else less for name, own in sets.numbers(best).items()}
-    return ActuationFit(sets.fits[best], chances, tuple(alike))
+    return ActuationFit(sets.traded(best), chances, tuple(alike))
 
 
 @dataclass
@@ -163,6 +163,27 @@ class _Sets:
         fit = self.fits[names]
         pairs = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
         return {candidate.effect.name: numbers for candidate, numbers in pairs if candidate.effect.name in names}
+
+    def traded(self, names: _Names) -> NamedFit:
+        """Give the fit of a set; the interval of one lag or delay holds what it is jointly with the other.
+
+        That is where the other is more than its standard error, which is neither named nor excluded.
+        """
+        fit, numbers = self.fits[names], self.numbers(names)
+        joint = [self.numbers(each) for each in self.fits if set(names) < set(each)]
+        own = [
+            each[names[0]][0].value
+            for each in joint
+            for name, (one, *_) in each.items()
+            if name not in names and one.value > (one.high - one.value) / ERRORS
+        ]
+        if len(names) != 1 or not own:
+            return fit
+        (number, *_), chosen = numbers[names[0]], fit.hypothesis.chosen
+        wider = replace(number, low=min(number.low, *own), high=max(number.high, *own))
+        pairs = zip(chosen, fit.estimates.effects, strict=True)
+        effects = tuple((wider,) if candidate.effect.name in names else each for candidate, each in pairs)
+        return fit._replace(estimates=replace(fit.estimates, effects=effects))
 
     def _needed(self, names: _Names, rate: float) -> set[str]:
         """Name the effects whose only number is significant at a rate.

@@ -10,7 +10,7 @@ from cpfls_cli.gap import diagnose
 from cpfls_cli.gap.naming import actuation
 from cpfls_cli.gap.naming.actuation import ActuationFit, decided_by_instruments
 from cpfls_cli.gap.naming.by_instruments import unidentified
-from cpfls_cli.gap.naming.estimate import Refusal
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal
 from cpfls_cli.gap.naming.held_out import Judgement
 from cpfls_cli.gap.naming.results import Alternative, Estimate
 from cpfls_cli.gap.settings import GapSettings
@@ -34,8 +34,8 @@ def found_with(names, sizes):
         for each, (value, half) in zip(chosen, sizes, strict=True)
     ]
     hypothesis = SimpleNamespace(chosen=tuple(chosen), flights=(), can=lambda _candidate: True)
-    estimates = SimpleNamespace(effects=numbers)
-    return SimpleNamespace(hypothesis=hypothesis, estimates=estimates, settings=GapSettings())
+    estimates = Estimates(linear=np.zeros(0), effects=tuple(numbers), parameters=(), of_effect=())
+    return NamedFit(hypothesis, estimates, np.ones(6), GapSettings())
 
 
 def apart(monkeypatch, own, left, sizes=None):
@@ -76,6 +76,15 @@ def test_what_is_needed_next_to_the_other_is_named_whatever_was_found(own, toget
     assert result.chances[names[0]] < 1e-6
     # A filter has a number more, and nothing is left for it but the lag that a delay alone lacks.
     assert bool({"low_pass_filter", "notch_filter"} & {*sum(tried, ())}) == (names == DELAY)
+
+
+@pytest.mark.parametrize(("delay", "low"), [(0.012, 0.02), (0.009, 0.029)], ids=["likely", "unlikely"])
+def test_the_interval_of_a_lag_holds_what_it_is_with_a_delay_of_more_than_its_standard_error(delay, low, monkeypatch):
+    left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
+    names, _, result, _ = apart(monkeypatch, LAG, left, {BOTH: [(0.02, 0.004), (delay, 0.02)]})
+    assert names == LAG
+    ((number,),) = result.found.estimates.effects
+    assert (number.value, number.low, number.high) == pytest.approx((0.03, low, 0.031))
 
 
 def test_the_one_that_leaves_more_is_no_rival(monkeypatch):
