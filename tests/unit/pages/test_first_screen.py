@@ -76,7 +76,8 @@ def next_steps(found):
                 "alternatives": (made.RIVAL,),
             },
             "These flights cannot separate offset of the centre of mass from constant torque. What the model misses "
-            "besides is motor lag. A parameter of the vehicle is wrong: Izz over yaw torque +24.0 % against the config.",
+            "besides is motor lag. "
+            "A parameter of the vehicle is wrong: Izz over yaw torque +24.0 % against the config.",
         ),
         (
             {"verdict": "UNEXPLAINED", "named": (), "closest": (made.effect(),)},
@@ -180,7 +181,8 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_sepa
     untried = diagnosis("AMBIGUOUS", alternatives=(Alternative("wind", "com_offset", np.nan, "log velocity"),))
     assert planned not in next_steps(untried)
     assert next_steps(untried).startswith("To separate steady wind from offset of the centre of mass: log velocity.")
-    both = diagnosis("AMBIGUOUS", alternatives=(*untried.alternatives, replace(untried.alternatives[0], name="payload")))
+    (rival,) = untried.alternatives
+    both = diagnosis("AMBIGUOUS", alternatives=(rival, replace(rival, name="payload")))
     assert "To separate steady wind or load on a cable from offset" in next_steps(both)
     assert next_steps(both).count("log velocity") == 1
     assert facts["How sure"] == "Of the held-out gap above the noise, 97 % is gone."
