@@ -24,7 +24,7 @@ help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | head -3
 	@echo "  make quick       the same study with one small search and without Table 5, in a minute"
 	@echo "  make reproduce-full   Table 5 and all readings from searches of full size; about fourteen hours on two cores"
-	@echo "  make reproduce-larger   of it only 75 x 25 beside 500 x 200 on 685 samples; about an hour and a half"
+	@echo "  make reproduce-larger   of it only 75 x 25 next to 500 x 200 on 685 samples; about an hour and a half"
 	@echo "  make hexarotor   a six-rotor study with a rigid body under the fuzzy part"
 	@echo "  make full-circle full rotations of a held vehicle: the structure that wins, and twelve others"
 	@echo "  make crazyflie LOGS=FOLDER   the real flight; FOLDER holds log119.csv and log149.csv"
@@ -162,7 +162,7 @@ FLIGHTS := paper paper-gentle
 $(foreach flight,$(FLIGHTS),$(foreach noise,$(NOISES),$(eval $(call reading,$(flight),$(noise)))))
 read = $(foreach flight,$(FLIGHTS),$(NOISES:%=data/$(flight)/$(1)-%.h5))
 
-# The smaller search beside the paper's, on its own.
+# The smaller search next to the paper's, on its own.
 data/paper/larger-%.h5: data/paper/flight.h5 data/paper/.part/searches.yaml
 	$(SEARCHES) configs/paper.yaml $< larger -o $@ --seed $* --seeds 5
 
@@ -206,7 +206,7 @@ $(CIRCLE)/kept-trajectory.h5: $(CIRCLE)/.part/trajectory.yaml
 $(CIRCLE)/kept.h5: $(CIRCLE)/kept-trajectory.h5 $(CIRCLE)/.part/simulate.yaml
 	$(CPFLS) simulate configs/full-circle.yaml $< -o $@ --force
 
-# Structures beside the one that wins, as consequents-products-order-functions. Learned from all samples, chosen on a
+# Structures other than the one that wins, as consequents-products-order-functions. Learned from all samples, chosen on a
 # flight kept for it and judged on another once; each is a file, so that a stopped loop goes on.
 STRUCTURES := $(addprefix seesaw-additive-2-,1 3 5 7) $(addprefix harmonic-additive-1-,1 3 5) \
 	$(addprefix harmonic-tensor-1-,1 3) harmonic-additive-2-3 $(addprefix harmonic-tensor-2-,1 3)
@@ -344,7 +344,7 @@ DECIDES = $$(grep -rl --include='*.py' mark.decides tests) -m decides --assert=p
 decides: $(INSTALLED_DEV)
 	OPENBLAS_CORETYPE=Prescott $(PYTEST) $(DECIDES)
 
-# The same with the oldest packages that pyproject.toml allows; old ones call what the newest beside them call outdated.
+# The same with the oldest packages that pyproject.toml allows; old ones call what the newest next to them call outdated.
 OLDEST := .venv-oldest/bin/python
 oldest:
 	$(PYTHON) -m venv .venv-oldest

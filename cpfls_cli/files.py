@@ -1,4 +1,4 @@
-"""Files before anything parses them: the checksum that ends an artifact, and whether it fits what stands before it."""
+"""Files before anything parses them: the checksum that ends an artifact, and whether it fits what precedes it."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def is_sealed(path: Path) -> bool:
 
 
 def seal_of(content: Buffer) -> bytes:
-    """Make the line that an artifact ends in: the SHA-256 of all that stands before it."""
+    """Make the line that an artifact ends in: the SHA-256 of all that precedes it."""
     return _line(_sha256(content).hexdigest())
 
 

@@ -111,8 +111,8 @@ def _kind(entry: Any) -> str:
 
 
 def _item(term: str, entry: Any) -> str:
-    told = " ".join(entry.description.split())
-    return _prose(f"- {term}{': ' if told else ''}{told}", "  ")
+    words = " ".join(entry.description.split())
+    return _prose(f"- {term}{': ' if words else ''}{words}", "  ")
 
 
 def _prose(text: str, indent: str = "") -> str:

@@ -458,7 +458,7 @@ def _free_ticks(figure: Figure) -> Iterator[tuple[Axis, Ticker, Locator, Formatt
 
 
 class _Ticks(NamedTuple):
-    """Where the ticks of an axis are and what is written at them, with the factor that stands in its corner."""
+    """Where the ticks of an axis are and what is written at them, with the factor in its corner."""
 
     places: list[float]
     words: list[str]
