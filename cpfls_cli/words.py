@@ -20,6 +20,12 @@ def some(names: Sequence[str], most: int, between: str = ", ") -> str:
     return between.join(names[:most]) + (f" and {rest} more" if rest > 0 else "")
 
 
+def few(names: Sequence[str], most: int = 6) -> str:
+    """Join names to a phrase, not more than anybody reads in a sentence."""
+    rest = len(names) - most
+    return joined([*names[:most], f"{rest} more"] if rest > 0 else names)
+
+
 def capitalised(words: str) -> str:
     """Begin with a capital."""
     return words[0].upper() + words[1:]

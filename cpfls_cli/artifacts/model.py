@@ -28,11 +28,12 @@ class LearnedFlight(NamedTuple):
     format: Annotated[str, About("format of the file, or its ending")]
     samples: Annotated[int | None, About("leading samples of it that were learned from")] = None
     of: Annotated[int | None, About("samples of it that were used: learned from or held out")] = None
+    log: Annotated[str, About("hash of the log that it was imported from; empty where it is one")] = ""
 
     @classmethod
-    def in_file(cls, file: InputFile, samples: int | None = None, of: int | None = None) -> Self:
+    def in_file(cls, file: InputFile, samples: int | None = None, of: int | None = None, log: str = "") -> Self:
         """Name a file."""
-        return cls(file.name, file.sha256, file.format, samples, of)
+        return cls(file.name, file.sha256, file.format, samples, of, log)
 
     @property
     def file(self) -> InputFile:

@@ -89,10 +89,13 @@ def tell(outcome: Outcome, common: Common) -> None:
 
 
 def _show_notes(outcome: Outcome, common: Common) -> None:
-    from cpfls_cli.report.terminal import warnings_of
+    from cpfls_cli.report.terminal import terminal_lines, warnings_of
 
     if not common.quiet:
-        for note in _notes(warnings_of(outcome.blocks), whole=common.verbose):
+        # What the answer says is no note too.
+        said = "" if common.as_json else "\n".join(terminal_lines(outcome.blocks, whole=common.verbose))
+        warnings = [each for each in warnings_of(outcome.blocks) if each.text.rstrip(".") not in said]
+        for note in _notes(warnings, whole=common.verbose):
             _complain(note, "note")
 
 
@@ -155,8 +158,14 @@ def _merged(warnings: Sequence[Text]) -> Iterator[Text]:
         first, *between = _NUMBER.split(saids[0])
         said = first + "".join(number + words for number, words in zip(ranges, between, strict=True))
         others = len(set(names)) - 1
-        more = f" and {others} more" if others else ""
-        yield replace(same[0], text=f"{names[0]}{more}: {said}", always=any(each.always for each in same))
+        if not others:
+            text = f"{names[0]}: {said}"
+        elif " " in (Path(names[0]).suffix or names[0]):
+            # No file, but what was done to one: "the first 3.1 s are cut".
+            text = f"{names[0]}: {said} ({others} more like it)"
+        else:
+            text = f"{names[0]} and {others} more: {said}"
+        yield replace(same[0], text=text, always=any(each.always for each in same))
 
 
 def _range_of(numbers: Sequence[str]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,9 @@ WHAT_TO_FLY = "cpfls trajectory CONFIG --hover 30 --excite roll,pitch --repeat 4
 """Plans of flights that separate the vehicle from the loop, and a missing effect from gusts."""
 BY_HAND = "by hand, stick left and right, then forward and back, about twice a second, with pauses"
 """The same without a mission."""
-FLOWN_BY_HAND = frozenset({"bbl", "bfl"})
+_FORMATS_WITHOUT = frozenset({"bbl", "bfl"})
 """Formats of logs whose autopilot flies no mission file."""
+_FLIES_NO_MISSION = "Betaflight"
 
 NOT_SPLIT = (
     "No two of these flights repeat a path, so the gap cannot be split into a repeatable part (an effect that the "
@@ -36,6 +37,12 @@ _PARTS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("not repeatable", {"facecolor": "#d9d9d9", "hatch": "////"}),
     ("sensor noise", {"facecolor": "white", "hatch": "...."}),
 )
+
+
+def flown_by_hand(formats: Collection[str], systems: Sequence[str]) -> bool:
+    """Tell whether an autopilot flies no mission: by the formats of its logs, or by what wrote them."""
+    by_format = bool(formats) and all(each.lower() in _FORMATS_WITHOUT for each in formats)
+    return by_format or (bool(systems) and all(each.startswith(_FLIES_NO_MISSION) for each in systems))
 
 
 def repeatability_drawn(groups: Callable[[Any], tuple[Repeatability | None, Repeatability | None]]) -> Drawn:

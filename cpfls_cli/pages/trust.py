@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
@@ -42,7 +42,7 @@ _WORDS: dict[str, Words] = {
 
 _TONES: tuple[Tone, ...] = ("plain", "good", "note", "warning")
 
-KnownBy = Iterable[tuple[str, Collection[str]]]
+KnownBy = Iterable[tuple[str, Sequence[str]]]
 """Flights by file name, each with the hashes of its file and of its log."""
 
 
@@ -88,11 +88,11 @@ def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy)
 
     Parameters
     ----------
-    judged : iterable of (str, collection of str)
+    judged : iterable of (str, sequence of str)
         Of each flight its file name, and the SHA-256 of the file and of the log that it was imported from.
     """
     for name, hashes in judged:
-        flight = next((each for each in learned if each.sha256 in hashes), None)
+        flight = next((each for each in learned if each.sha256 in hashes or each.log == hashes[0]), None)
         if flight is not None:
             what, it = ("it", "it") if flight.whole else (_part(flight), "that")
             yield f"{name}: {model} has learned from {what}, so {it} says nothing about unseen flights"

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeVar
 
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.job import Job, require_numbers
+from cpfls_cli.artifacts.vehicle_model import Vehicle, too_heavy
 from cpfls_cli.config.check import why_no_body
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.models import any_model, is_found, is_model, is_vehicle, with_found_numbers
+from cpfls_cli.flights.models import any_model, found_vehicle, is_found, is_model, is_vehicle, with_found_numbers
 from cpfls_cli.flights.training import log_formats
-from cpfls_cli.pages.gap_words import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
-from cpfls_cli.pages.model import cautions_of
-from cpfls_cli.report.content import Command
+from cpfls_cli.pages.gap_words import BY_HAND, WHAT_TO_FLY, flown_by_hand
+from cpfls_cli.pages.model import cautions_of, slow_words
+from cpfls_cli.report.content import Command, command_line
 from cpfls_cli.trajectory.settings import coarsest_excited
 from cpfls_cli.words import joined
 
@@ -65,14 +67,27 @@ def _with_found(job: J, found: Path) -> J:
 
 
 def why_no_body_found(job: Job, found: Path) -> str:
-    """Say why no body has the inertia that a vehicle puts into the config of a job; empty where one can have it."""
-    return why_no_body(with_found_numbers(job.study, found).vehicle) if "inertia" in job.study.vehicle.unknown else ""
+    """Say why no such vehicle has the inertia that one puts into the config of a job; empty where it can have it."""
+    if "inertia" not in job.study.vehicle.unknown:
+        return ""
+    return why_no_body(with_found_numbers(job.study, found).vehicle) or too_heavy(found_vehicle(found))
 
 
-def to_fly(job: Job, output: Path | None = None) -> Command:
-    """Give the command that plans flights that show more, or what to fly by hand where the autopilot flies no file."""
+def missing_flight(job: Job, record: Vehicle) -> str:
+    """Say which flight would identify what a vehicle leaves open, and first what to log faster."""
+    planned, slow = command_line(to_fly(job, systems=record.logged_by)).removeprefix("fly "), slow_words(record)
+    if slow:
+        return f"{slow} Then: {planned}, flown in still air, and `cpfls vehicle` again"
+    return f"The flight that is missing: {planned}, flown in still air, then `cpfls vehicle` again"
+
+
+def to_fly(job: Job, output: Path | None = None, *, systems: Sequence[str] = ()) -> Command:
+    """Give the command that plans flights that show more, or what to fly by hand where the autopilot flies no file.
+
+    `systems`: what wrote the logs, where that is known otherwise than by files of the job.
+    """
     formats = log_formats(job.inputs)
-    if formats and formats <= FLOWN_BY_HAND:
+    if flown_by_hand(formats, systems):
         return f"fly {BY_HAND}"
     planned = job.study.trajectory
     words = [job.config if word == "CONFIG" else word for word in WHAT_TO_FLY.split()[:-1]]

@@ -22,7 +22,7 @@ from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.flights.recordings import FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
 from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
-from cpfls_cli.flights.training import numbered_roles
+from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, before_after
 from cpfls_cli.gap.diagnose import diagnose as diagnose_flights
 from cpfls_cli.gap.naming.causes import of_thrust
@@ -143,6 +143,11 @@ def _farther_off(playback: PlaybackChange) -> list[str]:
     ]
 
 
+def loses(playback: PlaybackChange) -> bool:
+    """Tell whether all that is played back is worse than what knows no model."""
+    return bool(playback.at_end) and all(end.worse for end in playback.at_end.values())
+
+
 FIGURES = {
     "repeatable": repeatability_drawn(lambda r: (r.repeatability_before, r.repeatability_after)),
     "free-runs": Drawn(
@@ -169,7 +174,7 @@ FIGURES = {
 }
 WORDS = {
     **GAP_WORDS,
-    **by_name(_farther_off, hidden_gaps, _leaving),
+    **by_name(_farther_off, hidden_gaps, _leaving, loses),
     "axes": BODY_AXES,
     "finite": np.isfinite,
     "gust_words": axis_words,
@@ -193,8 +198,9 @@ def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOpti
         )
     flights = {role: file for role, file in origin.inputs.items() if role.startswith("flight")}
     learned = compared.learned
-    unseen = [inputs[role] for role in numbered_roles("held-out", held_out)]
-    refuse_seen(flights.values(), unseen)
+    roles = numbered_roles("held-out", held_out)
+    unseen = [inputs[role] for role in roles]
+    refuse_seen([(file.name, (file.sha256,)) for file in flights.values()], known_by(roles, inputs))
     held, study = read_flights(held_out, run.study), run.study
     given = [each.flight(study.vehicle, study.gap.ground_height_m) for each in compared.recorded.values()]
     split = split_flights(given, held.flights, study.gap)
@@ -214,7 +220,10 @@ def next_command(job: Job, found: Diagnosis, named: Command, unnamed: Command, d
         return to_correct(job)
     match found.verdict:
         case GapVerdict.NAMED | GapVerdict.PARTIAL:
-            return named
+            # A model that is not to be taken is not gone on with.
+            played = found.playback
+            left = played is not None and (loses(played) or (_farther_off(played) and not any(found.gusts)))
+            return unnamed if left else named
         case GapVerdict.AMBIGUOUS:
             return go_on(job, "trajectory", "--for", diagnosis, output=job.sibling("path.h5"))
         case GapVerdict.NO_GAP | GapVerdict.NOT_EXCITED:

@@ -16,12 +16,11 @@ from cpfls_cli.artifacts.job import go_on
 from cpfls_cli.artifacts.model import as_inputs, joined_flights
 from cpfls_cli.config.load import parse_config, stored_study, validate
 from cpfls_cli.errors import ComputationError, InputError, visible
-from cpfls_cli.flights.models import is_found, learned_by, read_base
+from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSet, FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
-from cpfls_cli.flights.training import known_by, numbered_roles
+from cpfls_cli.flights.training import hashes_of, known_by, numbered_roles
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
-from cpfls_cli.pages.gap_words import WHAT_TO_FLY
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.content import Command
 from cpfls_cli.result import described_fields, part, result
@@ -31,7 +30,7 @@ from cpfls_cli.simulators.inside import in_simulator
 from cpfls_cli.simulators.study import VehicleOf, played
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
-from cpfls_cli.stages._numbers import why_no_body_found, with_numbers
+from cpfls_cli.stages._numbers import missing_flight, why_no_body_found, with_numbers
 from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, warn_of_no_body, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
 from cpfls_cli.stages.init import Stated, proposed, taken
@@ -111,14 +110,14 @@ def gap(
     with_numbers(run, "gap", model)
     if of_file is not None:
         run.study = run.study.model_copy(update={"vehicle": of_file.filled(run.study.vehicle)})
-    why = "" if run.found is None else why_no_body_found(run, run.found)
-    if why:
-        raise InputError(
-            f"{run.found}: {why}, so no gap can be measured against it; --accept-guesses takes guesses from mass and "
-            f"arms, or fly what identifies its inertia: {WHAT_TO_FLY}"
-        )
     trained = numbered_roles("flight", flights)
     inputs = dict(run.take(trained | ({} if model is None else {"model": model}), "disagreement"))
+    why = "" if run.found is None else why_no_body_found(run, run.found)
+    if run.found is not None and why:
+        raise InputError(
+            f"{run.found}: {why}, so no gap can be measured against it; --accept-guesses takes guesses from mass and "
+            f"arms. {missing_flight(run, found_vehicle(run.found))}"
+        )
     unseen = dict(run.take(numbered_roles("held-out", held_out), "diagnosis"))
     for caution in run.cautions_of("disagreement", "diagnosis"):
         run.caution(caution)
@@ -231,7 +230,8 @@ def _flights(
     flown = tuple(of_vehicle(read.flights, base)) if has_effects(base) else tuple(balanced)
     split = split_flights(balanced[: len(flights)], balanced[len(flights) :], run.study.gap)
     # Those held out are behind those learned from, whoever chose them.
-    refuse_seen(files[: len(split.training)], files[len(split.training) :])
+    known = [(file.name, hashes_of(path, file)) for path, file in zip([*flights, *held_out], files, strict=True)]
+    refuse_seen(known[: len(split.training)], known[len(split.training) :])
     return FlightSet(flown[: len(flights)], (*seen_twice(files), *read.warnings)), split
 
 

@@ -33,6 +33,7 @@ from cpfls_cli.flights.training import (
     check_file,
     choosing_source,
     flight_roles,
+    hashes_of,
     held_out_parts,
     numbered_roles,
     read_training,
@@ -105,8 +106,11 @@ def identify(
     found = _with_length(found, flights, data)
     evidence, signal = _evidence(run, found, data, held_out, wrong, watch.signal)
     model = VehicleModel(vehicle=run.study.vehicle, fuzzy=found.model)
-    parts = zip(flight_roles(flights), data.parts, strict=True)
-    learned = tuple(LearnedFlight.in_file(inputs[role], *samples) for role, samples in parts)
+    parts = zip(flight_roles(flights).items(), data.parts, strict=True)
+    learned = tuple(
+        LearnedFlight.in_file(inputs[role], *samples, *hashes_of(path, inputs[role])[1:])
+        for (role, path), samples in parts
+    )
     hashes = tuple(file.sha256 for role, file in inputs.items() if role.startswith("choose-on"))
     made = identified_model(found, run.study.identification.base, data.indices, evidence, model, learned, hashes)
     unjudged = signal is not None and evidence is None and run.study.identification.validation.enabled

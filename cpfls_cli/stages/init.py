@@ -280,8 +280,10 @@ def init(
     proposal = made.proposal
     if proposal is not None:
         run.also = _summary(proposal, made.asked)
-        # A config that asks for something is refused by every command until it is filled in.
-        run.next += _next(run, proposal, given) if not made.asked else ()
+        # A config that asks for something is refused by every command until it is filled in, and a log that contradicts
+        # itself by the one that learns from it.
+        wrong = (("cpfls", "config", run.output, "--section", "import"),) if made.contradictions else ()
+        run.next += wrong or _next(run, proposal, given) if not made.asked else ()
     return made
 
 

@@ -14,7 +14,7 @@ import typer
 from cpfls_cli.arguments import AutopilotChoice
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import format_name
-from cpfls_cli.artifacts.vehicle_model import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST, Vehicle
+from cpfls_cli.artifacts.vehicle_model import DELAY, DRAG, FOUND_AS, INERTIA, LAG, THRUST, Vehicle, name_of
 from cpfls_cli.autopilots.law import AXES
 from cpfls_cli.autopilots.parameters import Autopilot
 from cpfls_cli.autopilots.registry import AUTOPILOTS
@@ -32,7 +32,6 @@ from cpfls_cli.look.gains import HOLDS, LogGains, TunedGains, tuned_gains
 from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.reasons import TOO_SLOW
 from cpfls_cli.look.vibration import Change, vibration_of
-from cpfls_cli.pages.model import slow_words
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import (
@@ -49,13 +48,13 @@ from cpfls_cli.report.canvas import (
     stacked,
     style_of,
 )
-from cpfls_cli.report.content import UNKNOWN, command_line
+from cpfls_cli.report.content import UNKNOWN
 from cpfls_cli.stage import Run, stage
-from cpfls_cli.stages._numbers import to_fly, with_numbers
+from cpfls_cli.stages._numbers import missing_flight, with_numbers
 from cpfls_cli.tuning.gains import PROPOSED, AskedMargins, Gains, ParameterRow, gains_for_vehicle
 from cpfls_cli.tuning.plant import LEAST, Noise, Spread, noise_of, spread_of
 from cpfls_cli.validation.trust import Trust
-from cpfls_cli.words import joined
+from cpfls_cli.words import few, joined
 
 _ASSUMED_LAG = (0.7, 1.3)
 _ASSUMED_GAIN = (0.8, 1.25)
@@ -383,7 +382,8 @@ def _trusted(run: Run, model: Path) -> Vehicle:
     record = found_vehicle(model)
     if record.verdict is not Trust.SIMULATION:
         good = trust_words(Trust.SIMULATION).short
-        weak = f"; not identified: {joined(record.not_determined)}" if record.not_determined else ""
+        open_ = [name_of(name) for name in record.not_determined]
+        weak = f"; not identified: {few(open_)}" if open_ else ""
         raise InputError(
             f"{model}: {trust_words(record.verdict).short}{weak}. Gains need a vehicle that is {good}: a body "
             f"that is too heavy gives gains that are too high. {_missing(run, record)}"
@@ -396,11 +396,7 @@ def _missing(run: Run, record: Vehicle) -> str:
     judged = record.held_out is not None or record.instruments is not None
     if record.verdict is Trust.NOT_JUDGED and not judged:
         return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
-    planned = command_line(to_fly(run))
-    slow = slow_words(record)
-    if slow:
-        return f"{slow} Then: {planned}, flown in still air, and `cpfls vehicle` again"
-    return f"The flight that is missing: {planned}, flown in still air, then `cpfls vehicle` again"
+    return missing_flight(run, record)
 
 
 def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tuple[Spread, ...], list[str]]:

@@ -48,8 +48,8 @@ from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, shown_slowly
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
-from cpfls_cli.flights.training import numbered_roles
-from cpfls_cli.pages.gap_words import BY_HAND, FLOWN_BY_HAND, WHAT_TO_FLY
+from cpfls_cli.flights.training import hashes_of, known_by, numbered_roles
+from cpfls_cli.pages.gap_words import BY_HAND, WHAT_TO_FLY, flown_by_hand
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.model import said_by
 from cpfls_cli.pages.playback import ERRORS, draw_errors, errors_height, gust_words
@@ -73,7 +73,7 @@ from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._checkpoint import stop_note
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.validation.trust import Trust
-from cpfls_cli.words import by_name, did_you_mean, joined
+from cpfls_cli.words import by_name, did_you_mean, few, joined
 
 _KEPT_EVERY = 10
 """Structures after which the checkpoint is written again: what a killed search has to judge anew at most."""
@@ -165,14 +165,15 @@ def shares_in_words(shares: Sequence[Share], first: int) -> str:
 WORDS: Mapping[str, Any] = {
     **MODEL_WORDS,
     **PLAYBACK_WORDS,
-    **by_name(excess, gust_words, is_learned, known_bands, log_faster, shown_slowly, _to_know, too_heavy),
+    **by_name(
+        excess, few, flown_by_hand, gust_words, is_learned, known_bands, log_faster, shown_slowly, _to_know, too_heavy
+    ),
     "ACCEPTABLE": ACCEPTABLE,
     "ANY": ANY,
     "BY_HAND": BY_HAND,
     "DRAG": DRAG,
     "FAR": _FAR,
     "FAST_HZ": FAST_HZ,
-    "FLOWN_BY_HAND": FLOWN_BY_HAND,
     "LIVELY_RAD_S": _LIVELY_RAD_S,
     "OF_NONE": OF_NONE,
     "OF_TURNING": OF_TURNING,
@@ -280,7 +281,8 @@ def vehicle(
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", others)
     begun = origin_before(run.study, run.take(learned | unseen), "vehicle-checkpoint")
     checkpoint, kept = VehicleCheckpoint.begun(run, begun, resume=resume)
-    refuse_seen(*([run.files[role] for role in roles] for roles in (learned, unseen)))
+    known = [hashes_of(path, run.files[role]) for role, path in learned.items()]
+    refuse_seen(zip([path.name for path in flights], known, strict=True), known_by(unseen, run.files))
     twice = seen_twice(run.files[role] for role in learned)
     if write_config is not None:
         refuse_own(write_config, run.output)
@@ -304,7 +306,10 @@ def vehicle(
     warnings = [*first, *limit, *twice, *(warning for flight in read for warning in flight.warnings)]
     sizes = [sum(map(len, flight.parts)) for flight in training]
     # All samples that were used were learned from.
-    own = [LearnedFlight.in_file(run.files[role], size, size) for role, size in zip(learned, sizes, strict=True)]
+    own = [
+        LearnedFlight.in_file(run.files[role], size, size, *hashes[1:])
+        for role, size, hashes in zip(learned, sizes, known, strict=True)
+    ]
     made = _judged(run, found, read, own, warnings)
     if made.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.
@@ -330,7 +335,7 @@ def next_commands(
         return page, ("cpfls", "vehicle", config, *flights, *others, "-o", job.output.with_name(f"{name}-full.h5"))
     if made.trust in (Trust.LOOP, Trust.NOT_DETERMINED, Trust.LACKING, Trust.DO_NOT_USE):
         mission = job.output.with_name(f"{name}-mission.h5")
-        return page, to_fly(job, mission)
+        return page, to_fly(job, mission, systems=made.logged_by)
     if not held_out and len(flights) > 1:
         judged = job.output.with_name(f"{name}-judged.h5")
         return page, ("cpfls", "vehicle", config, *flights[:-1], "--held-out", flights[-1], "-o", judged)

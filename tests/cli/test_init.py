@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -50,6 +51,25 @@ def test_the_next_commands_take_what_it_wrote(cpfls, usual, tmp_path):
     assert {"attitude", "body_rate", "specific_force", "position", "velocity", "rotor_speed"} <= set(summary["signals"])
     assert summary["samples"] == 2000
     cpfls.done("vehicle", study, made, "-o", tmp_path / "vehicle.h5", "--dry-run")
+
+
+def test_after_a_log_that_contradicts_itself_comes_no_command_that_refuses_it(cpfls, tmp_path, own):
+    wrong = SimpleNamespace(**vars(own) | {"velocity": own.velocity[::-1]})
+    log, study = put_file(tmp_path / "log.ulg", ulog_of_flight(wrong)), tmp_path / "study.yaml"
+    result = cpfls.done("init", log, "--mass", MASS, "-o", study)
+    assert "The log contradicts itself: log.ulg: the velocity" in result.stderr
+    *_, after, said, _ = result.stdout.splitlines()
+    assert (after, said) == ("next:", f"  cpfls config {study} --section import")
+    assert cpfls("vehicle", study, log, "-o", tmp_path / "v.h5", "--dry-run").exit_code == 2
+
+
+@pytest.mark.parametrize("imported_first", [True, False])
+def test_a_flight_is_not_judged_by_the_log_that_it_was_imported_from(cpfls, refuse, usual, tmp_path, imported_first):
+    (log, study, _), made = usual, tmp_path / "flight.h5"
+    cpfls.done("import", study, log, "-o", made)
+    one, other = (made, log) if imported_first else (log, made)
+    (line,) = refuse("vehicle", study, one, "--held-out", other, "-o", tmp_path / "vehicle.h5", "--dry-run")
+    assert line.startswith(f"{other.name}: is both learned from (as {one.name}) and held out")
 
 
 def test_every_guess_has_its_reason_in_the_file_and_in_the_answer(usual):

@@ -154,6 +154,19 @@ def test_notes_that_say_the_same_of_several_files_are_one(answer):
     without = tuple(Text(note, "warning") for note in ("no colon", "name: no colon", "other: no colon"))
     said = ["cpfls: note: no colon", "cpfls: note: name and 1 more: no colon"]
     assert answer(Outcome({}, without))[1] == said
+    # What is done to a file is no name: "the first 3.1 s are cut and 1 more: ..." said nothing.
+    cut = tuple(Text(f"the {end} s are cut: it is on the ground", "warning") for end in ("first 3.1", "last 7.0"))
+    assert answer(Outcome({}, cut))[1] == ["cpfls: note: the first 3.1 s are cut: it is on the ground (1 more like it)"]
+
+
+def test_what_the_answer_says_is_no_note_too(answer):
+    note = Text("vehicle.h5: DO NOT USE: predicts no better.", "warning", always=True)
+    said = (Text("The gap is that of vehicle.h5: DO NOT USE: predicts no better."), note)
+    assert answer(Outcome({}, said)) == [[said[0].text], []]
+    shown = [f"cpfls: note: {note.text}"]
+    assert answer(Outcome({}, (Text("a gap"), note)))[1] == shown
+    # For machines the notes are all there is of it.
+    assert answer(Outcome({}, said), as_json=True)[1] == shown
 
 
 def test_on_a_terminal_notes_are_broken_between_words_and_come_before_the_answer(monkeypatch):

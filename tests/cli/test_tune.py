@@ -116,7 +116,8 @@ def test_a_vehicle_that_flights_do_not_tell_is_refused_with_the_flight_that_is_m
     for name, own, words, missing in (
         ("loop", replace(vehicle, loop=loop), "the flights show the loop", "cpfls trajectory"),
         ("playback", vehicle, "not judged", "one that is kept aside"),
-        ("wide", replace(found_vehicle(), numbers=wide), "not identified: ", "cpfls trajectory"),
+        ("wide", replace(found_vehicle(), numbers=wide), "not identified: Ixx, Iyy, ", "cpfls trajectory"),
+        ("sticks", replace(vehicle, loop=loop, logged_by=("Betaflight 4.5",)), "loop", "by hand, stick left and right"),
     ):
         path = write_vehicle(tmp_path / f"{name}.h5", own, STUDY)
         message = refuse("tune", folder / "study.yaml", path, "--autopilot", "px4", "-o", tmp_path / "g.h5")

@@ -21,8 +21,10 @@ from cpfls_cli.flights import training as sources
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.flights.recordings import ReadFlight, signals_of
 from cpfls_cli.gap.settings import GapSettings
+from cpfls_cli.report.content import Form
 from cpfls_cli.simulation.inverse import flyability
 from cpfls_cli.simulation.model import Simulated
+from cpfls_cli.stage import loaded
 from cpfls_cli.store import Origin, write
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings, WaypointSettings
@@ -219,6 +221,13 @@ def imported(**given):
         "stated": {},
     }
     return Imported(**(counts | said | given))
+
+
+def test_rows_beyond_a_gap_are_said_with_what_they_are_a_share_of(tmp_path):
+    flight = imported(time=np.arange(10) / 10, dropped={"gap": 6, "crop": 8}, samples_read=24)
+    write(tmp_path / "flight.h5", flight, Origin(stage="import", seed=1, config=resolved_yaml(Study())))
+    said = loaded("import_").report(tmp_path / "flight.h5", Form.MARKDOWN)
+    assert "24 rows; 6 of these, 38 % of what import.crop_s keeps, are beyond a gap and left out" in said
 
 
 def write_flight(path, samples):

@@ -236,4 +236,4 @@ def test_what_is_logged_too_slowly_is_not_asked_to_be_flown():
 
 def test_a_log_of_nobody_known_has_no_name_in_its_answer():
     nobody = replace(found("betaflight"), version="", title="", reason="autopilot", axes=(), rows=(), fly=())
-    assert [block.title for block in answer(nobody)] == ["None."]
+    assert [block.title for block in answer(nobody)] == ["No gains."]

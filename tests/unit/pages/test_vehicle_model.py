@@ -9,8 +9,10 @@ from cpfls_cli import page
 from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.artifacts.vehicle_model import ResponseMismatch, vehicle_section
 from cpfls_cli.effects.scales import hover_speed
+from cpfls_cli.flights.recordings import refuse_seen
 from cpfls_cli.pages.gap_words import WHAT_TO_FLY
 from cpfls_cli.pages.model import against, slow_words
+from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
 from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
 from cpfls_cli.playback.loop import LoopBounds
@@ -188,8 +190,8 @@ def test_flights_that_show_the_loop_are_said_first_and_leave_no_good_word():
     assert own.verdict == Trust.LOOP
     first, said, *_ = against(own)
     assert first == (
-        "FORECAST NOT JUDGED; VEHICLE NOT JUDGED: THE FLIGHTS SHOW THE LOOP: not judged as a forecast; its constants "
-        "are those of vehicle and autopilot together; 2 of 2 numbers are not determined."
+        "FORECAST NOT JUDGED; VEHICLE NOT JUDGED: THE FLIGHTS SHOW THE LOOP: no flight was held out to judge its "
+        "forecast; its constants are those of vehicle and autopilot together; 2 of 2 numbers are not determined."
     )
     assert "torque explains 45 % of the roll acceleration and 47 % of the pitch acceleration" in said
     assert "Ixx 0.21 to 2.6 times and Iyy 0.23 to 2.4 times what was found" in said
@@ -354,6 +356,42 @@ def test_a_forecast_that_beats_its_rivals_in_rates_is_not_good_where_no_vehicle_
     assert own.verdict not in (Trust.SIMULATION, Trust.CONTROL)
     assert title(own).startswith(f"predicts body rates 0.50 s ahead, but {why}; ")
     assert f"Not for control: it {why}." in texts(own)
+
+
+@pytest.mark.parametrize("fades", [1.05, 4.0])
+def test_a_forecast_that_is_no_better_than_fading_rates_is_not_said_to_predict(fades):
+    """It predicted "0.50 s ahead, but is no better at 0.25 s than", where `replay` called it better."""
+    own = held_out(1.0)
+    rates = own.models["rate-stays"].body_rate
+    fading = replace(own.models["rate-stays"], body_rate=replace(rates, mae=0.5 * fades * rates.mae))
+    found = vehicle_of(whole(), held_out=replace(own, models={**own.models, "rate-fades": fading}))
+    said = "its forecast is not clearly better in body rate at 0.24 s than “rate fades” (no model); "
+    assert title(on_bound(found)).startswith("predicts body rates" if fades > 2 else said.replace(";", " and rests on"))
+    assert title(found).startswith("predicts motion 0.50 s ahead; " if fades > 2 else said)
+
+
+def test_a_number_at_the_limit_of_the_search_is_no_value_in_a_table():
+    """A drag factor was printed below its own interval, whose end it was."""
+    own = vehicle_of(whole(), numbers=(number_of("drag_factor", 1.987e-9, 1.99e-9, 6e-5)._replace(at_bound=True),))
+    (row,) = [row for row in rows_of(own, "Constant") if row[0].startswith("drag factor")]
+    assert row[1:4] == ["—", "—", "—"]
+    assert row[-1] == "no: at the limit of the search"
+
+
+def test_a_sentence_lists_no_more_numbers_than_anybody_reads():
+    effects = ("linear_damping.d", "inertia_ratio.e", "wind.v")
+    numbers = tuple(number_of(f"{name}_{axis}", determined=False) for name in effects for axis in "xyz")
+    (said,) = [line for line in against(vehicle_of(whole(), numbers=numbers)) if "say too little about it" in line]
+    assert said.endswith("inertia ratio e_z and 3 more.")
+
+
+def test_the_log_that_a_flight_was_imported_from_is_one_that_was_learned_from():
+    learned = (LearnedFlight("one.h5", "5" * 64, "cpfls/flight", log="9" * 64),)
+    (said,) = seen_warnings("vehicle.h5", learned, [("one.ulg", ("9" * 64,)), ("other.ulg", ("8" * 64,))])
+    assert said.startswith("one.ulg: vehicle.h5 has learned from it")
+    # Another stretch of that log is another flight.
+    assert not [*seen_warnings("vehicle.h5", learned, [("two.h5", ("6" * 64, "9" * 64))])]
+    refuse_seen([("one.h5", ("5" * 64, "9" * 64))], [("two.h5", ("6" * 64, "9" * 64))])
 
 
 def test_the_size_of_a_thrust_factor_goes_with_the_full_speed_that_is_assumed():

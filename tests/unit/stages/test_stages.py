@@ -16,6 +16,7 @@ from cpfls_cli.report.canvas import picture_of
 from cpfls_cli.report.content import command_line
 from cpfls_cli.result import Estimate
 from cpfls_cli.stages._numbers import to_fly
+from cpfls_cli.stages.diagnose import next_command
 from cpfls_cli.stages.extend import named_effects
 from cpfls_cli.stages.look import FIGURES
 from cpfls_cli.stages.reduce import _naming
@@ -131,7 +132,7 @@ def test_where_nothing_was_found_nothing_is_drawn():
 def test_a_vehicle_that_nobody_should_use_is_flown_for_and_not_handed_over(trust):
     study = validate(parse_config(CONFIG, "config"), "config")
     job = Job(study, Path("own/found.h5"), False, False, lambda *_: None, lambda _: None, config=Path("c.yaml"))
-    record = SimpleNamespace(complete=True, trust=trust, logged_slowly=False)
+    record = SimpleNamespace(complete=True, trust=trust, logged_slowly=False, logged_by=())
     page, (_, command, *words) = next_commands(job, record, [Path("f.h5")], ())
     assert page[:2] == ("cpfls", "report")
     poor = trust in (Trust.LACKING, Trust.NOT_DETERMINED, Trust.LOOP, Trust.DO_NOT_USE)
@@ -160,3 +161,21 @@ def test_logs_whose_autopilot_flies_no_mission_are_followed_by_sticks(tmp_path):
     job = Job(study, tmp_path / "found.h5", False, False, lambda *_: None, lambda _: None, inputs=[log])
     assert command_line(to_fly(job)).startswith("fly by hand, stick left and right")
     assert command_line(to_fly(replace(job, inputs=[]))).startswith("cpfls trajectory ")
+    # Of flights that were imported, and of a vehicle that was found, the file says what wrote the log.
+    for systems, by_hand in ((("Betaflight 4.3.0",), True), (("Betaflight 4.3.0", "PX4 1.13.3"), False), ((), False)):
+        planned = command_line(to_fly(replace(job, inputs=[]), systems=systems))
+        assert planned.startswith("fly by hand") is by_hand
+
+
+@pytest.mark.parametrize(
+    ("rates", "goes_on"),
+    # With the effects, of two that know no model, and as given: farther off; better; better, and worse than no model.
+    [((0.5, 0.3, 0.3, 0.4), "response"), ((0.2, 0.3, 0.3, 0.4), "replay"), ((0.4, 0.3, 0.3, 0.6), "response")],
+)
+def test_a_model_that_is_not_to_be_taken_is_not_gone_on_with(rates, goes_on):
+    """Leave the model as it is, was said above a command that plays the other one back."""
+    study = validate(parse_config(CONFIG, "config"), "config")
+    job = Job(study, Path("own/gap"), False, False, lambda *_: None, lambda _: None, config=Path("c.yaml"))
+    pair = made.played_pair(body_rate=rates, attitude=rates)
+    found = made.diagnosis("PARTIAL", playback=pair)
+    assert next_command(job, found, ("cpfls", "replay"), ("cpfls", "response"), Path("d.h5"))[1] == goes_on
