@@ -157,7 +157,8 @@ _BEHIND_AXES = ("dot", "ddot", "rate", "vel", "acc")
 
 
 def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
-    """Look for the columns of the other axes wherever the first one stands in a name."""
+    """Look for the columns of the other axes wherever the first one stands in a name, whatever the case of a letter."""
+    folded = {name.lower(): name for name in names}
     for name, (kind, axes) in product(names, _FAMILIES):
         for found in re.finditer(re.escape(axes[0]), name):
             before, after = name[: found.start()], name[found.end() :]
@@ -170,9 +171,10 @@ def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             )
             if (kind == "angles" and len(axes[0]) > 1) or (ends and (begins or kind in ("xyz", "wxyz"))):
                 columns = tuple(f"{before}{axis}{after}" for axis in axes)
+                columns = tuple(own if own in names else folded.get(own.lower(), "") for own in columns)
                 # Among P, Q, R and X, Y, Z there are R, P, Y too.
                 others = axes[0] in "rR" and {f"{before}{own}{after}" for own in "qQxX"} & names.keys()
-                if all(column in names for column in columns) and not others:
+                if all(columns) and not others:
                     yield ColumnGroup(f"{before}*{after}", kind, columns)
 
 
