@@ -331,14 +331,16 @@ _TEXTS: Final = (
     (rb"[{\[]", "JSON", _AS_CSV),
     (rb"\d+\.\d+ \d+ [a-z_0-9]+ ", "a log of Paparazzi", _AS_CSV),
     (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*^[\w/]+:)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),
+    (rb"([\w .:/%()-]+\|){3}", "text whose columns are parted by |", _AS_CSV),
+    (rb"time \(s\),esc ", "a log of a thrust stand", "a rotor alone flies nothing; give the log of a flight with it"),
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )
 # A line of three numbers or more, or its beginning, also as Python prints a tuple; or two lines of two numbers. No
 # match is tried again in parts, which took seconds where text goes on otherwise.
-_NUMBER: Final = rb"[-+]?\d[\d.]*+(e[-+]?\d+)?+"
+_NUMBER: Final = rb"[-+]?\d[\d.]*+(e[-+]?\d+)?+([-+]\d[\d.]*+(e[-+]?\d+)?+[ij])?+"
 _NUMBERS: Final = re.compile(
-    rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.e \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n){2}" % ((_NUMBER,) * 3)
+    rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.eij \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n){2}" % ((_NUMBER,) * 3)
 )
 # A line that says before each of its numbers what it is: `Power= 31 FLYMODE Yaw= 261.9 Roll= 2.2`.
 _NAMED_NUMBERS: Final = re.compile(rb"([a-z_][\w. \t]*[=:][ \t]*%b[ \t,;]*){3}" % _NUMBER)
