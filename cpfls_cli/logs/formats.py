@@ -252,8 +252,9 @@ def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
     if zeros:
         return "a file that begins with zeros, and no log: its writing was cut short; take it from the device again"
     found = _by_bytes(first, path.suffix.lower())
-    own = found is None or (form is not None and form.content == found[0])
-    return None if own else f"{found[0]}, and no log that can be read: {found[1]}"
+    if found is None or (form is not None and form.content == found[0]):
+        return None
+    return f"{found[0]}, and no log that can be read: {found[1]}"
 
 
 def _format_of(path: Path) -> LogFormat | None:
@@ -306,7 +307,7 @@ _FOREIGN: Final = (
     (b"Rar!", 0, "a rar archive", _UNPACK),
     (b"\x28\xb5\x2f\xfd", 0, "data compressed by zstd", _UNPACK),
     (b"ustar", 257, "a tar archive", _UNPACK),
-    (b"\x93NUMPY", 0, "an array of NumPy", "save its columns as .npz or CSV, each with its name"),
+    (b"\x93NUMPY", 0, "an array of NumPy", "write it as .npz or CSV, with a name for each column"),
     (b"version https://git-lfs", 0, "a pointer of Git LFS", "fetch it with `git lfs pull`"),
     (b"BUILD", 16, "a .DAT of DJI", "convert it to CSV with DatCon or its like"),
     (b"%PDF", 0, "a PDF", "give the log that it shows"),
@@ -331,7 +332,7 @@ _TEXTS: Final = (
     (rb"[{\[]", "JSON", _AS_CSV),
     (rb"\d+\.\d+ \d+ [a-z_0-9]+ ", "a log of Paparazzi", _AS_CSV),
     (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*^[\w/]+:)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),
-    (rb"([\w .:/%()-]+\|){3}", "text whose columns are parted by |", _AS_CSV),
+    (rb"([ -{}~]+ \|){3}", "text whose columns are parted by |", _AS_CSV),
     (rb"time \(s\),esc ", "a log of a thrust stand", "a rotor alone flies nothing; give the log of a flight with it"),
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),

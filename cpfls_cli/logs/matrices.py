@@ -227,7 +227,8 @@ def _lines(path: Path) -> dict[str, Any]:
 
 
 def _flat(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
-    if not isinstance(value, dict):
+    """Name what is in mappings by its path; a structure with time is one."""
+    if not isinstance(value, dict) or _with_time(value):
         yield prefix, value
         return
     for name, own in value.items():
@@ -250,18 +251,9 @@ def _labelled(arrays: Sequence[tuple[str, Any, str]]) -> Iterator[tuple[str, Any
 
 
 def _of_mat(variables: Mapping[str, Any]) -> Iterator[tuple[str, Any, str]]:
-    timed: dict[str, tuple[Array, list[Mapping[str, Any]]]] = {}
-
-    def within(prefix: str, value: Any) -> Iterator[tuple[str, Any, str]]:
-        if own := _with_time(value):
-            timed[prefix] = own
-        elif isinstance(value, dict):
-            for name, own in value.items():
-                yield from within(f"{prefix}/{name}" if prefix else name, own)
-        elif isinstance(value, np.ndarray):
-            yield prefix, value, ""
-
-    yield from within("", variables)
+    parts = dict(_flat("", variables))
+    timed = {name: own for name, value in parts.items() if (own := _with_time(value))}
+    yield from ((name, value, "") for name, value in parts.items() if isinstance(value, np.ndarray))
     if timed:
         longest = max(timed, key=lambda name: len(timed[name][0]))
         clock = timed[longest][0]
