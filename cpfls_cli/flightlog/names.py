@@ -172,7 +172,9 @@ def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             )
             if (kind == "angles" and len(axes[0]) > 1) or (ends and (begins or kind in ("xyz", "wxyz"))):
                 columns = tuple(f"{before}{axis}{after}" for axis in axes)
-                columns = tuple(own if own in names else folded.get(own.lower(), "") for own in columns)
+                # A letter alone is of another thing in capitals, as a rotation R is.
+                mixed = folded if any(map(str.isalpha, before + after)) or len(axes[0]) > 1 else {}
+                columns = tuple(own if own in names else mixed.get(own.lower(), "") for own in columns)
                 # Among P, Q, R and X, Y, Z there are R, P, Y too.
                 others = axes[0] in "rR" and {f"{before}{own}{after}" for own in "qQxX"} & names.keys()
                 if all(columns) and not others:

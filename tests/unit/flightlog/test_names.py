@@ -186,6 +186,14 @@ def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
     assert first(names, signal) is None
 
 
+def test_a_letter_alone_is_of_another_thing_in_capitals():
+    names = ("p[0]", "q[0]", "R[0]", "w[0]", "w[1]", "w[2]", "x", "y", "Z")
+    found = [
+        own.group.columns for own in named_signals(column_groups(names)) if own.signal in ("body_rate", "position")
+    ]
+    assert found == [("w[0]", "w[1]", "w[2]")]
+
+
 @pytest.mark.parametrize(
     ("names", "signal"),
     [
