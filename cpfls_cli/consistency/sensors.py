@@ -469,8 +469,8 @@ def _jump(flight: Signals, about_s: float, half_s: float) -> Finding:
         "keep what is before it or after it by import.crop_s, in s from the first stamp of the log: an estimator that "
         "resets its yaw jumps so"
     )
-    if abs(abs(size[axis]) - 2 * np.pi) < _JUMP_RAD:
-        # A full turn is none of an attitude.
+    if abs(size[axis]) > np.pi + _JUMP_RAD:
+        # No attitude jumps by more than half a turn.
         what = (
             f"the body rate turns by {np.degrees(-size[axis]):.0f} deg about {where}, which the attitude does not show"
         )
