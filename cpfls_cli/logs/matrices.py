@@ -221,7 +221,7 @@ def _lines(path: Path) -> dict[str, Any]:
     keys = Counter(tuple(row) for row in rows).most_common(1)[0][0] if rows else ()
     found: dict[str, Any] = {}
     for name in keys:
-        with contextlib.suppress(ValueError, TypeError):
+        with contextlib.suppress(ValueError, TypeError, OverflowError):
             found[name] = np.array([row[name] for row in rows if row.keys() >= {*keys}], dtype=float)
     return found
 
