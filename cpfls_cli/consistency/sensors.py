@@ -463,14 +463,18 @@ def _jump(flight: Signals, about_s: float, half_s: float) -> Finding:
     beyond = (turned[:-1].inv() * turned[1:]).as_rotvec() - flight.period * flight.body_rate[inside[:-1]]
     size, at = beyond.sum(axis=0), flight.time[inside[np.linalg.norm(beyond, axis=1).argmax()]]
     axis = int(np.abs(size).argmax())
-    what = (
-        f"the attitude jumps by {np.degrees(size[axis]):.0f} deg about body {BODY_AXES[axis]} at {at:.1f} s"
-        f"{f' of {flight.name}' if flight.name else ''}, which the gyroscope does not show"
-    )
+    where = f"body {BODY_AXES[axis]} at {at:.1f} s{f' of {flight.name}' if flight.name else ''}"
+    what = f"the attitude jumps by {np.degrees(size[axis]):.0f} deg about {where}, which the gyroscope does not show"
     remedy = (
         "keep what is before it or after it by import.crop_s, in s from the first stamp of the log: an estimator that "
         "resets its yaw jumps so"
     )
+    if abs(size[axis]) > np.pi + _JUMP_RAD:
+        # No attitude jumps by more than half a turn.
+        what = (
+            f"the body rate turns by {np.degrees(-size[axis]):.0f} deg about {where}, which the attitude does not show"
+        )
+        remedy = "it is derived from an angle that jumps by a full turn: leave body_rate out, which the attitude gives"
     return Finding(what, remedy, ("attitude", "gyroscope"), float(size[axis]), "rad")
 
 

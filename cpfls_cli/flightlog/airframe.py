@@ -12,6 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import blocks_of_time, half_width, jackknife_error
 from cpfls_cli.errors import InputError
+from cpfls_cli.flightlog.names import words_of
 from cpfls_cli.flightlog.smoothing import derivative, low_pass
 from cpfls_cli.flightlog.stated_vehicle import LAYOUTS, USUAL, Parameters, is_open, lifting_rotors, stated_frame
 from cpfls_cli.lag import delayed, lagged
@@ -142,6 +143,21 @@ def usual_airframe(kind: str, rotors: int) -> Airframe | None:
     if frame is None:
         return None
     return _laid_out(frame, f"the numbers that {kind} gives the motors of this frame unless changed: {frame}", "usual")
+
+
+def named_airframe(columns: Sequence[str], moved: "MovedBy | None") -> Airframe | None:
+    """Read the rotors that the names of columns place, as ``motor_FL``; which way they turn the motion may show."""
+    words = [{*words_of(column.replace("back", "rear").replace("Back", "Rear"))} for column in columns]
+    short = {"".join(part[0] for part in name.split()): name for name in _CORNERS}
+    short |= {"bl": "rear left", "br": "rear right"}
+    found = [[name for key, name in short.items() if key in own or {*name.split()} <= own] for own in words]
+    places = [own[0] for own in found if own]
+    if {*places} != {*_CORNERS} or len(places) != len(columns):
+        return None
+    shown = {} if moved is None or not moved.by_axes else {own.name: own.spin for own in moved.airframe.rotors}
+    spins = shown if [*shown] == places else {}
+    rotors = tuple(RotorPlace(name, _CORNERS[name], spins.get(name, 0)) for name in places)
+    return Airframe(rotors, False, "the names of their columns", "stated")
 
 
 def _require_control(airframe: Airframe) -> None:

@@ -62,7 +62,8 @@ class FlownPart:
     span_s: tuple[float, float] | None
     reasons: tuple[str, ...]  # What was cut, where, and how that is known; what else flies and is left out.
     flies: bool = True  # False where nothing in it flies.
-    stretches_s: tuple[tuple[float, float], ...] = ()  # Begin and end of each stretch that flies, in order.
+    stretches_s: tuple[tuple[float, float], ...] = ()  # Begin and end of each stretch that flies, in order,
+    air_s: tuple[tuple[float, float], ...] = ()  # and with what is close to the ground.
     ended: str = ""  # How flight ended before its time, and what is used; empty where nothing ended it.
     used: str = ""
     # What ended flights before their time, of all stretches, by the names of `crash.MOMENTS`, s.
@@ -418,10 +419,10 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> Flown
     ends = [crash.ended_early(signs, rests, part) for part in stretches]
     # The first sample that flies no more.
     stops = [min(after, *own.values()) if own else after for (_, after), own in zip(stretches, ends, strict=True)]
+    air = tuple((float(time[first]), float(time[stop - 1])) for (first, _), stop in zip(stretches, stops, strict=True))
     cut = []
-    for (first, _), stop, early_end in zip(stretches, stops, ends, strict=True):
+    for (first, _), stop, early_end, (begin, end) in zip(stretches, stops, ends, air, strict=True):
         # What is close to the ground at either end is left out, but where the log begins or ends in flight.
-        begin, end = float(time[first]), float(time[stop - 1])
         margin = min(_MARGIN_S, (end - begin) / 10)
         free = stop == len(time) or early_end
         cut.append((begin + (margin if first > 0 else 0.0), end - (0.0 if free else margin)))
@@ -447,7 +448,7 @@ def _longest(signs: Signs, active: BoolArray, rests: Resting, how: str) -> Flown
     used = f"the {end - begin:.0f} s before it are used" if index == chosen else f"{begin:.1f} to {end:.1f} s are used"
     span = None if whole else (round(begin, 2), round(end, 2))
     moments = tuple((what, float(time[at])) for own in ends for what, at in own.items())
-    return FlownPart(span, tuple(reasons), True, tuple(cut), ended, used, moments)
+    return FlownPart(span, tuple(reasons), True, tuple(cut), air, ended, used, moments)
 
 
 def _how(signs: Signs, part: slice, how: str) -> str:

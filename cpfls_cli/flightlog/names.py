@@ -81,16 +81,17 @@ class ColumnGroup:
     def words(self) -> tuple[str, ...]:
         """Words of the pattern in lower case, without numbers and without the unit at its end."""
         before, _, after = self.pattern.rpartition(self.ending) if self.ending else (self.pattern, "", "")
-        return _words(f"{before} {after}")
+        return words_of(f"{before} {after}")
 
     @cached_property
     def last_words(self) -> tuple[str, ...]:
         """Words of the last part of a path that has any: a structure ``output`` may hold whatever was measured."""
-        parts = map(_words, reversed(self.pattern.removesuffix(self.ending).split("/")))
+        parts = map(words_of, reversed(self.pattern.removesuffix(self.ending).split("/")))
         return next((words for words in parts if {*words} - _HOLDERS), ())
 
 
-def _words(text: str) -> tuple[str, ...]:
+def words_of(text: str) -> tuple[str, ...]:
+    """List the words of a name in lower case, without numbers, of which some are written in many ways."""
     parts = re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+", text.replace("*", " "))
     words = " ".join(part.lower() for part in parts if not part.isdecimal())
     for pattern, one in vocabulary.ONE_WORD.items():
@@ -157,7 +158,8 @@ _BEHIND_AXES = ("dot", "ddot", "rate", "vel", "acc")
 
 
 def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
-    """Look for the columns of the other axes wherever the first one stands in a name."""
+    """Look for the columns of the other axes wherever the first one stands in a name, whatever the case of a letter."""
+    folded = {name.lower(): name for name in names}
     for name, (kind, axes) in product(names, _FAMILIES):
         for found in re.finditer(re.escape(axes[0]), name):
             before, after = name[: found.start()], name[found.end() :]
@@ -170,9 +172,12 @@ def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             )
             if (kind == "angles" and len(axes[0]) > 1) or (ends and (begins or kind in ("xyz", "wxyz"))):
                 columns = tuple(f"{before}{axis}{after}" for axis in axes)
+                # A letter alone is of another thing in capitals, as a rotation R is.
+                mixed = folded if any(map(str.isalpha, before + after)) or len(axes[0]) > 1 else {}
+                columns = tuple(own if own in names else mixed.get(own.lower(), "") for own in columns)
                 # Among P, Q, R and X, Y, Z there are R, P, Y too.
                 others = axes[0] in "rR" and {f"{before}{own}{after}" for own in "qQxX"} & names.keys()
-                if all(column in names for column in columns) and not others:
+                if all(columns) and not others:
                     yield ColumnGroup(f"{before}*{after}", kind, columns)
 
 
@@ -359,7 +364,7 @@ def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool
         if signal == "body_rate":
             return turns or group.pqr
         # What is asked about an axis is no angle, but a structure of outputs may hold some; letters need a word.
-        part = {*_words(group.pattern.rpartition("/")[2])}
+        part = {*words_of(group.pattern.rpartition("/")[2])}
         asked = part & {*ASKED, "out"} or {*group.last_words} & ASKED - {"output"}
         letters = len(group.axis) == 1 and not own & meaning.words and group.columns != ("R", "P", "Y")
         return not (turns or group.pqr or letters or asked)
@@ -396,7 +401,7 @@ def _has_axes_of_places(group: ColumnGroup) -> bool:
 def _is_called_place(meaning: Meaning, group: ColumnGroup) -> bool:
     """Tell axes that are alone behind a path, or stand with words of places only."""
     part = re.split(r"[/.]", group.pattern)[-1]
-    return {*_words(part.removesuffix(group.ending))} - WISHED <= meaning.words
+    return {*words_of(part.removesuffix(group.ending))} - WISHED <= meaning.words
 
 
 # Attitude, rates, accelerometer and rotors are as many and more; what is narrower is another matrix.

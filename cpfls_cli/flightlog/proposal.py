@@ -9,7 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, about
-from cpfls_cli.flightlog.airframe import Airframe, stated_airframe, usual_airframe
+from cpfls_cli.flightlog.airframe import Airframe, named_airframe, stated_airframe, usual_airframe
 from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Load, Recognition, Rival
 from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.repair import common_rate, same_rate
@@ -384,7 +384,9 @@ def airframe_of(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     best = max(moved, key=lambda found: (found.clear, sum(found.explained)), default=None)
     if best is not None and best.clear and stated is None:
         return best.airframe, []
-    taken = stated or usual_airframe(logs[0].recognition.kind, logs[0].recognition.rotors)
+    driving = [guess.columns.names for guess in logs[0].recognition.signals if guess.signal in ROTORS]
+    named = named_airframe(driving[0], best) if driving else None
+    taken = stated or named or usual_airframe(logs[0].recognition.kind, logs[0].recognition.rotors)
     if best is None:
         return taken, []
     says = f"{best.airframe.reason}: {', '.join(f'{r.name} {_WAY[r.spin]}' for r in best.airframe.rotors)}"

@@ -145,12 +145,13 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     """Find the column of stamps, which never falls and says by name or steps what it counts; and any doubt of that."""
     ranks: dict[str, int] = {}
     refused: list[str] = []
-    paths = [name.split("/") for name in fields]
-    groups = Counter("/".join(path[:depth]) for path in paths for depth in range(len(path)))
+    paths = [re.split(r"(?=[/.])", name) for name in fields]
+    groups = Counter("".join(path[:depth]) for path in paths for depth in range(len(path)))
     for name, values in fields.items():
-        # In a struct of MATLAB, or a group of HDF5, what comes last says what it is; alone it is a unit, as in deg/sec.
-        (group, _, last), known = name.rpartition("/"), np.asarray(values, dtype=float)
-        lower = (last if groups[group] > 1 else name).lower().strip()
+        # In a struct, or a group of HDF5, what comes last says what it is; alone it is a unit, as in deg/sec.
+        *path, last = re.split(r"(?=[/.])", name)
+        lower = (last.lstrip("/.") if groups["".join(path)] > 1 else name).lower().removesuffix("[0]").strip()
+        known = np.asarray(values, dtype=float)
         known = known[np.isfinite(known)]
         usual = _TIME_NAMES.fullmatch(lower)
         changes = len(known) > max(2, 0.5 * len(values)) and np.ptp(known) > 0

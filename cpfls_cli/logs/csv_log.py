@@ -70,8 +70,7 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
     """Read columns of a CSV, empty fields as NaN; those that are not wanted by name only, for a message to suggest."""
     with _opened(path) as table:
         names = table.names
-        repeated = sorted(name for name, count in Counter(names).items() if count > 1 and name in wanted)
-        if repeated:
+        if repeated := sorted(table.repeated & wanted):
             raise InputError(f"{path}: column '{repeated[0]}' appears twice")
         kept = [index for index, name in enumerate(names) if name in wanted]
         # Lists of numbers would take ten times as much.
@@ -108,6 +107,7 @@ class _Table(NamedTuple):
     first: list[str]
     rows: _Rows
     stated: dict[str, str]  # Lines of the header of a log that a viewer exported, which stand before the names.
+    repeated: frozenset[str] = frozenset()  # Names of several columns, which ``names`` numbers from 0.
 
 
 @contextmanager
@@ -165,6 +165,8 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
         rows = ((at, list(map(_with_points, fields))) for at, fields in rows)
         first = list(map(_with_points, first))
+    repeated = frozenset(name for name, count in Counter(names).items() if count > 1 and name)
+    names = [f"{name}[{names[:at].count(name)}]" if name in repeated else name for at, name in enumerate(names)]
     sizes = [len(_listed(field)) for field in first] if len(names) == len(first) else []
     # What is called so already stays.
     sizes = [0 if f"{name}[0]" in names else size for name, size in zip(names, sizes, strict=False)]
@@ -173,7 +175,7 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         parts = zip(names, sizes, strict=True)
         names = [own for name, size in parts for own in ([f"{name}[{at}]" for at in range(size)] or [name])]
         first = _spread(first, sizes)
-    return _Table(names, first, rows, stated)
+    return _Table(names, first, rows, stated, repeated)
 
 
 def _with_points(field: str) -> str:

@@ -122,6 +122,8 @@ LOG_FORMATS = (
     LogFormat(".h5", "HDF5", "HDF5", HDF5_MAGIC, f"{_READERS}matrices", shared=True),
     LogFormat(".hdf5", "HDF5", "HDF5", HDF5_MAGIC, f"{_READERS}matrices", shared=True),
     LogFormat(".mat", "MATLAB", "MATLAB", b"MATLAB ", f"{_READERS}matrices"),
+    LogFormat(".npz", "NumPy", "arrays of NumPy", b"", f"{_READERS}matrices"),
+    LogFormat(".jsonl", "JSON lines", "JSON", b"", f"{_READERS}matrices"),
 )
 """The formats in the order in which messages list them."""
 
@@ -250,7 +252,9 @@ def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
     if zeros:
         return "a file that begins with zeros, and no log: its writing was cut short; take it from the device again"
     found = _by_bytes(first, path.suffix.lower())
-    return None if found is None else f"{found[0]}, and no log that can be read: {found[1]}"
+    if found is None or (form is not None and form.content == found[0]):
+        return None
+    return f"{found[0]}, and no log that can be read: {found[1]}"
 
 
 def _format_of(path: Path) -> LogFormat | None:
@@ -303,7 +307,7 @@ _FOREIGN: Final = (
     (b"Rar!", 0, "a rar archive", _UNPACK),
     (b"\x28\xb5\x2f\xfd", 0, "data compressed by zstd", _UNPACK),
     (b"ustar", 257, "a tar archive", _UNPACK),
-    (b"\x93NUMPY", 0, "an array of NumPy", "write it as CSV, HDF5 or .mat, with a name for each column"),
+    (b"\x93NUMPY", 0, "an array of NumPy", "write it as .npz or CSV, with a name for each column"),
     (b"version https://git-lfs", 0, "a pointer of Git LFS", "fetch it with `git lfs pull`"),
     (b"BUILD", 16, "a .DAT of DJI", "convert it to CSV with DatCon or its like"),
     (b"%PDF", 0, "a PDF", "give the log that it shows"),
@@ -328,14 +332,16 @@ _TEXTS: Final = (
     (rb"[{\[]", "JSON", _AS_CSV),
     (rb"\d+\.\d+ \d+ [a-z_0-9]+ ", "a log of Paparazzi", _AS_CSV),
     (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*^[\w/]+:)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),
+    (rb"([ -{}~]+ \|){3}", "text whose columns are parted by |", _AS_CSV),
+    (rb"time \(s\),esc ", "a log of a thrust stand", "a rotor alone flies nothing; give the log of a flight with it"),
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )
 # A line of three numbers or more, or its beginning, also as Python prints a tuple; or two lines of two numbers. No
 # match is tried again in parts, which took seconds where text goes on otherwise.
-_NUMBER: Final = rb"[-+]?\d[\d.]*+(e[-+]?\d+)?+"
+_NUMBER: Final = rb"[-+]?\d[\d.]*+(e[-+]?\d+)?+([-+]\d[\d.]*+(e[-+]?\d+)?+[ij])?+"
 _NUMBERS: Final = re.compile(
-    rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.e \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n){2}" % ((_NUMBER,) * 3)
+    rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.eij \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n){2}" % ((_NUMBER,) * 3)
 )
 # A line that says before each of its numbers what it is: `Power= 31 FLYMODE Yaw= 261.9 Roll= 2.2`.
 _NAMED_NUMBERS: Final = re.compile(rb"([a-z_][\w. \t]*[=:][ \t]*%b[ \t,;]*){3}" % _NUMBER)
@@ -349,7 +355,7 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
     if first.startswith(b"PK\x03\x04") and (suffix in (".xlsx", ".ods") or any(own in first for own in _SPREADSHEET)):
         return "a spreadsheet", "save its table as CSV, with a line of column names"
     if first.startswith(b"PK\x03\x04") and _NPY in first:
-        return "arrays of NumPy", "write them as CSV, HDF5 or .mat, with a name for each column"
+        return "arrays of NumPy", "let its name end in .npz"
     known = next(((what, way) for begins, at, what, way in _FOREIGN if first.startswith(begins, at)), None)
     if known is not None:
         return known

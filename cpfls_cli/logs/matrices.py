@@ -1,12 +1,15 @@
-"""Reader of HDF5 and of MATLAB's .mat: arrays of numbers by their path, the columns of a matrix one by one."""
+"""Reader of HDF5, MATLAB's .mat, NumPy's .npz and JSON lines: arrays by their path, columns of a matrix one by one."""
 
 import contextlib
+import json
 import struct
 import subprocess
 import sys
 import warnings
+import zipfile
 import zlib
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from math import prod
 from pathlib import Path
@@ -62,23 +65,24 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     A matrix has its samples along its longer axis, and stamps whose attribute states a unit of time are converted to
     s. What is wider than 64 columns, or holds no numbers, is left out.
     """
+    hdf5 = h5py.is_hdf5(path)
+    kind, load = ("HDF5", dict) if hdf5 else _LOADED.get(path.suffix.lower(), ("MATLAB", _variables))
     try:
-        hdf5 = h5py.is_hdf5(path)
         if hdf5:
             found = _probed(state_of(path))
             if found.fault:
                 raise InputError(f"{path}: {found.fault}")
             if found.artifact:
                 raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
-        variables = {} if hdf5 else _variables(path)
+        variables = {} if hdf5 else load(path)
         if (messages := exported(path, variables)) is not None:
             return messages
-        columns, units, names = _read(_of_hdf5(path) if hdf5 else _of_mat(variables), wanted)
+        columns, units, names = _read(_of_hdf5(path) if hdf5 else _labelled([*_of_mat(variables)]), wanted)
     except InputError:
         raise
     except Exception as error:
         # Each version of .mat breaks in its own way: what the parsers raise is no fixed set.
-        raise InputError(f"{path}: cannot be read as {'HDF5' if hdf5 else 'MATLAB'}: {error}") from None
+        raise InputError(f"{path}: cannot be read as {kind}: {error}") from None
     if not columns:
         raise InputError(f"{path}: holds no vectors or matrices of numbers")
     columns = _of_one_length(columns)
@@ -192,19 +196,64 @@ def _variables(path: Path) -> dict[str, Any]:
     return variables
 
 
+def _arrays(path: Path) -> dict[str, Any]:
+    """Load a .npz, whose arrays of objects are programs and are left out."""
+    with zipfile.ZipFile(path) as inside:
+        _require_held(path, sum(own.file_size for own in inside.infolist()), path.stat().st_size)
+    found: dict[str, Any] = {}
+    with np.load(path) as archive:
+        for name in archive.files:
+            with contextlib.suppress(ValueError):
+                found[name] = archive[name]
+    return found
+
+
+def _lines(path: Path) -> dict[str, Any]:
+    """Load objects of JSON, one a line, that have the keys that most have; a last one may have been cut."""
+    rows: list[dict[str, Any]] = []
+    with path.open(encoding="utf-8") as stream:
+        for number, line in enumerate(stream, start=1):
+            try:
+                rows += [dict(_flat("", json.loads(line)))] if line.strip() else []
+            except ValueError as error:
+                if line.endswith("\n"):
+                    raise InputError(f"{path}:{number}: no object of JSON: {error}") from None
+    keys = Counter(tuple(row) for row in rows).most_common(1)[0][0] if rows else ()
+    found: dict[str, Any] = {}
+    for name in keys:
+        with contextlib.suppress(ValueError, TypeError, OverflowError):
+            found[name] = np.array([row[name] for row in rows if row.keys() >= {*keys}], dtype=float)
+    return found
+
+
+def _flat(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Name what is in mappings by its path; a structure with time is one."""
+    if not isinstance(value, dict) or _with_time(value):
+        yield prefix, value
+        return
+    for name, own in value.items():
+        yield from _flat(f"{prefix}/{name}" if prefix else name, own)
+
+
+_LOADED = {".npz": ("NumPy", _arrays), ".jsonl": ("JSON lines", _lines)}
+
+
+def _labelled(arrays: Sequence[tuple[str, Any, str]]) -> Iterator[tuple[str, Any, str]]:
+    """Part the one matrix that has as many columns as a list of texts, which are their names."""
+    listed = [own.ravel().tolist() for _, own, _ in arrays if own.dtype.kind == "U"]
+    labels = {len(own): own for own in listed if len({*own}) == len(own) > 1}
+    widths = Counter(own.shape[1] for _, own, _ in arrays if own.ndim == 2)
+    for name, own, unit in arrays:
+        if own.ndim == 2 and own.shape[1] in labels and widths[own.shape[1]] == 1:
+            yield from ((label, column, unit) for label, column in zip(labels[own.shape[1]], own.T, strict=True))
+        else:
+            yield name, own, unit
+
+
 def _of_mat(variables: Mapping[str, Any]) -> Iterator[tuple[str, Any, str]]:
-    timed: dict[str, tuple[Array, list[Mapping[str, Any]]]] = {}
-
-    def within(prefix: str, value: Any) -> Iterator[tuple[str, Any, str]]:
-        if own := _with_time(value):
-            timed[prefix] = own
-        elif isinstance(value, dict):
-            for name, own in value.items():
-                yield from within(f"{prefix}/{name}" if prefix else name, own)
-        elif isinstance(value, np.ndarray):
-            yield prefix, value, ""
-
-    yield from within("", variables)
+    parts = dict(_flat("", variables))
+    timed = {name: own for name, value in parts.items() if (own := _with_time(value))}
+    yield from ((name, value, "") for name, value in parts.items() if isinstance(value, np.ndarray))
     if timed:
         longest = max(timed, key=lambda name: len(timed[name][0]))
         clock = timed[longest][0]

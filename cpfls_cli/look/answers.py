@@ -17,7 +17,7 @@ from cpfls_cli.look.gains import TunedGains
 from cpfls_cli.look.gusts import AxisGusts
 from cpfls_cli.look.hover import Hover
 from cpfls_cli.look.loop import AxisLoop
-from cpfls_cli.look.steady import FEWEST_WINDOWS, WINDOW_S
+from cpfls_cli.look.steady import FEWEST_WINDOWS, WINDOW_S, windows_of
 from cpfls_cli.look.vibration import Vibration
 from cpfls_cli.result import about, result
 from cpfls_cli.words import joined
@@ -28,6 +28,8 @@ _SWAP = (
     "swap the propellers of M{} and M{}, which turn the same way, and hover for 40 s: what moves with the propeller is "
     "the propeller"
 )
+_PAUSES, _WHOLE = "also what falls into its pauses", 0.5
+"""What to log where less than this share of a flight is in windows without a pause."""
 _TRIED = 2
 """Flights that are proposed at most."""
 _PUNCH = "climb twice at nearly full throttle, for 2 s each"
@@ -111,6 +113,14 @@ class Found:
         has = self.flight.parameters
         return tuple(f"{name} = {value}" for name, value in pairs if not _is(has.get(name), value))
 
+    def too_short(self, what: str, fly: str = "") -> tuple[str, str, str, str]:
+        """Say that it flies for too short a time, or that pauses of the log leave too little of it whole."""
+        flight = self.flight
+        flown_s = float(flight.flown.sum()) / flight.rate_hz
+        if len(flight.gaps_s) and len(windows_of(flight).begin) * WINDOW_S < _WHOLE * flown_s:
+            return "no", f"{len(flight.gaps_s)} pauses of the log leave too little of the flight whole", _PAUSES, ""
+        return "no", what, "", fly
+
     @property
     def sticks(self) -> str:
         """What to fly for axes that are not identified."""
@@ -165,7 +175,7 @@ def _balance(found: Found) -> tuple[str, str, str, str]:
         return "no", "commands of the rotors are not logged", "also rotor commands", ""
     shares = [row.share for row in balance.rotors if row.share is not None]
     if not shares:
-        return "no", f"less than {_LEAST_S:.0f} s of steady flight in it", "", _HOVER
+        return found.too_short(f"less than {_LEAST_S:.0f} s of steady flight in it", _HOVER)
     half = max(share.half for share in shares)
     why = f"within {100 * half:.1f} points, {balance.steady_s:.0f} s of steady flight"
     return "yes" if half < _SURE_SHARE else "roughly", why, "", _parting(found, balance)
@@ -194,7 +204,7 @@ def _hover(found: Found) -> tuple[str, str, str, str]:
         return (
             ("no", "commands are not logged", "also rotor commands", "")
             if missing
-            else ("no", f"less than {_LEAST_S:.0f} s of hover in it", "", _HOVER)
+            else found.too_short(f"less than {_LEAST_S:.0f} s of hover in it", _HOVER)
         )
     why = f"{hover.hover_s:.0f} s of hover, seen by {hover.found_by}"
     return "yes" if hover.throttle.half < _SURE_HOVER else "roughly", why, "", ""
@@ -265,7 +275,7 @@ def _spectra(found: Found) -> tuple[str, str, str, str]:
     if rate < _SOME_SPECTRUM_HZ:
         return "no", f"the gyroscope is logged {rate:.0f} times a second", wanted, ""
     if found.vibration is None or not found.vibration.spectra:
-        return "no", "too little flight", "", ""
+        return found.too_short("too little flight")
     if rate >= _WHOLE_SPECTRUM_HZ:
         return "yes", f"up to {rate / 2:.0f} Hz", "", ""
     return "roughly", f"up to {rate / 2:.0f} Hz; what is faster is folded below or averaged away", wanted, ""

@@ -22,6 +22,7 @@ from cpfls_cli.flightlog.conversion import (
     attitude_to_enu_flu,
 )
 from cpfls_cli.flightlog.crash import ALIVE
+from cpfls_cli.flightlog.names import column_groups, named_signals
 from cpfls_cli.flightlog.proposal import KnownLog, airframe_of
 from cpfls_cli.flightlog.recognised import Guess, Recognition
 from cpfls_cli.flightlog.recognition import recognise
@@ -194,6 +195,11 @@ class _Reader:
             held = ", ".join(guess.signal.replace("_", " ") for guess in self.recognition.signals)
             surfaces = [own for own in self.log.table.names if own.lower() in _SURFACES]
             held += f"; {joined(surfaces)} are no rotors" if surfaces else ""
+            known = named_signals(column_groups(self.log.table.names))
+            for group in [own.group for own in known if own.signal == "body_rate"][:1]:
+                still = np.ptp(self.log.table.values(group.columns)[1], axis=0).max(initial=0.0) == 0
+                derived = "are derivatives of angles" if group.words[-1:] == ("dot",) else "are no rates of the body"
+                held += f"; {joined(group.columns)} {'never change' if still else derived}"
             raise InputError(f"a log without a gyroscope (it holds {held}): {faster}")
         return found
 

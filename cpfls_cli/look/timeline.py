@@ -190,24 +190,26 @@ def timeline(
 def _flights(flight: LogFlight, topics: Topics, recognition: Recognition) -> Iterator[Event]:
     lifts, lands = _land_detector(topics)
     ends = [(what, at + recognition.counted_from_s) for what, at in recognition.flown.moments]
-    last, spans = float(flight.time[-1]), runs(flight.flown)
+    last, spans, air = float(flight.time[-1]), runs(flight.flown), recognition.flown.air_s
     # Rotors may be logged less often than rates.
     lately = flight.collective[np.isfinite(flight.collective)][-max(2, round(_AT_END_S * flight.rate_hz)) :]
     for number, (first, after) in enumerate(spans):
         before = spans[number - 1][1] if number else 0
         follows = spans[number + 1][0] if number + 1 < len(spans) else None
         begin, end = float(flight.time[first]), float(flight.time[after - 1])
-        yield Event(time_s=begin, until_s=end, kind="flown", text="flies")
+        off, down = (begin, end) if len(air) != len(spans) else np.add(air[number], recognition.counted_from_s).tolist()
+        off, down = min(begin, max(off, 0.0)), max(end, min(down, last))
+        yield Event(time_s=off, until_s=down, kind="flown", text="flies")
         # What climbs far is surely off the ground long after it has left it, and is near it again long before.
         earliest = max(begin - _CLIMBS_S, flight.time[before - 1] if number else 0.0)
         latest = min(end + _CLIMBS_S, last if follows is None else flight.time[follows])
         lifted = max((at for at in lifts if earliest < at < begin + _NEAR_S), default=None)
         landed = min((at for at in lands if end - _NEAR_S < at <= max(latest, end + _NEAR_S)), default=None)
         if lifted is not None or (begin - float(flight.time[0]) > _AROUND_S and _rests(flight, slice(before, first))):
-            yield Event(time_s=begin if lifted is None else lifted, kind="take-off", text="takes off")
+            yield Event(time_s=off if lifted is None else lifted, kind="take-off", text="takes off")
         if any(end - _NEAR_S <= at < end + _NEAR_S for _, at in ends):
             continue
-        touch = _landing(flight, begin, end, end if landed is None else landed)
+        touch = _landing(flight, begin, end, down if landed is None else landed)
         stopped = touch.severity == "warning"
         if landed is not None or (last - end > _AROUND_S and _rests(flight, slice(after, follows), stopped)):
             yield touch

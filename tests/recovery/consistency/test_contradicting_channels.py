@@ -432,6 +432,16 @@ def test_an_attitude_that_jumps_is_said_to_and_no_column_is_suspected(flights, j
         assert angle == pytest.approx(degrees, abs=3.0)
 
 
+def test_rates_that_are_derived_across_a_full_turn_are_said_to_be_wrong(flights):
+    first, other = flights
+    spike = np.zeros_like(first.body_rate)
+    at = int(np.searchsorted(first.time, 8.0))
+    spike[at : at + 2, 2] = np.pi / first.period
+    [said] = audit([replace(first, body_rate=first.body_rate + spike), other], WINDOWS).contradictions
+    assert re.search(r"the body rate turns by 360 deg about body z \(yaw\) at (7\.9|8\.0) s", said)
+    assert "leave body_rate out" in said
+
+
 def test_a_gyroscope_of_another_sign_is_no_jump(flights):
     wrong = [replace(each, body_rate=each.body_rate * [1, 1, -1]) for each in flights]
     [said] = audit(wrong, WINDOWS).contradictions

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.airframe import airframe_from_motion, stated_airframe
+from cpfls_cli.flightlog.airframe import airframe_from_motion, named_airframe, stated_airframe
 from tests.builders.unknown_logs import HUBS, flight
 
 NAMES = {(1, -1): "front right", (-1, 1): "rear left", (1, 1): "front left", (-1, -1): "rear right"}
@@ -119,3 +119,36 @@ def test_rotors_that_cannot_turn_a_vehicle_are_refused(hubs, axis):
 
 def test_parameters_of_nothing_known_state_no_rotors():
     assert stated_airframe({"MOT_PWM_MAX": 1900.0, "FRAME_CLASS": 7.0}) is None
+
+
+@pytest.mark.parametrize(
+    ("columns", "places"),
+    [
+        ("motor_fl motor_fr motor_bl motor_br", "front left, front right, rear left, rear right"),
+        ("rpmRR rpmRL rpmFR rpmFL", "rear right, rear left, front right, front left"),
+        (
+            "backLeftMotor frontLeftMotor backRightMotor frontRightMotor",
+            "rear left, front left, rear right, front right",
+        ),
+        ("m1 m2 m3 m4", ""),
+        ("motor_fl motor_fr motor_rl", ""),
+        ("motor_fl motor_fr motor_rl motor_rl_2", ""),
+    ],
+)
+def test_names_of_columns_place_rotors(columns, places):
+    found = named_airframe(columns.split(), None)
+    assert ", ".join(rotor.name for rotor in found.rotors if not rotor.spin) == places if places else found is None
+
+
+def test_the_motion_shows_which_way_named_rotors_turn():
+    own = flight(seconds=20.0)
+    names = [NAMES[hub[:2]] for hub in HUBS]
+    columns = ["motor_" + "".join(part[0] for part in name.split()) for name in names]
+    moved = airframe_from_motion(own.rate, own.speed, 100.0, False)
+    found = named_airframe(columns, moved)
+    assert [(rotor.name, rotor.spin) for rotor in found.rotors] == [
+        (n, hub[2]) for n, hub in zip(names, HUBS, strict=True)
+    ]
+    # What moves as if it were elsewhere says no spins.
+    other = airframe_from_motion(own.rate, own.speed[:, [1, 0, 2, 3]], 100.0, False)
+    assert [rotor.spin for rotor in named_airframe(columns, other).rotors] == [0] * 4

@@ -42,6 +42,7 @@ def test_rotors_that_turn_fast_on_the_ground_do_not_fly():
     level, height = between(5, 30, 0.5), between(12, 28, 2.0)
     flown = flown_by(level, height, turning(12, 28))
     assert flown.span_s == (pytest.approx(12.5, abs=0.1), pytest.approx(27.5, abs=0.1))
+    assert flown.air_s == ((pytest.approx(12.0, abs=0.1), pytest.approx(28.0, abs=0.1)),)
 
 
 def test_a_flight_that_comes_down_to_the_height_of_its_ground_is_one():

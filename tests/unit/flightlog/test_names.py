@@ -119,6 +119,13 @@ def first(names, signal, system=""):
         ("R P Y", "attitude", "R P Y"),
         ("v_dot_x v_dot_y v_dot_z", "acceleration", "v_dot_x v_dot_y v_dot_z"),
         ("batV", "voltage", "batV"),
+        # Axes in mixed case, a gyroscope of a structure, and words that are written as one.
+        ("xGyro yGyro ZGyro", "body_rate", "xGyro yGyro ZGyro"),
+        ("Roll pitch YAW", "attitude", "Roll pitch YAW"),
+        ("imu.gx imu.gy imu.gz", "body_rate", "imu.gx imu.gy imu.gz"),
+        ("att.gx_[deg/s] att.gy_[deg/s] att.gz_[deg/s]", "body_rate", "att.gx_[deg/s] att.gy_[deg/s] att.gz_[deg/s]"),
+        ("motval_0 motval_1 motval_2 motval_3", "rotor_command", "motval_0 motval_1 motval_2 motval_3"),
+        ("motorrpm1 motorrpm2 motorrpm3", "rotor_speed", "motorrpm1 motorrpm2 motorrpm3"),
         # The first instance of a topic bears no number.
         ("ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM", "rotor_speed", "ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM"),
     ],
@@ -177,6 +184,14 @@ def test_columns_are_found_by_their_names(names, signal, columns):
 )
 def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
     assert first(names, signal) is None
+
+
+def test_a_letter_alone_is_of_another_thing_in_capitals():
+    names = ("p[0]", "q[0]", "R[0]", "w[0]", "w[1]", "w[2]", "x", "y", "Z")
+    found = [
+        own.group.columns for own in named_signals(column_groups(names)) if own.signal in ("body_rate", "position")
+    ]
+    assert found == [("w[0]", "w[1]", "w[2]")]
 
 
 @pytest.mark.parametrize(

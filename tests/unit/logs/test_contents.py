@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import json
 import struct
 import subprocess
 import sys
@@ -66,6 +67,51 @@ def test_columns_without_names_that_a_spreadsheet_adds_are_none(tmp_path):
         contents = log_contents(tmp_path / "log.csv")
         assert listed(contents)[""] == {"t": [0, 1], "roll": [1, 2]}
         assert contents.warnings == warnings
+
+
+def test_of_columns_with_one_name_each_has_a_number(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("T,roll,T,motor,motor\n0,1,20,5,6\n1,2,30,7,8\n")
+    held = {"T[0]": [0, 1], "roll": [1, 2], "T[1]": [20, 30], "motor[0]": [5, 7], "motor[1]": [6, 8]}
+    assert listed(log_contents(path)) == {"": held}
+    assert listed(log_contents(path, ["T[1]"]))[""]["T[1]"] == [20, 30]
+    # What a config maps is one of them.
+    with pytest.raises(InputError, match=r"log\.csv: column 'T' appears twice"):
+        log_contents(path, ["T"])
+
+
+def test_arrays_of_numpy_are_named_by_the_texts_with_them(tmp_path):
+    time, state = np.arange(5) * 0.01, np.arange(15.0).reshape(5, 3)
+    texts = {"state_labels": np.array(["x", "vx", "wz"]), "source": np.array("a.ulg"), "odd": np.array([{}, 1])}
+    np.savez(tmp_path / "log.npz", t=time, X=state, U=state[:, :2], **texts)
+    contents = log_contents(tmp_path / "log.npz")
+    columns = zip(("x", "vx", "wz", "U[0]", "U[1]"), state.T[[0, 1, 2, 0, 1]].tolist(), strict=True)
+    assert listed(contents) == {"": {"t": time.tolist(), **dict(columns)}}
+    assert contents.warnings == ("arrays that are no columns of numbers are left out: state_labels",)
+    # Of two matrices as wide it is not known whose names they are.
+    np.savez(tmp_path / "log.npz", t=time, X=state, Y=state, labels=texts["state_labels"])
+    assert "X[0]" in log_contents(tmp_path / "log.npz").topics[""]
+
+
+def test_lines_of_json_are_rows(tmp_path):
+    path = tmp_path / "log.jsonl"
+    rows = [{"type": "frame", "t": 0.1 * row, "imu": {"gyro": [row, 0, -1]}, "ok": None} for row in range(4)]
+    head = {"type": "header", "vehicle": "a quad"}
+    path.write_text("".join(f"{json.dumps(each)}\n" for each in [head, *rows, {"type": "bye"}]) + '{"type": "fra')
+    contents = listed(log_contents(path))[""]
+    np.testing.assert_equal(
+        contents,
+        {
+            "t": [0.1 * row for row in range(4)],
+            "imu/gyro[0]": [0, 1, 2, 3],
+            "imu/gyro[1]": [0] * 4,
+            "imu/gyro[2]": [-1] * 4,
+            "ok": [np.nan] * 4,
+        },
+    )
+    path.write_text('{"t": 1}\n{"t": 2\n{"t": 3}\n')
+    with pytest.raises(InputError, match=r"log\.jsonl:2: no object of JSON: "):
+        log_contents(path)
 
 
 def test_a_ulog_holds_topics_and_what_px4_knows_of_the_vehicle(tmp_path):
@@ -216,10 +262,10 @@ def test_the_page_on_import_describes_every_format():
 
 def test_words():
     suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl, .bfl, Crazyflie uSD"
-    suffixes += ", .db3, .mcap, .h5, .hdf5 or .mat"
+    suffixes += ", .db3, .mcap, .h5, .hdf5, .mat, .npz or .jsonl"
     assert suffixes_in_words() == suffixes
     formats = "CSV, Parquet, ULog, ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag"
-    formats += ", HDF5, MATLAB"
+    formats += ", HDF5, MATLAB, NumPy, JSON lines"
     assert formats_in_words() == formats
 
 
@@ -387,6 +433,8 @@ def test_what_comes_behind_a_slash_names_a_clock_in_a_group_alone() -> None:
     time = np.linspace(0.0, 5.0, 500)
     assert LogTable({"": {"data/x": np.cos(time), "data/t": time}}, {}).time_column == "data/t"
     assert LogTable({"": {"gear deg/sec": 3 * time, "log_time": time}}, {}).time_column == "log_time"
+    assert LogTable({"": {"imu.gx": np.cos(time), "imu.ts [s]": time}}, {}).time_column == "imu.ts [s]"
+    assert LogTable({"": {"T[0]": time, "roll": np.cos(time), "T[1]": 3 * time}}, {}).time_column == "T[0]"
 
 
 def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
@@ -617,8 +665,10 @@ def test_matlab_of_version_7_3_is_hdf5_behind_a_line_of_text(tmp_path):
         ),
         ("log.h5", b"\x89HDF\r\n\x1a\n" + bytes(30), "cannot be read as HDF5: "),
         ("log.h5", b"MATLAB 5.0 MAT-file".ljust(126), "cannot be read as MATLAB: "),
+        ("log.npz", b"broken", "cannot be read as NumPy: "),
+        ("log.jsonl", b"\n", "holds no vectors or matrices of numbers"),
     ],
-    ids=["empty", "broken", "cut", "under another ending"],
+    ids=["empty", "broken", "cut", "under another ending", "no archive", "no lines"],
 )
 def test_what_cannot_be_read(tmp_path, name, content, message):
     (tmp_path / name).write_bytes(content)
@@ -701,8 +751,10 @@ def test_a_file_that_states_more_than_memory_may_hold_is_refused(tmp_path, monke
     scipy.io.savemat(tmp_path / "log.mat", {"t": np.zeros(3 << 20)}, do_compression=True)
     with pytest.raises(InputError, match=r"log\.h5: claims 8 GB of numbers, far more"):
         log_contents(tmp_path / "log.h5")
-    with pytest.raises(InputError, match=r"log\.mat: holds more than .* GB of numbers in .* MB: damaged, or not a log"):
-        log_contents(tmp_path / "log.mat")
+    np.savez_compressed(tmp_path / "log.npz", t=np.zeros(3 << 20))
+    for name in ("log.mat", "log.npz"):
+        with pytest.raises(InputError, match=r"holds more than .* GB of numbers in .* MB: damaged, or not a log"):
+            log_contents(tmp_path / name)
 
 
 def archive(**members):
@@ -743,6 +795,15 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.tar", tape(), "a tar archive", "unpack it first"),
         ("a.xlsx", archive(xl_book="x"), "a spreadsheet", "save its table as CSV"),
         ("a.npy", array(), "an array of NumPy", "a name for each column"),
+        ("a.zip", archive(log_t__npy="x"), "arrays of NumPy", "let its name end in .npz"),
+        ("a.txt", b"\n  _Vind,_kias |  pitch,__deg | _roll,__deg |\n", "text whose columns are parted by |", "as CSV"),
+        (
+            "a.csv",
+            "\ufeffTime (s),ESC signal (\u00b5s),Thrust (N)\n".encode(),
+            "a log of a thrust stand",
+            "of a flight",
+        ),
+        ("a.txt", b"0+0i\t-0.5+0i\t1e-3-2i\n0+0i\t0+0i\t1+0i\n", "a table of numbers without names", "names each"),
         ("a.ulg", b"version https://git-lfs.github.com/spec/v1\n", "a pointer of Git LFS", "git lfs pull"),
         ("a.DAT", bytes(16) + b"BUILD 2019", "a .DAT of DJI", "to CSV"),
         ("a.gpx", b'<?xml version="1.0"?>\n<gpx version="1.1">', "a GPX track", "log of the autopilot"),

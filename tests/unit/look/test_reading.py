@@ -218,6 +218,22 @@ def test_motion_a_log_without_a_gyroscope_and_heights_alone_are_not_enough():
         read(contents)
 
 
+def test_columns_that_are_called_rates_and_are_none_are_named():
+    dots = ("roll_dot", "pitch_dot", "yaw_dot")
+    angles = np.unwrap(OWN.angles, axis=0)
+    for rates, why in (
+        (np.gradient(angles, OWN.time, axis=0), "are derivatives of angles"),
+        (0 * angles, "never change"),
+    ):
+        contents = logs.WRITERS[""](OWN)
+        fields = contents.topics[""]
+        for name in [name for name in fields if name.startswith(("gyro", "q"))]:
+            del fields[name]
+        fields |= named(OWN.angles, "roll", "pitch", "yaw") | named(rates, *dots)
+        with pytest.raises(InputError, match=rf"without a gyroscope \(.*; roll_dot, pitch_dot and yaw_dot {why}\)"):
+            read(contents)
+
+
 def test_surfaces_of_an_airplane_are_no_rotors():
     asked = {"throttle": 0.5 + 0 * OWN.time, "aileron": OWN.angles[:, 0], "elevator": OWN.angles[:, 1]}
     with pytest.raises(InputError, match=r"acceleration.*; aileron and elevator are no rotors\): log body rates"):
