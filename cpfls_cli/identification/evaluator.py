@@ -13,7 +13,7 @@ from cpfls_cli.fuzzy.basis import breakpoints
 from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.identification.samples import Products, Samples
 from cpfls_cli.identification.settings import LocalSearchSettings
-from cpfls_cli.identification.solver import Fit, Solver
+from cpfls_cli.identification.solver import Fit, Ridge, Solver
 from cpfls_cli.least_squares import NormalEquations, quick_solution
 from cpfls_cli.regressor.structure import ModelStructure
 
@@ -85,14 +85,14 @@ class ChromosomePoint:
 
 @dataclass(frozen=True)
 class Problem:
-    """Partition weights as nonlinear least squares with the linear parameters eliminated, from a fit at the start.
+    """Partition weights as nonlinear least squares with the linear parameters eliminated, from the ridge at the start.
 
-    Its ridge weight is finite. Ridge weight and column sizes stay those of the start: a penalty that moved with the
+    Its weight is finite. Ridge weight and column sizes stay those of the start: a penalty that moved with the
     columns would add a term to the gradient that variable projection leaves out.
     """
 
     solver: Solver
-    start: Fit
+    start: Ridge | Fit
 
     def point(self, genes: IntArray, products: Products) -> ChromosomePoint:
         """Solve for the linear parameters of a chromosome, whose products are given."""
@@ -235,22 +235,26 @@ class Evaluator:
 
     def _evaluate(self, chromosome: IntArray) -> tuple[IntArray, Array]:
         products = self.solver.products(self._decode(chromosome))
-        fit = self._fit(chromosome, products)
-        if products is None or fit is None:
+        if products is None:
             return chromosome, NOT_DEFINED
-        objectives = self.objectives(chromosome, fit)
+        ridge, genes, after = self.solver.ridge_of(self._decode(chromosome), products), chromosome, NOT_DEFINED
         movable = any(partition.functions > 2 for partition in self.structure.partitions)
-        if self.local_search.enabled and movable and not np.isinf(fit.ridge_weight):
-            refined = refine(Problem(self.solver, fit), chromosome, products, self.local_search.evaluations)
-            better = self._fit(refined.genes, refined.products) if refined.products is not products else None
-            after = NOT_DEFINED if better is None else self.objectives(refined.genes, better)
-            always = self.local_search.reinsert == "always" and np.isfinite(after).all()
-            if always or after[0] < objectives[0]:
-                return refined.genes, after
-        return chromosome, objectives
+        if self.local_search.enabled and movable and not np.isinf(ridge.ridge_weight):
+            refined = refine(Problem(self.solver, ridge), chromosome, products, self.local_search.evaluations)
+            if refined.products is not products:
+                genes, after = refined.genes, self._judged(refined.genes, refined.products)
+            # Nothing is asked of a chromosome that is replaced whatever it is worth.
+            if self.local_search.reinsert == "always" and np.isfinite(after).all():
+                return genes, after
+        objectives = self._judged(chromosome, products, ridge)
+        return (genes, after) if after[0] < objectives[0] else (chromosome, objectives)
 
-    def _fit(self, chromosome: IntArray, products: Products | None) -> Fit | None:
-        fit = None if products is None else self.solver.fit(self._decode(chromosome), products)
+    def _judged(self, chromosome: IntArray, products: Products, ridge: Ridge | None = None) -> Array:
+        fit = self._fit(chromosome, products, ridge)
+        return NOT_DEFINED if fit is None else self.objectives(chromosome, fit)
+
+    def _fit(self, chromosome: IntArray, products: Products | None, ridge: Ridge | None = None) -> Fit | None:
+        fit = None if products is None else self.solver.fit(self._decode(chromosome), products, ridge)
         return fit if fit is not None and np.isfinite([fit.mean_squared_error, fit.conditioning]).all() else None
 
     def _decode(self, chromosome: IntArray) -> tuple[Array, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -222,6 +223,14 @@ class Fit:
     column_size: Array
 
 
+class Ridge(NamedTuple):
+    """A ridge weight with the column sizes that it holds for, as in `Fit`, and its cross-validated error."""
+
+    ridge_weight: float
+    column_size: Array
+    error: float | None
+
+
 def regressor_blocks(learned: Samples) -> Iterator[tuple[TorqueData, Regressor]]:
     """Yield the samples block by block, small enough to write out, with their regressors."""
     for data in learned.ready.source.chunks():
@@ -260,13 +269,13 @@ class Solver:
         products = self.learned.products(partitions)
         return products if np.max(np.abs(products.gram)) <= LARGEST_SQUARE else None
 
-    def fit(self, partitions: Breakpoints, products: Products | None = None) -> Fit | None:
+    def fit(self, partitions: Breakpoints, products: Products | None = None, ridge: Ridge | None = None) -> Fit | None:
         """Solve for the linear parameters, with the ridge weight that these partitions need.
 
         Parameters
         ----------
         products : Products, optional
-            Of these partitions, where they are known already.
+            Of these partitions, where they are known already, and `ridge` too.
 
         Returns
         -------
@@ -276,12 +285,15 @@ class Solver:
         products = products or self.products(partitions)
         if products is None:
             return None
-        weight, error, size = 0.0, None, np.ones(self.learned.table.parameters)
-        if self.ridge is not None:
-            size = column_size(products.sum())
-            curve = self._curve(products, partitions, size)
-            weight, error = float(curve.weight[curve.chosen]), float(curve.error[curve.chosen])
-        return self._solved(products.sum(), partitions, weight, size, error)
+        return self._solved(products.sum(), partitions, *(ridge or self.ridge_of(partitions, products)))
+
+    def ridge_of(self, partitions: Breakpoints, products: Products) -> Ridge:
+        """Cross-validate the ridge weight that partitions need, whose products are given; 0 without a ridge."""
+        if self.ridge is None:
+            return Ridge(0.0, np.ones(self.learned.table.parameters), None)
+        size = column_size(products.sum())
+        curve = self._curve(products, partitions, size)
+        return Ridge(float(curve.weight[curve.chosen]), size, float(curve.error[curve.chosen]))
 
     def curve(self, partitions: Breakpoints) -> RidgeCurve | None:
         """Cross-validate the ridge weight.
