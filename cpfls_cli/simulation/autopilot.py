@@ -21,6 +21,7 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.stepping import Flat, Machine, Memory
 from cpfls_cli.vehicle.tracing import SYMBOLS, Symbol
 from cpfls_cli.vehicle.values import (
+    ARRAYS,
     Each,
     Functions,
     Value,
@@ -326,17 +327,11 @@ def asked(
     By name, at the samples of the plan: position and velocity in the world frame, m and m/s; attitude as roll, pitch,
     yaw, rad, within half a turn of those that are flown; of an autopilot's own law thrust too, N.
     """
-    autopilot, thrusts = Autopilot(vehicle, settings), settings.law is not None
-
-    def build(_memory: Memory, given: tuple[Symbol, ...]) -> Vector:
-        plan, at = Planned.of(given[:PLANNED]), given[PLANNED:]
-        rows = [x for row in autopilot.target(plan, at) for x in row]
-        return (*rows, autopilot.wrench(plan, at, rotation_rows(at[ATTITUDE], SYMBOLS))[0]) if thrusts else tuple(rows)
-
-    machine = Machine.of(build, PLANNED + VEHICLE_STATES)
-    along = np.column_stack([_plan(*(planned[name] for name in _PLANNED)), state[:, :VEHICLE_STATES]])
-    found = np.array([machine.advance(tuple(row)) for row in along.tolist()])
-    flown, targets = state[:, ATTITUDE], found[:, :9].reshape(-1, 3, 3)
-    attitude = flown + rotations.wrapped(rotations.euler_angles(targets) - flown)
-    thrust = {"thrust": found[:, 9]} if thrusts else {}
+    autopilot, at = Autopilot(vehicle, settings, ARRAYS), tuple(state.T)
+    plan = Planned.of(tuple(_plan(*(planned[name] for name in _PLANNED)).T))
+    target = np.stack([np.stack(row, axis=-1) for row in autopilot.target(plan, at)], axis=-2)
+    flown, thrust = state[:, ATTITUDE], {}
+    attitude = flown + rotations.wrapped(rotations.euler_angles(target) - flown)
+    if settings.law is not None:
+        thrust = {"thrust": autopilot.wrench(plan, at, rotation_rows(at[ATTITUDE], ARRAYS))[0]}
     return {"position": planned["position"], "velocity": planned["velocity"], "attitude": attitude, **thrust}
