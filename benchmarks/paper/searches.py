@@ -109,10 +109,10 @@ class Prepared:
 class Samples:
     """Training data by setting; what two settings have in common is made once."""
 
-    def __init__(self, split: SplitFlights) -> None:
+    def __init__(self, split: SplitFlights, known: Sequence[Selection] = ()) -> None:
         self._split = split
         self._surveys: dict[str, Survey] = {}
-        self._selections: dict[Any, Selection] = {}
+        self._selections: dict[Any, Selection] = {("cpfls", each.criterion): each for each in known}
 
     def prepared(self, wanted: Wanted, study: Study) -> Prepared:
         """Choose the samples of a setting as `cpfls reduce` would."""
@@ -169,6 +169,7 @@ def main(
     generations: int = 200,
     samples: Annotated[list[int] | None, typer.Option()] = None,
     overrides: Annotated[list[str] | None, typer.Option("--set")] = None,
+    selections: Annotated[list[Path] | None, typer.Option("--selection")] = None,
     force: bool = False,
 ) -> None:
     size = (f"identification.population={population}", f"identification.generations={generations}")
@@ -178,7 +179,8 @@ def main(
     check_outputs(job, output)
     inputs = take_inputs(job, flight_roles([flight]))
     split = split_training([flight], study, inputs)
-    chosen = Samples(split)
+    # Of the same motion, whatever its noise: `cpfls reduce` chooses as is chosen here.
+    chosen = Samples(split, [read(path, Selection)[0] for path in selections or ()])
     wanted = list(settings(what, samples or ((2743, 1170, 685) if what is Compared.TABLE_5 else (685,))))
     prepared = [chosen.prepared(each, load_study(config, (*common, *each.overrides), seed)) for each in wanted]
     partial, origin = output.with_name(f"{output.name}.partial"), origin_before(study, inputs)

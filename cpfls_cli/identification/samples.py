@@ -137,10 +137,11 @@ class Samples:
         self._add_up(kernels.GRAM, padded_breakpoints(partitions), (NOTHING, NOTHING), (gram, moment, NOTHING))
         gram = gram + gram.swapaxes(1, 2)
         gram[:, np.arange(P), np.arange(P)] *= 0.5
-        rigid = moment[:, :, 1:]
-        whole = np.block([[dense[:, 1:, 1:], rigid.swapaxes(1, 2)], [rigid, gram]])
+        if self.ready.rigid:
+            rigid = moment[:, :, 1:]
+            gram = np.block([[dense[:, 1:, 1:], rigid.swapaxes(1, 2)], [rigid, gram]])
         columns = np.concatenate([dense[:, 1:, 0], moment[:, :, 0]], axis=1)
-        return Products(whole, columns, dense[:, 0, 0], 3 * np.bincount(self.label, minlength=self.labels))
+        return Products(gram, columns, dense[:, 0, 0], 3 * np.bincount(self.label, minlength=self.labels))
 
     def errors(self, partitions: Breakpoints, coefficients: Array, rigid_body: Array) -> tuple[Array, Array]:
         """Add up the squared residuals of a model and find the largest.
