@@ -201,19 +201,13 @@ class Evaluator:
         refined = np.array([chromosome for chromosome, _ in results]).reshape(genes.shape)
         return Evaluation(refined, np.array([objectives for _, objectives in results]).reshape(-1, OBJECTIVES))
 
-    def fit(self, chromosome: IntArray) -> Fit | None:
-        """Solve for the linear parameters of one chromosome.
+    def fit(self, chromosome: IntArray, products: Products | None = None, ridge: Ridge | None = None) -> Fit | None:
+        """Solve for the linear parameters of one chromosome, shape (genes,), given what of it is known already.
 
-        Parameters
-        ----------
-        chromosome : array of int, shape (genes,)
-
-        Returns
-        -------
-        Fit or None
-            None where a partition is not defined or the model is not finite.
+        None where a partition is not defined or the model is not finite.
         """
-        return self._fit(chromosome, self.solver.products(self._decode(chromosome)))
+        fit = self.solver.fit(self._decode(chromosome), products, ridge)
+        return fit if fit is not None and np.isfinite([fit.mean_squared_error, fit.conditioning]).all() else None
 
     def objectives(self, chromosome: IntArray, fit: Fit) -> Array:
         """Judge a fit by all objectives.
@@ -250,12 +244,8 @@ class Evaluator:
         return (genes, after) if after[0] < objectives[0] else (chromosome, objectives)
 
     def _judged(self, chromosome: IntArray, products: Products, ridge: Ridge | None = None) -> Array:
-        fit = self._fit(chromosome, products, ridge)
+        fit = self.fit(chromosome, products, ridge)
         return NOT_DEFINED if fit is None else self.objectives(chromosome, fit)
-
-    def _fit(self, chromosome: IntArray, products: Products | None, ridge: Ridge | None = None) -> Fit | None:
-        fit = None if products is None else self.solver.fit(self._decode(chromosome), products, ridge)
-        return fit if fit is not None and np.isfinite([fit.mean_squared_error, fit.conditioning]).all() else None
 
     def _decode(self, chromosome: IntArray) -> tuple[Array, ...]:
         return decode(self.structure, chromosome.astype(float))

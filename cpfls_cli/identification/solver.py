@@ -272,15 +272,7 @@ class Solver:
     def fit(self, partitions: Breakpoints, products: Products | None = None, ridge: Ridge | None = None) -> Fit | None:
         """Solve for the linear parameters, with the ridge weight that these partitions need.
 
-        Parameters
-        ----------
-        products : Products, optional
-            Of these partitions, where they are known already, and `ridge` too.
-
-        Returns
-        -------
-        Fit or None
-            None where the regressor is not finite.
+        Products and ridge of these partitions are given where they are known; None where the regressor is not finite.
         """
         products = products or self.products(partitions)
         if products is None:
