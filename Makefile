@@ -144,14 +144,21 @@ data/paper/full-%.h5: data/paper/flight.h5 $(LARGEST) data/paper/.part/searches.
 	$(SEARCHES) configs/paper.yaml $< table-5 -o $@ --seed $* --seeds 5 --selection $(LARGEST)
 
 # What the paper leaves open, combined: two flights, three noises of the torque, four choices of samples, and whether
-# errors are taken over the whole flight or over the samples learned from.
+# errors are taken over the whole flight or over the samples learned from. Samples are chosen by the motion, which is
+# the same with every noise.
+CHOSEN := paper-literal sigma_min KD-exchange
+define chosen
+data/$(1)/chosen-$(2).h5: data/$(1)/noise-0.h5 data/$(1)/.part/reduce.yaml
+	$(CPFLS) reduce configs/$(1).yaml $$< -o $$@ --force --set reduction.size=685 --set reduction.criterion=$(2)
+endef
+
 define reading
 data/$(1)/noise-$(2).h5: data/$(1)/trajectory.h5 data/$(1)/.part/simulate.yaml
 	$(CPFLS) simulate configs/$(1).yaml $$< -o $$@ --force --set simulation.relative_noise.torque=$(2)
 
-data/$(1)/readings-$(2).h5: data/$(1)/noise-$(2).h5 data/$(1)/.part/searches.yaml
+data/$(1)/readings-$(2).h5: data/$(1)/noise-$(2).h5 $(CHOSEN:%=data/$(1)/chosen-%.h5) data/$(1)/.part/searches.yaml
 	$(SEARCHES) configs/$(1).yaml $$< readings -o $$@ $$(READ) --set simulation.relative_noise.torque=$(2) \
-		--population 20 --generations 5 --samples 685
+		--population 20 --generations 5 --samples 685 $(CHOSEN:%=--selection data/$(1)/chosen-%.h5)
 
 data/$(1)/readings-full-$(2).h5: data/$(1)/noise-$(2).h5 data/$(1)/.part/searches.yaml
 	$(SEARCHES) configs/$(1).yaml $$< readings -o $$@ $$(READ) --set simulation.relative_noise.torque=$(2) \
@@ -160,6 +167,7 @@ endef
 READ := --set identification.local_search.reinsert=always
 NOISES := 0 0.01 0.05
 FLIGHTS := paper paper-gentle
+$(foreach flight,$(FLIGHTS),$(foreach rule,$(CHOSEN),$(eval $(call chosen,$(flight),$(rule)))))
 $(foreach flight,$(FLIGHTS),$(foreach noise,$(NOISES),$(eval $(call reading,$(flight),$(noise)))))
 read = $(foreach flight,$(FLIGHTS),$(NOISES:%=data/$(flight)/$(1)-%.h5))
 
