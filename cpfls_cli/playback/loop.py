@@ -38,6 +38,8 @@ ANY = 10.0
 _TINY = np.finfo(float).tiny
 _LEAVES_LESS = 0.5
 """Of what a model leaves unexplained: one without its effects that leaves less shows that it is wrong."""
+_FORMULAS = 1.15
+"""Factor by which lag and thrust of a formula move both bounds: a sagging battery or a filter did by up to 1.12."""
 _MOST_NOISE = 0.1
 """Of the power of a band that may be noise of the sensors: with more, the residual is the noise's error."""
 
@@ -63,6 +65,12 @@ class LoopBounds(NamedTuple):
     missed: Annotated[
         Array, _by_axis("share explained by the model that was found, where rotors that only lag explain much more")
     ] = np.full(3, np.nan)
+    enclosed: Annotated[
+        Array,
+        About(
+            "bounds on a moment of inertia by rotors that only lag, there", ("end", "axis"), "kg m^2", BODY, gaps=True
+        ),
+    ] = np.full((2, 3), np.nan)
 
     @property
     def shows_loop(self) -> bool:
@@ -116,7 +124,12 @@ def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Seque
     better = found._replace(explained=best.explained, by_band=best.by_band)
     left = 1 - found.explained[:2]
     far = (left > 1 - EXPLAINED) & less(1 - best.explained[:2], _LEAVES_LESS * left)
-    return better._replace(missed=found.explained) if far.any() or not best.shows_loop else better
+    if best.shows_loop and not far.any():
+        return better
+    # Of yaw torque and inertia a vehicle whose drag factor is open shows the ratio alone.
+    known = [True, True, "drag_factor" not in vehicle.unknown]
+    ends = np.array([best.low / _FORMULAS, best.high * _FORMULAS]) * vehicle.inertia_kg_m2[:3]
+    return better._replace(missed=found.explained, enclosed=np.where(known, ends, np.nan))
 
 
 def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], logged_hz: float) -> bool:

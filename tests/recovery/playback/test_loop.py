@@ -90,6 +90,16 @@ def test_a_model_that_explains_nothing_is_not_taken_for_the_loop(flights, bounds
     assert (found.misses, found.shows_loop, found.unexplained) == (True, False, True)
     assert found.explained[:2].min() > 0.95
     np.testing.assert_array_equal(found.missed, loop_bounds(wrong, still).explained)
+    # Whatever the config guesses, its rotors alone enclose the body, and the yaw of one whose drag factor is known.
+    truth = np.array(SMALL.vehicle.inertia_kg_m2[:3])
+    for vehicle in (
+        replace(SMALL.vehicle, inertia_kg_m2=tuple(3 * truth)),
+        replace(SMALL.vehicle, unknown=("inertia",)),
+    ):
+        low, high = loop_and_plain(wrong, vehicle, still).enclosed
+        assert ((low < truth) & (truth < high) & (high < 1.6 * low)).all()
+    open_drag = replace(SMALL.vehicle, unknown=("drag_factor", "inertia"))
+    assert np.isnan(loop_and_plain(wrong, open_drag, still).enclosed[:, 2]).all()
     for bandwidth in BANDWIDTHS[:2]:
         key = ("45 g", GUSTS, bandwidth)
         gusty = loop_and_plain(VehicleModel(vehicle=SMALL.vehicle), SMALL.vehicle, flights[key])

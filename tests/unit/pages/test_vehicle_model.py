@@ -229,6 +229,7 @@ def test_a_model_that_explains_less_than_its_rotors_alone_is_none_and_no_loop_is
         np.array([[2.5, 6.7], [0.63, 1.7]]),
         np.array([[0.85, 0.86, np.nan], [0.91, 0.79, np.nan]]),
         missed=np.array([0.01, 0.02, np.nan]),
+        enclosed=np.array([[1.3e-5, 1.4e-5, np.nan], [2.3e-5, 2.5e-5, np.nan]]),
     )
     own = vehicle_of(whole(), loop=loop)
     assert own.verdict == Trust.NOT_DETERMINED
@@ -236,6 +237,8 @@ def test_a_model_that_explains_less_than_its_rotors_alone_is_none_and_no_loop_is
     (said,) = [line for line in against(own) if line.startswith("What was found")]
     assert "its torque explains 1 % of roll and 2 % of pitch acceleration" in said
     assert "but a lag 85 % of the roll acceleration from 2.5 to 6.7 Hz (91 % from 0.63 to 1.7 Hz)" in said
+    inside = "Ixx lies between 1.3 × 10⁻⁵ and 2.3 × 10⁻⁵ and Iyy lies between 1.4 × 10⁻⁵ and 2.5 × 10⁻⁵ kg m². Its"
+    assert inside in said
     assert "the loop" not in " ".join(against(own))
 
 
