@@ -127,9 +127,9 @@ def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Seque
     if best.shows_loop and not far.any():
         return better
     # Of yaw torque and inertia a vehicle whose drag factor is open shows the ratio alone.
-    known = [True, True, "drag_factor" not in vehicle.unknown]
+    bounded = [True, True, "drag_factor" not in vehicle.unknown]
     ends = np.array([best.low / _FORMULAS, best.high * _FORMULAS]) * vehicle.inertia_kg_m2[:3]
-    return better._replace(missed=found.explained, enclosed=np.where(known, ends, np.nan))
+    return better._replace(missed=found.explained, enclosed=np.where(bounded, ends, np.nan))
 
 
 def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], logged_hz: float) -> bool:
