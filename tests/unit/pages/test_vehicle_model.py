@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli import page
-from cpfls_cli.artifacts.model import LearnedFlight
+from cpfls_cli.artifacts.model import LearnedFlight, joined_flights
 from cpfls_cli.artifacts.vehicle_model import ResponseMismatch, vehicle_section
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.flights.recordings import refuse_seen
@@ -392,6 +392,12 @@ def test_the_log_that_a_flight_was_imported_from_is_one_that_was_learned_from():
     # Another stretch of that log is another flight.
     assert not [*seen_warnings("vehicle.h5", learned, [("two.h5", ("6" * 64, "9" * 64))])]
     refuse_seen([("one.h5", ("5" * 64, "9" * 64))], [("two.h5", ("6" * 64, "9" * 64))])
+
+
+def test_the_log_of_a_flight_is_kept_where_a_gap_was_found_in_it_too():
+    known = LearnedFlight("one.h5", "5" * 64, "cpfls/flight", 9, 9, "9" * 64)
+    again = known._replace(log="")
+    assert joined_flights([again], [known]) == joined_flights([known], [again]) == (known,)
 
 
 def test_the_size_of_a_thrust_factor_goes_with_the_full_speed_that_is_assumed():
