@@ -115,8 +115,8 @@ def gap(
     why = "" if run.found is None else why_no_body_found(run, run.found)
     if run.found is not None and why:
         raise InputError(
-            f"{run.found}: {why}, so no gap can be measured against it; --accept-guesses takes guesses from mass and "
-            f"arms. {missing_flight(run, found_vehicle(run.found))}"
+            f"{run.found}: {why}, so no gap can be measured against it; --accept-guesses, with a config and without "
+            f"--model, takes guesses from mass and arms. {missing_flight(run, found_vehicle(run.found))}"
         )
     kept_aside = numbered_roles("held-out", held_out)
     unseen = dict(run.take(kept_aside, "diagnosis"))

@@ -181,8 +181,8 @@ def test_names_that_make_no_forecast_come_with_what_does():
 @pytest.mark.parametrize(("rival", "taken"), [(0.6, True), (0.3, False)])
 def test_in_gusts_too_a_model_that_forecasts_worse_than_none_is_not_to_be_taken(rival, taken, monkeypatch):
     """It was, where it was farther off than the model as given, and the command below went on with the other one."""
-    gusts, air = (GustAxis("roll", 5.0, 4.0, 6.0, 0.2, 0.1, 0.3),), SimpleNamespace(instrument_kind="past", alone=None)
-    monkeypatch.setattr(Diagnosis, "gusts", gusts)
+    monkeypatch.setattr(Diagnosis, "gusts", (GustAxis("roll", 5.0, 4.0, 6.0, 0.2, 0.1, 0.3),))
+    air = SimpleNamespace(instrument_kind="past", alone=None, axes=lambda *_: ())
     worse = made.played_pair(body_rate=(0.5, rival, rival, 0.4), attitude=(0.5, rival, rival, 0.4))
     said = next_steps(diagnosis(playback=worse, air=air))
     assert ("for a simulation take it all the same" in said) is taken
