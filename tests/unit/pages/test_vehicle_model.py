@@ -10,7 +10,7 @@ from cpfls_cli.artifacts.model import LearnedFlight, joined_flights
 from cpfls_cli.artifacts.vehicle_model import ResponseMismatch, vehicle_section
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.flights.recordings import refuse_seen
-from cpfls_cli.pages.gap_words import WHAT_TO_FLY
+from cpfls_cli.pages.gap_words import BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import against, slow_words
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
@@ -294,6 +294,12 @@ def test_a_response_that_is_off_is_none_of_the_vehicle_and_one_that_is_not_seen_
     assert "roll 101 (0.40 to 9.0 Hz), pitch 8.0" in " ".join(evidence(off))
     assert unseen.verdict == Trust.NOT_JUDGED
     assert "do not show the frequency responses of roll and pitch clearly enough" in " ".join(evidence(unseen))
+    for kind in ("repeats", "past"):
+        own = instrumented(vehicle_of(whole()), cost=np.nan, kind=kind)
+        assert WHAT_TO_FLY in " ".join(evidence(own))
+        by_hand = " ".join(evidence(replace(own, logged_by=("Betaflight 4.5",))))
+        assert BY_HAND in by_hand
+        assert WHAT_TO_FLY not in by_hand
     assert plain(off)["responses"][0] == {"name": "roll", "cost": 101.0, "low": 0.4, "high": 9.0}
 
 
