@@ -52,12 +52,12 @@ def as_inputs(role: str, flights: Sequence[LearnedFlight]) -> dict[str, InputFil
 
 
 def joined_flights(*groups: Iterable[LearnedFlight]) -> tuple[LearnedFlight, ...]:
-    """List flights once each; of one that is in several groups what was learned from most."""
+    """List flights once each; of one in several groups what was learned from most, and its log if any knows it."""
     kept: dict[str, LearnedFlight] = {}
     for flight in (flight for group in groups for flight in group):
-        known = kept.get(flight.sha256)
-        if known is None or (known.samples or 0) < (flight.samples or 0):
-            kept[flight.sha256] = flight
+        known = kept.get(flight.sha256, flight)
+        most = flight if (known.samples or 0) < (flight.samples or 0) else known
+        kept[flight.sha256] = most._replace(log=known.log or flight.log)
     return tuple(kept.values())
 
 

@@ -70,27 +70,34 @@ def why_no_body_found(job: Job, found: Path) -> str:
     """Say why no such vehicle has the inertia that one puts into the config of a job; empty where it can have it."""
     if "inertia" not in job.study.vehicle.unknown:
         return ""
-    return why_no_body(with_found_numbers(job.study, found).vehicle) or too_heavy(found_vehicle(found))
+    heavy = too_heavy(found_vehicle(found))
+    return why_no_body(with_found_numbers(job.study, found).vehicle) or (heavy and f"its inertia is {heavy}")
 
 
 def missing_flight(job: Job, record: Vehicle) -> str:
     """Say which flight would identify what a vehicle leaves open, and first what to log faster."""
-    planned, slow = command_line(to_fly(job, systems=record.logged_by)).removeprefix("fly "), slow_words(record)
+    # A study that comes with a vehicle is written with the results, of which a refusal leaves none.
+    config = job.config if job.config is None or job.config.is_file() else "CONFIG"
+    planned = command_line(to_fly(job, systems=record.logged_by, config=config)).removeprefix("fly ")
+    slow = slow_words(record)
     if slow:
         return f"{slow} Then: {planned}, flown in still air, and `cpfls vehicle` again"
     return f"The flight that is missing: {planned}, flown in still air, then `cpfls vehicle` again"
 
 
-def to_fly(job: Job, output: Path | None = None, *, systems: Sequence[str] = ()) -> Command:
+def to_fly(
+    job: Job, output: Path | None = None, *, systems: Sequence[str] = (), config: str | Path | None = None
+) -> Command:
     """Give the command that plans flights that show more, or what to fly by hand where the autopilot flies no file.
 
-    `systems`: what wrote the logs, where that is known otherwise than by files of the job.
+    `systems`: what wrote the logs, where that is known otherwise than by files of the job; `config`: what to call the
+    config, if not that of the job.
     """
     formats = log_formats(job.inputs)
     if flown_by_hand(formats, systems):
         return f"fly {BY_HAND}"
     planned = job.study.trajectory
-    words = [job.config if word == "CONFIG" else word for word in WHAT_TO_FLY.split()[:-1]]
+    words = [config or job.config if word == "CONFIG" else word for word in WHAT_TO_FLY.split()[:-1]]
     coarsest = coarsest_excited(planned.excite)
     # A config of coarser paths is refused an excitation.
     finer = ("--set", f"trajectory.sample_time_s={coarsest:g}") if planned.sample_time_s > coarsest else ()

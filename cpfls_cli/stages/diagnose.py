@@ -43,7 +43,7 @@ from cpfls_cli.pages.gap import (
 )
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn
 from cpfls_cli.pages.playback import SIGNALS, axis_words, draw_errors, errors_height
-from cpfls_cli.pages.trust import seen_warnings
+from cpfls_cli.pages.trust import KnownBy, seen_warnings
 from cpfls_cli.playback.errors import AFTER
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import GREY, Axes, Drawn, Figure, legend_over, plain_ticks, stacked
@@ -198,9 +198,8 @@ def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOpti
         )
     flights = {role: file for role, file in origin.inputs.items() if role.startswith("flight")}
     learned = compared.learned
-    roles = numbered_roles("held-out", held_out)
-    unseen = [inputs[role] for role in roles]
-    refuse_seen([(file.name, (file.sha256,)) for file in flights.values()], known_by(roles, inputs))
+    unseen = known_by(numbered_roles("held-out", held_out), inputs)
+    refuse_seen([(file.name, (file.sha256,)) for file in flights.values()], unseen)
     held, study = read_flights(held_out, run.study), run.study
     given = [each.flight(study.vehicle, study.gap.ground_height_m) for each in compared.recorded.values()]
     split = split_flights(given, held.flights, study.gap)
@@ -236,7 +235,7 @@ def learned_from(
     found: Diagnosis,
     flights: dict[str, InputFile],
     learned: Sequence[LearnedFlight],
-    held_out: Sequence[InputFile],
+    held_out: KnownBy,
     *,
     model: str,
     of: str = "",
@@ -247,8 +246,7 @@ def learned_from(
     model is of, and the diagnosis among the results of the run.
     """
     run.take_also({**flights, **as_inputs(MODEL_FLIGHT, learned)}, of)
-    hashes = [(file.name, (file.sha256,)) for file in held_out]
-    seen = (*seen_twice(flights.values()), *seen_warnings(f"the model of {model}", learned, hashes))
+    seen = (*seen_twice(flights.values()), *seen_warnings(f"the model of {model}", learned, held_out))
     return replace(found, learned=tuple(learned), seen=seen)
 
 

@@ -115,10 +115,11 @@ def gap(
     why = "" if run.found is None else why_no_body_found(run, run.found)
     if run.found is not None and why:
         raise InputError(
-            f"{run.found}: {why}, so no gap can be measured against it; --accept-guesses takes guesses from mass and "
-            f"arms. {missing_flight(run, found_vehicle(run.found))}"
+            f"{run.found}: {why}, so no gap can be measured against it; --accept-guesses, with a config and without "
+            f"--model, takes guesses from mass and arms. {missing_flight(run, found_vehicle(run.found))}"
         )
-    unseen = dict(run.take(numbered_roles("held-out", held_out), "diagnosis"))
+    kept_aside = numbered_roles("held-out", held_out)
+    unseen = dict(run.take(kept_aside, "diagnosis"))
     for caution in run.cautions_of("disagreement", "diagnosis"):
         run.caution(caution)
     check_ignored(run.study)
@@ -135,9 +136,8 @@ def gap(
     disagreement = learned_from(run, disagreement, learned, "disagreement")
     found = of_diagnosis.diagnosed(study, split, disagreement.warnings, base, progress_of(run.progress, 0.15, 0.85))
     trained_on = {role: inputs[role] for role in trained}
-    found = of_diagnosis.learned_from(
-        run, found, trained_on, learned, list(unseen.values()), model="disagreement.h5", of="diagnosis"
-    )
+    held = known_by(kept_aside, unseen)
+    found = of_diagnosis.learned_from(run, found, trained_on, learned, held, model="disagreement.h5", of="diagnosis")
     if of_file is not None:
         found = _with_file(run, found, of_file, split)
     run.progress(0.85, 1, "extend")

@@ -167,10 +167,11 @@ class _Sets:
     def traded(self, names: _Names) -> NamedFit:
         """Give the fit of a set; the interval of one lag or delay holds what it is jointly with the other.
 
-        That is where the other is more than its standard error, which is neither named nor excluded.
+        That is where the other is more than its standard error, which is neither named nor excluded. Of a filter no
+        number is a time that a lag could trade for.
         """
         fit, numbers = self.fits[names], self.numbers(names)
-        joint = [self.numbers(each) for each in self.fits if set(names) < set(each)]
+        joint = [self.numbers(each) for each in self.fits if set(names) < set(each) and self.count(each) == 2]
         own = [
             each[names[0]][0].value
             for each in joint

@@ -200,7 +200,7 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
                 logged = [name for name in to_log if name != _RADIUS]
                 asked = [f"log {' and '.join(logged)}"] if logged else []
                 asked += ["state rotors.radius_m in the config"] if _RADIUS in to_log else []
-                separated_by = f"{' and '.join(asked)} (not tried without)"
+                separated_by = f"{' and '.join(asked)} (not tried without that)"
                 rivals.append(Alternative(name, effect.name, np.nan, separated_by))
     return tuple(rivals)
 

@@ -87,6 +87,23 @@ def test_the_interval_of_a_lag_holds_what_it_is_with_a_delay_of_more_than_its_st
     assert (number.value, number.low, number.high) == pytest.approx((0.03, low, 0.031))
 
 
+@pytest.mark.parametrize(
+    ("best", "sizes", "numbers"),
+    [
+        (("low_pass_filter",), [(0.02, 0.001), (6.0, 0.1)], [(0.03, 0.029, 0.031)] * 2),
+        (LAG, [(0.005, 0.01), (9.0, 3.0)], [(0.03, 0.029, 0.031)]),
+    ],
+    ids=["a filter keeps both of its numbers", "a frequency is no time that a lag trades for"],
+)
+def test_a_lag_and_a_filter_do_not_trade(best, sizes, numbers, monkeypatch):
+    filtered = ("motor_lag", "low_pass_filter")
+    left = {(): 90.0, LAG: 60.0, DELAY: 60.0, BOTH: 60.0} | dict.fromkeys((best, filtered), 9.0)
+    names, _, result, _ = apart(monkeypatch, filtered, left, {filtered: sizes, BOTH: [SURE, ABSENT]})
+    assert names == best
+    (own,) = result.found.estimates.effects
+    assert [(each.value, each.low, each.high) for each in own] == [pytest.approx(each) for each in numbers]
+
+
 def test_the_one_that_leaves_more_is_no_rival(monkeypatch):
     left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
     assert apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})[:2] == (DELAY, set())

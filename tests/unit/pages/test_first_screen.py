@@ -1,13 +1,16 @@
 """The first screen of a diagnosis: each sentence from the facts of a record, and nothing that its numbers deny."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cpfls_cli import page
+from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.gap.naming.results import Alternative, ByKind, Unexplained
 from cpfls_cli.gap.residual.rotor_loss import RotorLoss
+from cpfls_cli.playback.gusts import GustAxis
 from cpfls_cli.report.content import Box, Facts, Folded, Table, Text
 from cpfls_cli.result import Estimate, plain
 from cpfls_cli.simulators.results import Corrected
@@ -173,6 +176,17 @@ def test_names_that_make_no_forecast_come_with_what_does():
     assert next_steps(replace(lost, recorded=slowly)) == f"{said}log the rotors faster, as said above."
     winning = made.played_pair(body_rate=(0.2, 0.3, 0.3, 0.6), attitude=(0.5, 0.3, 0.3, 0.7))
     assert "cpfls vehicle" not in next_steps(diagnosis("PARTIAL", playback=winning))
+
+
+@pytest.mark.parametrize(("rival", "taken"), [(0.6, True), (0.3, False)])
+def test_in_gusts_too_a_model_that_forecasts_worse_than_none_is_not_to_be_taken(rival, taken, monkeypatch):
+    """It was, where it was farther off than the model as given, and the command below went on with the other one."""
+    monkeypatch.setattr(Diagnosis, "gusts", (GustAxis("roll", 5.0, 4.0, 6.0, 0.2, 0.1, 0.3),))
+    air = SimpleNamespace(instrument_kind="past", alone=None, axes=lambda *_: ())
+    worse = made.played_pair(body_rate=(0.5, rival, rival, 0.4), attitude=(0.5, rival, rival, 0.4))
+    said = next_steps(diagnosis(playback=worse, air=air))
+    assert ("for a simulation take it all the same" in said) is taken
+    assert ("Do not take the model with it" in said) is not taken
 
 
 def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_separates():

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from cpfls_cli import page
-from cpfls_cli.artifacts.model import LearnedFlight
+from cpfls_cli.artifacts.model import LearnedFlight, joined_flights
 from cpfls_cli.artifacts.vehicle_model import ResponseMismatch, vehicle_section
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.flights.recordings import refuse_seen
-from cpfls_cli.pages.gap_words import WHAT_TO_FLY
+from cpfls_cli.pages.gap_words import BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import against, slow_words
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
@@ -297,6 +297,12 @@ def test_a_response_that_is_off_is_none_of_the_vehicle_and_one_that_is_not_seen_
     assert "roll 101 (0.40 to 9.0 Hz), pitch 8.0" in " ".join(evidence(off))
     assert unseen.verdict == Trust.NOT_JUDGED
     assert "do not show the frequency responses of roll and pitch clearly enough" in " ".join(evidence(unseen))
+    for kind in ("repeats", "past"):
+        own = instrumented(vehicle_of(whole()), cost=np.nan, kind=kind)
+        assert WHAT_TO_FLY in " ".join(evidence(own))
+        by_hand = " ".join(evidence(replace(own, logged_by=("Betaflight 4.5",))))
+        assert BY_HAND in by_hand
+        assert WHAT_TO_FLY not in by_hand
     assert plain(off)["responses"][0] == {"name": "roll", "cost": 101.0, "low": 0.4, "high": 9.0}
 
 
@@ -395,6 +401,12 @@ def test_the_log_that_a_flight_was_imported_from_is_one_that_was_learned_from():
     # Another stretch of that log is another flight.
     assert not [*seen_warnings("vehicle.h5", learned, [("two.h5", ("6" * 64, "9" * 64))])]
     refuse_seen([("one.h5", ("5" * 64, "9" * 64))], [("two.h5", ("6" * 64, "9" * 64))])
+
+
+def test_the_log_of_a_flight_is_kept_where_a_gap_was_found_in_it_too():
+    known = LearnedFlight("one.h5", "5" * 64, "cpfls/flight", 9, 9, "9" * 64)
+    again = known._replace(log="")
+    assert joined_flights([again], [known]) == joined_flights([known], [again]) == (known,)
 
 
 def test_the_size_of_a_thrust_factor_goes_with_the_full_speed_that_is_assumed():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.artifacts.job import Job
+from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.naming.results import GapVerdict
@@ -16,7 +17,7 @@ from cpfls_cli.report.canvas import picture_of
 from cpfls_cli.report.content import command_line
 from cpfls_cli.result import Estimate
 from cpfls_cli.stages._numbers import to_fly
-from cpfls_cli.stages.diagnose import next_command
+from cpfls_cli.stages.diagnose import learned_from, next_command
 from cpfls_cli.stages.extend import named_effects
 from cpfls_cli.stages.look import FIGURES
 from cpfls_cli.stages.reduce import _naming
@@ -179,3 +180,11 @@ def test_a_model_that_is_not_to_be_taken_is_not_gone_on_with(rates, goes_on):
     pair = made.played_pair(body_rate=rates, attitude=rates)
     found = made.diagnosis("PARTIAL", playback=pair)
     assert next_command(job, found, ("cpfls", "replay"), ("cpfls", "response"), Path("d.h5"))[1] == goes_on
+
+
+def test_a_flight_held_out_that_was_imported_from_a_log_learned_from_is_said_to_be():
+    run = SimpleNamespace(take_also=lambda *_: None)
+    learned = (LearnedFlight("one.ulg", "9" * 64, "ulg"),)
+    held = [("two.h5", ("6" * 64, "9" * 64))]
+    (said,) = learned_from(run, made.diagnosis(), {}, learned, held, model="disagreement.h5").seen
+    assert said.startswith("two.h5: the model of disagreement.h5 has learned from it")
