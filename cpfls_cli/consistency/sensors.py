@@ -41,6 +41,7 @@ _FEWEST_SHIFTS = 4  # Two halves of one flight about roll and pitch.
 _NEXT_TO_NOTHING, _HALF = 0.01, 0.5
 # Step of an attitude that no gyroscope of a flight is off by within a window, and share of windows that are without.
 _JUMP_RAD, _BUT_FOR_JUMPS = 0.17, 0.9
+_NEAR_TURN = 0.05  # Turns.
 _DONE = "corrected before the balance"
 
 
@@ -469,12 +470,17 @@ def _jump(flight: Signals, about_s: float, half_s: float) -> Finding:
         "keep what is before it or after it by import.crop_s, in s from the first stamp of the log: an estimator that "
         "resets its yaw jumps so"
     )
-    if abs(size[axis]) > np.pi + _JUMP_RAD:
-        # No attitude jumps by more than half a turn.
+    turns = abs(size[axis]) / (2 * np.pi)
+    if turns > 0.5 + _NEAR_TURN:
+        # No attitude jumps by more than half a turn, and no angle makes another jump of its derivative than full turns.
         what = (
             f"the body rate turns by {np.degrees(-size[axis]):.0f} deg about {where}, which the attitude does not show"
         )
-        remedy = "it is derived from an angle that jumps by a full turn: leave body_rate out, which the attitude gives"
+        remedy = "a gyroscope at its limit or a spike: keep what is before it or after it by import.crop_s"
+        if abs(turns - round(turns)) < _NEAR_TURN:
+            remedy = (
+                "it is derived from an angle that jumps by a full turn: leave body_rate out, which the attitude gives"
+            )
     return Finding(what, remedy, ("attitude", "gyroscope"), float(size[axis]), "rad")
 
 

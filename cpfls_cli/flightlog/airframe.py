@@ -147,7 +147,7 @@ def usual_airframe(kind: str, rotors: int) -> Airframe | None:
 
 def named_airframe(columns: Sequence[str], moved: "MovedBy | None") -> Airframe | None:
     """Read the rotors that the names of columns place, as ``motor_FL``; which way they turn the motion may show."""
-    words = [{*words_of(column.replace("back", "rear").replace("Back", "Rear"))} for column in columns]
+    words = [{"rear" if word == "back" else word for word in words_of(column)} for column in columns]
     short = {"".join(part[0] for part in name.split()): name for name in _CORNERS}
     short |= {"bl": "rear left", "br": "rear right"}
     found = [[name for key, name in short.items() if key in own or {*name.split()} <= own] for own in words]

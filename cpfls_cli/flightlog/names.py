@@ -159,7 +159,9 @@ _BEHIND_AXES = ("dot", "ddot", "rate", "vel", "acc")
 
 def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
     """Look for the columns of the other axes wherever the first one stands in a name, whatever the case of a letter."""
-    folded = {name.lower(): name for name in names}
+    cases = Counter(map(str.lower, names))
+    # What is there in small letters and in capitals is two things.
+    folded = {name.lower(): name for name in names if cases[name.lower()] == 1}
     for name, (kind, axes) in product(names, _FAMILIES):
         for found in re.finditer(re.escape(axes[0]), name):
             before, after = name[: found.start()], name[found.end() :]
@@ -173,7 +175,8 @@ def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
             if (kind == "angles" and len(axes[0]) > 1) or (ends and (begins or kind in ("xyz", "wxyz"))):
                 columns = tuple(f"{before}{axis}{after}" for axis in axes)
                 # A letter alone is of another thing in capitals, as a rotation R is.
-                mixed = folded if any(map(str.isalpha, before + after)) or len(axes[0]) > 1 else {}
+                apart = any(map(str.isalpha, before + after)) or len(axes[0]) > 1
+                mixed = folded if apart and name.lower() in folded else {}
                 columns = tuple(own if own in names else mixed.get(own.lower(), "") for own in columns)
                 # Among P, Q, R and X, Y, Z there are R, P, Y too.
                 others = axes[0] in "rR" and {f"{before}{own}{after}" for own in "qQxX"} & names.keys()
@@ -188,7 +191,7 @@ def _numbered(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
         if dot and f"{topic}[1].{rest}" in names:
             # The first instance of a topic bears no number.
             groups.setdefault(f"{topic}[*].{rest}", {})[0] = name
-        for found in re.finditer(r"\d+", name):
+        for found in re.finditer(r"(?<!\d)\d{1,9}(?!\d)", name):
             groups.setdefault(f"{name[: found.start()]}*{name[found.end() :]}", {})[int(found.group())] = name
     for pattern, columns in groups.items():
         numbers = sorted(columns)

@@ -382,10 +382,13 @@ def airframe_of(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
         stated = next((found for found in own if found is not None), None)
     moved = [one.recognition.moved for one in logs if one.recognition.moved is not None]
     best = max(moved, key=lambda found: (found.clear, sum(found.explained)), default=None)
-    if best is not None and best.clear and stated is None:
-        return best.airframe, []
     driving = [guess.columns.names for guess in logs[0].recognition.signals if guess.signal in ROTORS]
     named = named_airframe(driving[0], best) if driving else None
+    if best is not None and best.clear and stated is None:
+        shown = best.airframe
+        alike = named is None or [rotor.name for rotor in named.rotors] == [rotor.name for rotor in shown.rotors]
+        off = f"the rotors are taken from {shown.reason}, which contradicts {'' if named is None else named.reason}"
+        return shown, [] if alike else [f"{off}; {DECIDES_ROTORS}"]
     taken = stated or named or usual_airframe(logs[0].recognition.kind, logs[0].recognition.rotors)
     if best is None:
         return taken, []

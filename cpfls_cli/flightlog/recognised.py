@@ -56,7 +56,7 @@ class LogTable:
         self.time_column, self.time_unit, self.time_doubt = stamps
         if self.time_doubt:
             self._take_unit_of_motion()
-        self.origin = float(self.clock("")[0]) if self.flat else 0.0
+        self.origin = float(next(filter(np.isfinite, self.clock("")))) if self.flat else 0.0
         self.grid = np.empty(0)
 
     def _take_unit_of_motion(self) -> None:

@@ -71,7 +71,7 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
     with _opened(path) as table:
         names = table.names
         if repeated := sorted(table.repeated & wanted):
-            raise InputError(f"{path}: column '{repeated[0]}' appears twice")
+            raise InputError(f"{path}: column '{repeated[0]}' appears twice: map {repeated[0]}[0] or the next")
         kept = [index for index, name in enumerate(names) if name in wanted]
         # Lists of numbers would take ten times as much.
         numbers, count = array("d"), 0
@@ -166,16 +166,28 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         rows = ((at, list(map(_with_points, fields))) for at, fields in rows)
         first = list(map(_with_points, first))
     repeated = frozenset(name for name, count in Counter(names).items() if count > 1 and name)
-    names = [f"{name}[{names[:at].count(name)}]" if name in repeated else name for at, name in enumerate(names)]
+    names = _numbered(names, repeated)
     sizes = [len(_listed(field)) for field in first] if len(names) == len(first) else []
     # What is called so already stays.
-    sizes = [0 if f"{name}[0]" in names else size for name, size in zip(names, sizes, strict=False)]
+    taken = {*names}
+    sizes = [0 if f"{name}[0]" in taken else size for name, size in zip(names, sizes, strict=False)]
     if any(sizes):
         rows = ((at, _spread(fields, sizes)) for at, fields in rows)
         parts = zip(names, sizes, strict=True)
         names = [own for name, size in parts for own in ([f"{name}[{at}]" for at in range(size)] or [name])]
         first = _spread(first, sizes)
     return _Table(names, first, rows, stated, repeated)
+
+
+def _numbered(names: Sequence[str], repeated: frozenset[str]) -> list[str]:
+    """Give columns of one name numbers from 0 on, but for those that others have."""
+    taken, last, numbered = {*names}, Counter[str](), []
+    for name in names:
+        own = name
+        while name in repeated and own in taken:
+            own, last[name] = f"{name}[{last[name]}]", last[name] + 1
+        numbered.append(own)
+    return numbered
 
 
 def _with_points(field: str) -> str:

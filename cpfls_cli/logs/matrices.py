@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import re
 import struct
 import subprocess
 import sys
@@ -56,7 +57,13 @@ _TIME_UNITS = ("s", "ms", "us", "ns")
 _STATES = "x y z yaw pitch roll vx vy vz gyro_x gyro_y gyro_z"
 _SENSED = "acc_x acc_y acc_z gyro_x gyro_y gyro_z height pressure"
 _BUSES = {"rt_estim": _STATES, "rt_estimatedStates": _STATES, "rt_sensor": _SENSED}
+# What arrays of texts that name columns are called.
+_LABELS = re.compile("label|name|column|header|field|channel|key", re.IGNORECASE)
 _OBJECTS = "holds objects or tables, which MATLAB alone reads: save their columns as vectors"
+# Variables by name, and what was left out.
+_Loaded = tuple[dict[str, Any], tuple[str, ...]]
+# Stands for values that are no numbers.
+_NO_NUMBERS = np.empty(2, dtype=object)
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -66,7 +73,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     s. What is wider than 64 columns, or holds no numbers, is left out.
     """
     hdf5 = h5py.is_hdf5(path)
-    kind, load = ("HDF5", dict) if hdf5 else _LOADED.get(path.suffix.lower(), ("MATLAB", _variables))
+    kind, load = _LOADED.get(path.suffix.lower(), ("MATLAB", _variables))
     try:
         if hdf5:
             found = _probed(state_of(path))
@@ -74,27 +81,31 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
                 raise InputError(f"{path}: {found.fault}")
             if found.artifact:
                 raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
-        variables = {} if hdf5 else load(path)
+        variables, lost = ({}, ()) if hdf5 else load(path)
         if (messages := exported(path, variables)) is not None:
             return messages
-        columns, units, names = _read(_of_hdf5(path) if hdf5 else _labelled([*_of_mat(variables)]), wanted)
+        columns, units, others = _read(_of_hdf5(path) if hdf5 else _labelled([*_of_mat(variables)]), wanted)
     except InputError:
         raise
     except Exception as error:
         # Each version of .mat breaks in its own way: what the parsers raise is no fixed set.
-        raise InputError(f"{path}: cannot be read as {kind}: {error}") from None
+        raise InputError(f"{path}: cannot be read as {'HDF5' if hdf5 else kind}: {error}") from None
     if not columns:
-        raise InputError(f"{path}: holds no vectors or matrices of numbers")
+        way = (
+            f" (of something else: {some(others, MOST_LISTED)}): save each signal as an array of numbers"
+            if others
+            else ""
+        )
+        raise InputError(f"{path}: holds no vectors or matrices of numbers{way}")
     columns = _of_one_length(columns)
-    read = {name.partition("[")[0] for name in columns}
-    others = [name for name in names if name not in read] if wanted is None else []
-    warnings = (f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}",) if others else ()
+    if others and wanted is None:
+        lost = (*lost, f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}")
     system = (
         f"{PARROT} minidrone"
         if any(name.startswith((*_BUSES, "rt_motor", "rt_yout/motors")) for name in columns)
         else ""
     )
-    return LogContents({"": columns}, units, system=system, warnings=warnings)
+    return LogContents({"": columns}, units, system=system, warnings=lost)
 
 
 def _of_one_length(columns: dict[str, Array]) -> dict[str, Array]:
@@ -151,17 +162,17 @@ def _probed(state: FileState) -> _Probed:
 def _read(
     arrays: Iterable[tuple[str, Any, str]], wanted: Collection[str] | None
 ) -> tuple[dict[str, Array], dict[str, str], list[str]]:
-    """Name the columns of arrays and read those that are wanted; give their units, and the names of all arrays too."""
+    """Name the columns of arrays and read those that are wanted; give their units, and the arrays that have none."""
     columns: dict[str, Array] = {}
     units: dict[str, str] = {}
-    names = []
+    others = []
     for name, array, unit in arrays:
-        names += [name] if (array.size or 0) > 1 else []
         own = dict(_named(name, array, wanted))
+        others += [name] if (array.size or 0) > 1 and not own else []
         factor = known_unit(unit).factor if unit in _TIME_UNITS else 1.0
         columns |= {column: factor * values for column, values in own.items()} if factor != 1.0 else own
         units |= {column: "s" if unit in _TIME_UNITS else unit for column in own if unit}
-    return columns, units, names
+    return columns, units, others
 
 
 def _of_hdf5(path: Path) -> Iterator[tuple[str, Any, str]]:
@@ -180,7 +191,7 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, Any, str]]:
                 yield name, dataset, unit if isinstance(unit, str) else ""
 
 
-def _variables(path: Path) -> dict[str, Any]:
+def _variables(path: Path) -> _Loaded:
     """Load a .mat of before 7.3: structures as mappings."""
     # A flight of this program is asked whether it is a matrix too, and needs none of this.
     import scipy.io
@@ -193,37 +204,54 @@ def _variables(path: Path) -> dict[str, Any]:
     variables = {name: value for name, value in read.items() if not name.startswith("__")}
     if variables and all(isinstance(value, scipy.io.matlab.MatlabOpaque) for value in variables.values()):
         raise InputError(f"{path}: {_OBJECTS}")
-    return variables
+    return variables, ()
 
 
-def _arrays(path: Path) -> dict[str, Any]:
+def _arrays(path: Path) -> _Loaded:
     """Load a .npz, whose arrays of objects are programs and are left out."""
     with zipfile.ZipFile(path) as inside:
         _require_held(path, sum(own.file_size for own in inside.infolist()), path.stat().st_size)
     found: dict[str, Any] = {}
     with np.load(path) as archive:
         for name in archive.files:
-            with contextlib.suppress(ValueError):
+            try:
                 found[name] = archive[name]
-    return found
+            except ValueError:
+                found[name] = _NO_NUMBERS
+    return found, ()
 
 
-def _lines(path: Path) -> dict[str, Any]:
+def _lines(path: Path) -> _Loaded:
     """Load objects of JSON, one a line, that have the keys that most have; a last one may have been cut."""
     rows: list[dict[str, Any]] = []
-    with path.open(encoding="utf-8") as stream:
+    with path.open(encoding="utf-8-sig") as stream:
         for number, line in enumerate(stream, start=1):
             try:
-                rows += [dict(_flat("", json.loads(line)))] if line.strip() else []
+                own = json.loads(line) if line.strip() else {}
             except ValueError as error:
                 if line.endswith("\n"):
                     raise InputError(f"{path}:{number}: no object of JSON: {error}") from None
+                continue
+            if not isinstance(own, dict):
+                raise InputError(
+                    f'{path}:{number}: no object of JSON: write one a line, {{"t": 0.01, "gyro": [0, 0, 0]}}'
+                )
+            rows += [dict(_flat("", own))] if own else []
     keys = Counter(tuple(row) for row in rows).most_common(1)[0][0] if rows else ()
-    found: dict[str, Any] = {}
-    for name in keys:
-        with contextlib.suppress(ValueError, TypeError, OverflowError):
-            found[name] = np.array([row[name] for row in rows if row.keys() >= {*keys}], dtype=float)
-    return found
+    kept = [row for row in rows if row.keys() >= {*keys}]
+    others = len(rows) - len(kept)
+    lost = (f"{others} of {len(rows)} lines have other keys and are left out",) if others else ()
+    return {name: _numbers([row[name] for row in kept]) for name in keys}, lost
+
+
+def _numbers(values: Sequence[Any]) -> Any:
+    """Make numbers of values of JSON; of lists as long as the first one, others are absent."""
+    size = next((len(own) for own in values if isinstance(own, list)), 0)
+    same = (own if not size or (isinstance(own, list) and len(own) == size) else [None] * size for own in values)
+    try:
+        return np.array([*same], dtype=float)
+    except (ValueError, TypeError, OverflowError):
+        return _NO_NUMBERS
 
 
 def _flat(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -239,14 +267,24 @@ _LOADED = {".npz": ("NumPy", _arrays), ".jsonl": ("JSON lines", _lines)}
 
 
 def _labelled(arrays: Sequence[tuple[str, Any, str]]) -> Iterator[tuple[str, Any, str]]:
-    """Part the one matrix that has as many columns as a list of texts, which are their names."""
-    listed = [own.ravel().tolist() for _, own, _ in arrays if own.dtype.kind == "U"]
-    labels = {len(own): own for own in listed if len({*own}) == len(own) > 1}
-    widths = Counter(own.shape[1] for _, own, _ in arrays if own.ndim == 2)
+    """Part the one matrix that has as many columns as a list of labels, each of which names nothing else."""
+    texts = {name: own for name, own, _ in arrays if own.dtype.kind == "U" and _LABELS.search(name.rpartition("/")[2])}
+    listed = {name: [text.strip() for text in own.ravel().tolist()] for name, own in texts.items()}
+    lengths = Counter(map(len, listed.values()))
+    held = Counter([*(name for name, _, _ in arrays), *(text for own in listed.values() for text in own)])
+    labels = {
+        len(own): (name, own)
+        for name, own in listed.items()
+        if lengths[len(own)] == 1 < len(own) and all(text and held[text] == 1 for text in own)
+    }
+    wide = [(name, own.shape[1]) for name, own, _ in arrays if own.ndim == 2 and own.shape[0] > own.shape[1]]
+    widths = Counter(width for _, width in wide)
+    parted = {name: labels[width] for name, width in wide if widths[width] == 1 and width in labels}
+    used = {name for name, _ in parted.values()}
     for name, own, unit in arrays:
-        if own.ndim == 2 and own.shape[1] in labels and widths[own.shape[1]] == 1:
-            yield from ((label, column, unit) for label, column in zip(labels[own.shape[1]], own.T, strict=True))
-        else:
+        if name in parted:
+            yield from ((label, column, unit) for label, column in zip(parted[name][1], own.T, strict=True))
+        elif name not in used:
             yield name, own, unit
 
 
@@ -336,10 +374,10 @@ def _require_held(path: Path, total: int, size: int) -> None:
 
 def _named(name: str, array: Any, wanted: Collection[str] | None) -> Iterator[tuple[str, Array]]:
     """Name the columns of an array, and read those that are wanted."""
-    shape = tuple(size for size in array.shape if size != 1)
+    shape = tuple(size for size in array.shape or () if size != 1)
     count = min(shape) if len(shape) == 2 else 1
     # Integers, floats and booleans.
-    if array.dtype.kind not in "iufb" or len(shape) not in (1, 2) or count > _MOST_COLUMNS:
+    if not array.size or array.dtype.kind not in "iufb" or len(shape) not in (1, 2) or count > _MOST_COLUMNS:
         return
     names = [name] if len(shape) == 1 else [f"{name}[{column}]" for column in range(count)]
     if wanted is not None and not set(names) & set(wanted):

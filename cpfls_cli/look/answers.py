@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,7 +29,7 @@ _SWAP = (
     "the propeller"
 )
 _PAUSES, _WHOLE = "also what falls into its pauses", 0.5
-"""What to log where less than this share of a flight is in windows without a pause."""
+"""What to log where pauses leave less than this share of the windows of a flight."""
 _TRIED = 2
 """Flights that are proposed at most."""
 _PUNCH = "climb twice at nearly full throttle, for 2 s each"
@@ -116,9 +116,12 @@ class Found:
     def too_short(self, what: str, fly: str = "") -> tuple[str, str, str, str]:
         """Say that it flies for too short a time, or that pauses of the log leave too little of it whole."""
         flight = self.flight
-        flown_s = float(flight.flown.sum()) / flight.rate_hz
-        if len(flight.gaps_s) and len(windows_of(flight).begin) * WINDOW_S < _WHOLE * flown_s:
-            return "no", f"{len(flight.gaps_s)} pauses of the log leave too little of the flight whole", _PAUSES, ""
+        begins = np.searchsorted(flight.time, flight.gaps_s[:, 0]).clip(max=len(flight.time) - 1)
+        pauses = int(flight.flown[begins].sum())
+        left, whole = (len(windows_of(each).begin) for each in (flight, replace(flight, usable=flight.flown)))
+        if pauses and left < _WHOLE * whole:
+            several = "1 pause of the log leaves" if pauses == 1 else f"{pauses} pauses of the log leave"
+            return "no", f"{several} too little of the flight whole", _PAUSES, ""
         return "no", what, "", fly
 
     @property

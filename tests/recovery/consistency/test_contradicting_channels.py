@@ -442,6 +442,14 @@ def test_rates_that_are_derived_across_a_full_turn_are_said_to_be_wrong(flights)
     assert "leave body_rate out" in said
 
 
+def test_a_turn_that_a_gyroscope_at_its_limit_misses_is_no_derivative_of_an_angle(flights):
+    first, other = flights
+    turn = np.outer(np.clip((first.time - 8.0) / 0.1, 0.0, 1.0), [0.0, 0.0, np.radians(240)])
+    [said] = audit([replace(first, attitude=first.attitude + turn), other], WINDOWS).contradictions
+    assert "the body rate turns by -2" in said
+    assert said.endswith("a gyroscope at its limit or a spike: keep what is before it or after it by import.crop_s")
+
+
 def test_a_gyroscope_of_another_sign_is_no_jump(flights):
     wrong = [replace(each, body_rate=each.body_rate * [1, 1, -1]) for each in flights]
     [said] = audit(wrong, WINDOWS).contradictions

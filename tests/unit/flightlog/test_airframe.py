@@ -130,6 +130,7 @@ def test_parameters_of_nothing_known_state_no_rotors():
             "backLeftMotor frontLeftMotor backRightMotor frontRightMotor",
             "rear left, front left, rear right, front right",
         ),
+        ("BACK_LEFT BACK_RIGHT FRONT_LEFT FRONT_RIGHT", "rear left, rear right, front left, front right"),
         ("m1 m2 m3 m4", ""),
         ("motor_fl motor_fr motor_rl", ""),
         ("motor_fl motor_fr motor_rl motor_rl_2", ""),

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.flightlog.airframe import usual_airframe
 from tests.builders.topic_logs import ardupilot, maps, proposed, topic
-from tests.builders.unknown_logs import FLIP, NED, flight, named, quaternion
+from tests.builders.unknown_logs import FLIP, NED, flat_log, flight, named, quaternion
 
 NAMES = ["front right", "rear left", "front left", "rear right"]
 
@@ -40,6 +40,16 @@ def test_parameters_that_the_motion_contradicts_are_warned_of(own):
         "the rotors are taken from FRAME_CLASS and FRAME_TYPE in the log: quad X, which contradicts"
     )
     assert "rear left counter-clockwise, front right counter-clockwise, front left clockwise" in warning
+
+
+def test_names_of_columns_that_the_motion_contradicts_are_warned_of(own):
+    places = ("FR", "RL", "FL", "RR")
+    for order, said in ((places, 0), (("RL", "FR", "FL", "RR"), 1)):
+        speeds = named(own.speed, *(f"rpm_{place}" for place in order))
+        log = flat_log(own, speed={f"rpm_{place}": 30 / np.pi * speeds[f"rpm_{place}"] for place in places})
+        proposal = proposed(log.topics, "")
+        warnings = [each for each in proposal.warnings if "which contradicts the names of their columns; " in each]
+        assert len(warnings) == said
 
 
 def test_a_blackbox_log_is_known_by_its_header(own):

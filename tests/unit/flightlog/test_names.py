@@ -186,6 +186,15 @@ def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
     assert first(names, signal) is None
 
 
+def test_what_is_there_in_small_letters_and_in_capitals_is_two_things():
+    names = ("roll", "pitch", "yaw", "Roll", "Pitch")
+    assert [own.columns for own in column_groups(names) if len(own.columns) > 1] == [names[:3]]
+
+
+def test_a_number_in_a_name_may_be_long():
+    assert [own.columns for own in column_groups(("m" + 5000 * "1",))] == [("m" + 5000 * "1",)]
+
+
 def test_a_letter_alone_is_of_another_thing_in_capitals():
     names = ("p[0]", "q[0]", "R[0]", "w[0]", "w[1]", "w[2]", "x", "y", "Z")
     found = [

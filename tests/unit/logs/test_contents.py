@@ -75,8 +75,12 @@ def test_of_columns_with_one_name_each_has_a_number(tmp_path):
     held = {"T[0]": [0, 1], "roll": [1, 2], "T[1]": [20, 30], "motor[0]": [5, 7], "motor[1]": [6, 8]}
     assert listed(log_contents(path)) == {"": held}
     assert listed(log_contents(path, ["T[1]"]))[""]["T[1]"] == [20, 30]
+    # A number that another column has is none of theirs.
+    path.write_text("t,x,x,x[0]\n0,1,2,3\n1,1,2,3\n")
+    assert [*listed(log_contents(path))[""].items()][1:] == [("x[1]", [1, 1]), ("x[2]", [2, 2]), ("x[0]", [3, 3])]
+    path.write_text("T,T\n0,1\n")
     # What a config maps is one of them.
-    with pytest.raises(InputError, match=r"log\.csv: column 'T' appears twice"):
+    with pytest.raises(InputError, match=r"log\.csv: column 'T' appears twice: map T\[0\] or the next"):
         log_contents(path, ["T"])
 
 
@@ -87,10 +91,56 @@ def test_arrays_of_numpy_are_named_by_the_texts_with_them(tmp_path):
     contents = log_contents(tmp_path / "log.npz")
     columns = zip(("x", "vx", "wz", "U[0]", "U[1]"), state.T[[0, 1, 2, 0, 1]].tolist(), strict=True)
     assert listed(contents) == {"": {"t": time.tolist(), **dict(columns)}}
-    assert contents.warnings == ("arrays that are no columns of numbers are left out: state_labels",)
+    assert contents.warnings == ("arrays that are no columns of numbers are left out: odd",)
     # Of two matrices as wide it is not known whose names they are.
     np.savez(tmp_path / "log.npz", t=time, X=state, Y=state, labels=texts["state_labels"])
     assert "X[0]" in log_contents(tmp_path / "log.npz").topics[""]
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [
+        {"phases": ["takeoff", "hover", "land"]},
+        {"labels": ["t", "vx", "wz"]},
+        {"labels": ["x", "y", "z"], "names": ["vx", "vy", "vz"]},
+        {"labels": ["x", "y", "z"], "columns": ["x", "y"]},
+        {"labels": ["x", "y", ""]},
+    ],
+    ids=["no labels", "of another array", "two lists", "in two lists", "one without a text"],
+)
+def test_texts_that_may_not_be_names_of_columns_name_none(tmp_path, texts):
+    state = np.arange(15.0).reshape(5, 3)
+    np.savez(tmp_path / "log.npz", t=np.arange(5.0), X=state, **{name: np.array(own) for name, own in texts.items()})
+    assert [*log_contents(tmp_path / "log.npz").topics[""]] == ["t", "X[0]", "X[1]", "X[2]"]
+
+
+def test_a_text_with_each_sample_names_none_of_them(tmp_path):
+    stamps = np.array([f"10:00:0{second}" for second in range(5)])
+    np.savez(tmp_path / "log.npz", t=np.arange(5.0), gyro=np.ones((3, 5)), time_names=stamps)
+    assert [*log_contents(tmp_path / "log.npz").topics[""]] == ["t", "gyro[0]", "gyro[1]", "gyro[2]"]
+
+
+def test_an_empty_array_is_no_fault_of_the_others(tmp_path):
+    np.savez(tmp_path / "log.npz", t=np.arange(5.0), scan=np.empty((5, 0)))
+    assert [*log_contents(tmp_path / "log.npz").topics[""]] == ["t"]
+
+
+def test_what_is_no_row_of_numbers_in_lines_of_json_is_said(tmp_path):
+    path = tmp_path / "log.jsonl"
+    rows = [{"t": row, "gyro": [row, 1, 2], "scan": [], "mode": "hover", "many": 10**400} for row in range(4)]
+    rows[2]["gyro"], rows[3]["gyro"] = None, [1]
+    text = "".join(f"{json.dumps(each)}\n" for each in [{"t": 0}, *rows])
+    path.write_text(text, encoding="utf-8-sig")
+    contents = log_contents(path)
+    np.testing.assert_equal(listed(contents)[""]["gyro[0]"], [0, 1, np.nan, np.nan])
+    assert [*contents.topics[""]] == ["t", "gyro[0]", "gyro[1]", "gyro[2]"]
+    assert contents.warnings == (
+        "1 of 5 lines have other keys and are left out",
+        "arrays that are no columns of numbers are left out: mode, many",
+    )
+    path.write_text(json.dumps(rows))
+    with pytest.raises(InputError, match=r"log\.jsonl:1: no object of JSON: write one a line, "):
+        log_contents(path)
 
 
 def test_lines_of_json_are_rows(tmp_path):

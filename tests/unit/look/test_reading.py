@@ -234,6 +234,15 @@ def test_columns_that_are_called_rates_and_are_none_are_named():
             read(contents)
 
 
+def test_a_first_row_without_a_stamp_is_left_out():
+    contents = logs.WRITERS[""](OWN)
+    (clock,) = (name for name in contents.topics[""] if name in ("t", "time"))
+    contents.topics[""][clock] = np.where(np.arange(len(OWN.time)) < 3, np.nan, contents.topics[""][clock])
+    found = read(contents)
+    assert found.time[0] == 0.0
+    assert found.time[-1] == pytest.approx(OWN.time[-1] - OWN.time[3], abs=0.02)
+
+
 def test_surfaces_of_an_airplane_are_no_rotors():
     asked = {"throttle": 0.5 + 0 * OWN.time, "aileron": OWN.angles[:, 0], "elevator": OWN.angles[:, 1]}
     with pytest.raises(InputError, match=r"acceleration.*; aileron and elevator are no rotors\): log body rates"):

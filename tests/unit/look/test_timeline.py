@@ -274,7 +274,24 @@ def test_pauses_are_named_where_they_leave_too_little_of_a_flight_whole():
     own = look_at("log", contents.topics, contents.units, contents.parameters, contents.system)
     for answer in (each for each in own.answers if each.question in ("rotor balance", "hover throttle")):
         assert (answer.answer, answer.fly) == ("no", "")
-        assert answer.why.endswith("pauses of the log leave too little of the flight whole")
+        # Twice a second in 20 s of flight; what falls on the ground takes nothing of it.
+        number, _, said = answer.why.partition(" ")
+        assert 36 <= int(number) <= 40
+        assert said == "pauses of the log leave too little of the flight whole"
+
+
+@pytest.mark.parametrize(
+    ("between", "named"), [((1.0, 2.0), False), ((6.0, 7.0), True)], ids=["on the ground", "aloft"]
+)
+def test_a_pause_is_named_where_it_takes_of_a_flight(between, named):
+    contents = logs.WRITERS["betaflight"](with_ground(flight(seconds=4.0)))
+    fields = contents.topics[""]
+    kept = (fields["time"] < between[0]) | (fields["time"] > between[1])
+    contents.topics[""] = {name: values[kept] for name, values in fields.items()}
+    own = look_at("log", contents.topics, contents.units, contents.parameters, contents.system)
+    (hover,) = (answer for answer in own.answers if answer.question == "hover throttle")
+    said = "1 pause of the log leaves too little of the flight whole"
+    assert hover.why == (said if named else "less than 12 s of hover in it")
 
 
 def test_a_loop_that_is_not_measured_says_why_about_its_axes():
