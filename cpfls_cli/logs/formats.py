@@ -123,7 +123,6 @@ LOG_FORMATS = (
     LogFormat(".hdf5", "HDF5", "HDF5", HDF5_MAGIC, f"{_READERS}matrices", shared=True),
     LogFormat(".mat", "MATLAB", "MATLAB", b"MATLAB ", f"{_READERS}matrices"),
     LogFormat(".npz", "NumPy", "arrays of NumPy", b"", f"{_READERS}matrices"),
-    LogFormat(".jsonl", "JSON lines", "JSON", b"", f"{_READERS}matrices"),
 )
 """The formats in the order in which messages list them."""
 

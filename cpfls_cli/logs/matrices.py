@@ -1,7 +1,6 @@
-"""Reader of HDF5, MATLAB's .mat, NumPy's .npz and JSON lines: arrays by their path, columns of a matrix one by one."""
+"""Reader of HDF5, MATLAB's .mat, NumPy's .npz: arrays by their path, columns of a matrix one by one."""
 
 import contextlib
-import json
 import re
 import struct
 import subprocess
@@ -60,8 +59,6 @@ _BUSES = {"rt_estim": _STATES, "rt_estimatedStates": _STATES, "rt_sensor": _SENS
 # What arrays of texts that name columns are called.
 _LABELS = re.compile("label|name|column|header|field|channel|key", re.IGNORECASE)
 _OBJECTS = "holds objects or tables, which MATLAB alone reads: save their columns as vectors"
-# Variables by name, and what was left out.
-_Loaded = tuple[dict[str, Any], tuple[str, ...]]
 # Stands for values that are no numbers.
 _NO_NUMBERS = np.empty(2, dtype=object)
 
@@ -73,7 +70,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     s. What is wider than 64 columns, or holds no numbers, is left out.
     """
     hdf5 = h5py.is_hdf5(path)
-    kind, load = _LOADED.get(path.suffix.lower(), ("MATLAB", _variables))
+    kind, load = ("NumPy", _arrays) if path.suffix.lower() == ".npz" else ("MATLAB", _variables)
     try:
         if hdf5:
             found = _probed(state_of(path))
@@ -81,7 +78,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
                 raise InputError(f"{path}: {found.fault}")
             if found.artifact:
                 raise InputError(f"{path}: is an artifact of this program ({found.artifact}), not a log")
-        variables, lost = ({}, ()) if hdf5 else load(path)
+        variables = {} if hdf5 else load(path)
         if (messages := exported(path, variables)) is not None:
             return messages
         columns, units, others = _read(_of_hdf5(path) if hdf5 else _labelled([*_of_mat(variables)]), wanted)
@@ -98,14 +95,13 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         )
         raise InputError(f"{path}: holds no vectors or matrices of numbers{way}")
     columns = _of_one_length(columns)
-    if others and wanted is None:
-        lost = (*lost, f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}")
+    lost = f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}"
     system = (
         f"{PARROT} minidrone"
         if any(name.startswith((*_BUSES, "rt_motor", "rt_yout/motors")) for name in columns)
         else ""
     )
-    return LogContents({"": columns}, units, system=system, warnings=lost)
+    return LogContents({"": columns}, units, system=system, warnings=(lost,) if others and wanted is None else ())
 
 
 def _of_one_length(columns: dict[str, Array]) -> dict[str, Array]:
@@ -191,7 +187,7 @@ def _of_hdf5(path: Path) -> Iterator[tuple[str, Any, str]]:
                 yield name, dataset, unit if isinstance(unit, str) else ""
 
 
-def _variables(path: Path) -> _Loaded:
+def _variables(path: Path) -> dict[str, Any]:
     """Load a .mat of before 7.3: structures as mappings."""
     # A flight of this program is asked whether it is a matrix too, and needs none of this.
     import scipy.io
@@ -204,10 +200,10 @@ def _variables(path: Path) -> _Loaded:
     variables = {name: value for name, value in read.items() if not name.startswith("__")}
     if variables and all(isinstance(value, scipy.io.matlab.MatlabOpaque) for value in variables.values()):
         raise InputError(f"{path}: {_OBJECTS}")
-    return variables, ()
+    return variables
 
 
-def _arrays(path: Path) -> _Loaded:
+def _arrays(path: Path) -> dict[str, Any]:
     """Load a .npz, whose arrays of objects are programs and are left out."""
     with zipfile.ZipFile(path) as inside:
         _require_held(path, sum(own.file_size for own in inside.infolist()), path.stat().st_size)
@@ -218,40 +214,7 @@ def _arrays(path: Path) -> _Loaded:
                 found[name] = archive[name]
             except ValueError:
                 found[name] = _NO_NUMBERS
-    return found, ()
-
-
-def _lines(path: Path) -> _Loaded:
-    """Load objects of JSON, one a line, that have the keys that most have; a last one may have been cut."""
-    rows: list[dict[str, Any]] = []
-    with path.open(encoding="utf-8-sig") as stream:
-        for number, line in enumerate(stream, start=1):
-            try:
-                own = json.loads(line) if line.strip() else {}
-            except ValueError as error:
-                if line.endswith("\n"):
-                    raise InputError(f"{path}:{number}: no object of JSON: {error}") from None
-                continue
-            if not isinstance(own, dict):
-                raise InputError(
-                    f'{path}:{number}: no object of JSON: write one a line, {{"t": 0.01, "gyro": [0, 0, 0]}}'
-                )
-            rows += [dict(_flat("", own))] if own else []
-    keys = Counter(tuple(row) for row in rows).most_common(1)[0][0] if rows else ()
-    kept = [row for row in rows if row.keys() >= {*keys}]
-    others = len(rows) - len(kept)
-    lost = (f"{others} of {len(rows)} lines have other keys and are left out",) if others else ()
-    return {name: _numbers([row[name] for row in kept]) for name in keys}, lost
-
-
-def _numbers(values: Sequence[Any]) -> Any:
-    """Make numbers of values of JSON; of lists as long as the first one, others are absent."""
-    size = next((len(own) for own in values if isinstance(own, list)), 0)
-    same = (own if not size or (isinstance(own, list) and len(own) == size) else [None] * size for own in values)
-    try:
-        return np.array([*same], dtype=float)
-    except (ValueError, TypeError, OverflowError):
-        return _NO_NUMBERS
+    return found
 
 
 def _flat(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -261,9 +224,6 @@ def _flat(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
         return
     for name, own in value.items():
         yield from _flat(f"{prefix}/{name}" if prefix else name, own)
-
-
-_LOADED = {".npz": ("NumPy", _arrays), ".jsonl": ("JSON lines", _lines)}
 
 
 def _labelled(arrays: Sequence[tuple[str, Any, str]]) -> Iterator[tuple[str, Any, str]]:

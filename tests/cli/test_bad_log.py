@@ -67,7 +67,7 @@ def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):
         ("", "LOG: is empty; a log starts with a line of column names"),
         ("\n\n", "LOG: is empty; a log starts with a line of column names"),
         (",".join(NAMES) + "\n", "LOG: holds column names but no samples"),
-        ("t,t,pitch\n0,1,2\n", "LOG: column 't' appears twice"),
+        ("t,t,pitch\n0,1,2\n", "LOG: column 't' appears twice: map t[0] or the next"),
         (",".join(NAMES) + "\n0,0,0,0,0,0,0\n1,0,0\n", f"LOG:3: 3 fields, but 7 column names: {FIELDS}"),
         (",".join(NAMES) + "\n0,0,0,0,0,0,0,0\n", f"LOG:2: 8 fields, but 7 column names: {FIELDS}"),
         (",".join(NAMES) + "\n0,0,up,0,0,0,0\n", "LOG:2: column 'pitch' = 'up': not a number"),

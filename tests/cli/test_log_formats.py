@@ -76,12 +76,12 @@ def test_messages_name_a_new_format(refuse, log_study, tmp_path):
     other.write_text("t\n")
     assert refuse("import", log_study, other, *words) == [
         f"{other}: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl,"
-        " .bfl, .db3, .mcap, .h5, .hdf5, .mat, .npz, .jsonl, .fake, or it must hold one of Parquet, ULog,"
+        " .bfl, .db3, .mcap, .h5, .hdf5, .mat, .npz, .fake, or it must hold one of Parquet, ULog,"
         " ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag, HDF5, MATLAB, Fake;"
         " a table with a line of column names has to end in .csv"
     ]
-    assert formats.suffixes_in_words().endswith(", .mat, .npz, .jsonl or .fake")
-    assert formats.formats_in_words().endswith(", MATLAB, NumPy, JSON lines, Fake")
+    assert formats.suffixes_in_words().endswith(", .mat, .npz or .fake")
+    assert formats.formats_in_words().endswith(", MATLAB, NumPy, Fake")
 
 
 @pytest.mark.usefixtures("fake_format")
@@ -151,12 +151,6 @@ def arrays(save):
     return lambda path: save(path, {"t": TIME, **SIGNALS})
 
 
-def lines(path):
-    data = {"t": TIME, **SIGNALS}
-    rows = ({name: values[row].tolist() for name, values in data.items()} for row in range(len(TIME)))
-    path.write_text("".join(f"{json.dumps(row)}\n" for row in rows))
-
-
 def hdf5(path, data):
     with h5py.File(path, "w") as file:
         for name, values in data.items():
@@ -217,7 +211,6 @@ WRITERS = {
     "log.hdf5": (arrays(hdf5), "t", INDEXED),
     "log.mat": (arrays(scipy.io.savemat), "t", INDEXED),
     "log.npz": (arrays(lambda path, data: np.savez(path, **data)), "t", INDEXED),
-    "log.jsonl": (lines, "t", INDEXED),
 }
 BEGINS = {
     "log.ulg": 1e-6 * ulogs.BEGIN,

@@ -11,7 +11,7 @@ from cpfls_cli.simulators.formats import read_model
 from tests.builders import command_line
 from tests.builders.gusty_flights import GUSTS, SMALL, Flight, gusty_flights
 from tests.builders.simulator_files import header_of, write_crazyflie_log
-from tests.builders.vehicle_models import vehicle_of, write_vehicle
+from tests.builders.vehicle_models import number_of, vehicle_of, write_vehicle
 
 TRUE = SMALL._replace(drag=0.0, damping=0.0)
 CURVE = [f"VMOTOR2THRUST{power}" for power in range(4)]
@@ -43,7 +43,8 @@ def gap(folder, logs, speed, **wrong):
     # Forward is to the right of what flies.
     inertia = tuple(TRUE.inertia[axis] for axis in (1, 0, 2))
     known = type(settings)(**(vars(settings) | {"inertia_kg_m2": inertia, "rotors": rotors, "unknown": ()}))
-    write_vehicle(vehicle, vehicle_of(VehicleModel(vehicle=known)), config=study.read_text())
+    numbers = (number_of("inertia.Ixx", inertia[0], 0.9 * inertia[0], 1.1 * inertia[0]),)
+    write_vehicle(vehicle, vehicle_of(VehicleModel(vehicle=known), numbers=numbers), config=study.read_text())
     words = ("gap", mine, *logs[:-1], "--held-out", logs[-1], "--model", vehicle, "-o", folder / "gap", "--json")
     result = command_line.done(*words)
     assert mine.read_bytes() == before

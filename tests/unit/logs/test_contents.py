@@ -2,7 +2,6 @@
 
 import gzip
 import io
-import json
 import struct
 import subprocess
 import sys
@@ -123,45 +122,6 @@ def test_a_text_with_each_sample_names_none_of_them(tmp_path):
 def test_an_empty_array_is_no_fault_of_the_others(tmp_path):
     np.savez(tmp_path / "log.npz", t=np.arange(5.0), scan=np.empty((5, 0)))
     assert [*log_contents(tmp_path / "log.npz").topics[""]] == ["t"]
-
-
-def test_what_is_no_row_of_numbers_in_lines_of_json_is_said(tmp_path):
-    path = tmp_path / "log.jsonl"
-    rows = [{"t": row, "gyro": [row, 1, 2], "scan": [], "mode": "hover", "many": 10**400} for row in range(4)]
-    rows[2]["gyro"], rows[3]["gyro"] = None, [1]
-    text = "".join(f"{json.dumps(each)}\n" for each in [{"t": 0}, *rows])
-    path.write_text(text, encoding="utf-8-sig")
-    contents = log_contents(path)
-    np.testing.assert_equal(listed(contents)[""]["gyro[0]"], [0, 1, np.nan, np.nan])
-    assert [*contents.topics[""]] == ["t", "gyro[0]", "gyro[1]", "gyro[2]"]
-    assert contents.warnings == (
-        "1 of 5 lines have other keys and are left out",
-        "arrays that are no columns of numbers are left out: mode, many",
-    )
-    path.write_text(json.dumps(rows))
-    with pytest.raises(InputError, match=r"log\.jsonl:1: no object of JSON: write one a line, "):
-        log_contents(path)
-
-
-def test_lines_of_json_are_rows(tmp_path):
-    path = tmp_path / "log.jsonl"
-    rows = [{"type": "frame", "t": 0.1 * row, "imu": {"gyro": [row, 0, -1]}, "ok": None} for row in range(4)]
-    head = {"type": "header", "vehicle": "a quad"}
-    path.write_text("".join(f"{json.dumps(each)}\n" for each in [head, *rows, {"type": "bye"}]) + '{"type": "fra')
-    contents = listed(log_contents(path))[""]
-    np.testing.assert_equal(
-        contents,
-        {
-            "t": [0.1 * row for row in range(4)],
-            "imu/gyro[0]": [0, 1, 2, 3],
-            "imu/gyro[1]": [0] * 4,
-            "imu/gyro[2]": [-1] * 4,
-            "ok": [np.nan] * 4,
-        },
-    )
-    path.write_text('{"t": 1}\n{"t": 2\n{"t": 3}\n')
-    with pytest.raises(InputError, match=r"log\.jsonl:2: no object of JSON: "):
-        log_contents(path)
 
 
 def test_a_ulog_holds_topics_and_what_px4_knows_of_the_vehicle(tmp_path):
@@ -312,10 +272,10 @@ def test_the_page_on_import_describes_every_format():
 
 def test_words():
     suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl, .bfl, Crazyflie uSD"
-    suffixes += ", .db3, .mcap, .h5, .hdf5, .mat, .npz or .jsonl"
+    suffixes += ", .db3, .mcap, .h5, .hdf5, .mat or .npz"
     assert suffixes_in_words() == suffixes
     formats = "CSV, Parquet, ULog, ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag"
-    formats += ", HDF5, MATLAB, NumPy, JSON lines"
+    formats += ", HDF5, MATLAB, NumPy"
     assert formats_in_words() == formats
 
 
@@ -716,9 +676,8 @@ def test_matlab_of_version_7_3_is_hdf5_behind_a_line_of_text(tmp_path):
         ("log.h5", b"\x89HDF\r\n\x1a\n" + bytes(30), "cannot be read as HDF5: "),
         ("log.h5", b"MATLAB 5.0 MAT-file".ljust(126), "cannot be read as MATLAB: "),
         ("log.npz", b"broken", "cannot be read as NumPy: "),
-        ("log.jsonl", b"\n", "holds no vectors or matrices of numbers"),
     ],
-    ids=["empty", "broken", "cut", "under another ending", "no archive", "no lines"],
+    ids=["empty", "broken", "cut", "under another ending", "no archive"],
 )
 def test_what_cannot_be_read(tmp_path, name, content, message):
     (tmp_path / name).write_bytes(content)
