@@ -170,20 +170,20 @@ class _Sets:
         That is where the other is more than its standard error, which is neither named nor excluded. Of a filter no
         number is a time that a lag could trade for.
         """
-        fit, numbers = self.fits[names], self.numbers(names)
-        joint = [self.numbers(each) for each in self.fits if set(names) < set(each) and self.count(each) == 2]
+        fit, pairs = self.fits[names], [each for each in self.fits if set(names) < set(each)]
+        joint = [self.numbers(each) for each in pairs if len(names) == 1 and self.count(each) == 2]
         own = [
             each[names[0]][0].value
             for each in joint
             for name, (one, *_) in each.items()
             if name not in names and one.value > (one.high - one.value) / ERRORS
         ]
-        if len(names) != 1 or not own:
+        if not own:
             return fit
-        (number, *_), chosen = numbers[names[0]], fit.hypothesis.chosen
+        ((number,),) = self.numbers(names).values()
         wider = replace(number, low=min(number.low, *own), high=max(number.high, *own))
-        pairs = zip(chosen, fit.estimates.effects, strict=True)
-        effects = tuple((wider,) if candidate.effect.name in names else each for candidate, each in pairs)
+        each_with = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
+        effects = tuple((wider,) if candidate.effect.name in names else each for candidate, each in each_with)
         return fit._replace(estimates=replace(fit.estimates, effects=effects))
 
     def _needed(self, names: _Names, rate: float) -> set[str]:

@@ -104,6 +104,13 @@ def test_a_lag_and_a_filter_do_not_trade(best, sizes, numbers, monkeypatch):
     assert [(each.value, each.low, each.high) for each in own] == [pytest.approx(each) for each in numbers]
 
 
+def test_where_nothing_is_late_nothing_trades(monkeypatch):
+    left = {(): LITTLE, LAG: 9.0, DELAY: 9.0, BOTH: LITTLE}
+    unsure = [(0.03, 0.06), (0.02, 0.035)]
+    names, *_ = apart(monkeypatch, (), left, {LAG: [(0.001, 0.05)], DELAY: [(0.001, 0.05)], BOTH: unsure})
+    assert names == ()
+
+
 def test_the_one_that_leaves_more_is_no_rival(monkeypatch):
     left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
     assert apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})[:2] == (DELAY, set())
