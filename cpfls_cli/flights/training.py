@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, count
+from itertools import chain, count, product
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.files import read_content
 from cpfls_cli.flightlog.results import MOTION, Flight
 from cpfls_cli.flightlog.settings import SETPOINTS
-from cpfls_cli.flights.recordings import ReadFlight, check_flight, read_flight, units_of
+from cpfls_cli.flights.recordings import ReadFlight, check_flight, read_flight, read_whole, units_of
 from cpfls_cli.identification.data import (
     CHUNK,
     TRAINING,
@@ -315,6 +315,28 @@ def hashes_of(path: Path, file: InputFile) -> tuple[str, ...]:
     """Give the hashes that a flight is known by: that of its file, and that of the log that it was imported from."""
     log = None if is_log(path) else read_origin(path).inputs.get("log")
     return (file.sha256,) if log is None else (file.sha256, log.sha256)
+
+
+def refuse_overlap(learned: Sequence[Path], held_out: Sequence[Path]) -> None:
+    """Refuse to judge on a stretch of a log that overlaps another one, which is learned from."""
+    own, unseen = ([(path, *stretch) for path in paths if (stretch := _stretch(path))] for paths in (learned, held_out))
+    for (path, log, *ends), (other, its, *others) in product(unseen, own):
+        begin, end = max(ends[0], others[0]), min(ends[1], others[1])
+        if log == its and begin < end:
+            raise InputError(
+                f"{path}: holds {begin:.1f} to {end:.1f} s of the log that {other.name} is from too, which is learned "
+                "from; part the two by import.crop_s, or hold out another flight"
+            )
+
+
+def _stretch(path: Path) -> tuple[str, float, float] | None:
+    """Give the hash of the log that a flight was imported from, and its ends on the clock of that; None for others."""
+    log = None if is_log(path) else read_origin(path).inputs.get("log")
+    if log is None:
+        return None
+    flight, _ = read_whole(path)
+    begin, end = flight.begins + flight.signals["time"][[0, -1]]
+    return log.sha256, float(begin), float(end)
 
 
 def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:

@@ -18,7 +18,7 @@ from cpfls_cli.config.load import parse_config, stored_study, validate
 from cpfls_cli.errors import ComputationError, InputError, visible
 from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_base
 from cpfls_cli.flights.recordings import FlightSet, FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
-from cpfls_cli.flights.training import hashes_of, known_by, numbered_roles
+from cpfls_cli.flights.training import hashes_of, known_by, numbered_roles, refuse_overlap
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
 from cpfls_cli.playback.model import VehicleModel
@@ -232,6 +232,8 @@ def _flights(
     # Those held out are behind those learned from, whoever chose them.
     known = [(file.name, hashes_of(path, file)) for path, file in zip([*flights, *held_out], files, strict=True)]
     refuse_seen(known[: len(split.training)], known[len(split.training) :])
+    paths = [*flights, *held_out]
+    refuse_overlap(paths[: len(split.training)], paths[len(split.training) :])
     return FlightSet(flown[: len(flights)], (*seen_twice(files), *read.warnings)), split
 
 

@@ -48,7 +48,7 @@ from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, shown_slowly
 from cpfls_cli.flights.playback import flights_to_play, played
 from cpfls_cli.flights.recordings import refuse_seen, seen_twice
-from cpfls_cli.flights.training import hashes_of, known_by, numbered_roles
+from cpfls_cli.flights.training import hashes_of, known_by, numbered_roles, refuse_overlap
 from cpfls_cli.pages.gap_words import BY_HAND, WHAT_TO_FLY, flown_by_hand
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.model import said_by
@@ -283,6 +283,7 @@ def vehicle(
     checkpoint, kept = VehicleCheckpoint.begun(run, begun, resume=resume)
     known = [hashes_of(path, run.files[role]) for role, path in learned.items()]
     refuse_seen(zip([path.name for path in flights], known, strict=True), known_by(unseen, run.files))
+    refuse_overlap(flights, others)
     twice = seen_twice(run.files[role] for role in learned)
     if write_config is not None:
         refuse_own(write_config, run.output)
