@@ -44,7 +44,7 @@ from cpfls_cli.pages.gap import (
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn
 from cpfls_cli.pages.playback import SIGNALS, axis_words, draw_errors, errors_height
 from cpfls_cli.pages.trust import KnownBy, seen_warnings
-from cpfls_cli.playback.errors import AFTER
+from cpfls_cli.playback.errors import AFTER, CONTROL_HORIZON
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import GREY, Axes, Drawn, Figure, legend_over, plain_ticks, stacked
 from cpfls_cli.report.content import Command
@@ -53,6 +53,7 @@ from cpfls_cli.rounding import less
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.stages.compare import check_ignored, progress_of, to_correct
+from cpfls_cli.validation.trust import Trust, trust_by_playback
 from cpfls_cli.words import by_name, joined
 
 _VISIBLE = 0.05  # Share of the error without a model by which a playback has to grow to be called worse.
@@ -143,9 +144,15 @@ def _farther_off(playback: PlaybackChange) -> list[str]:
     ]
 
 
-def loses(playback: PlaybackChange) -> bool:
-    """Tell whether all that is played back is worse than what knows no model."""
-    return bool(playback.at_end) and all(end.worse for end in playback.at_end.values())
+def loses_in(playback: PlaybackChange, *, gusts: bool) -> str:
+    """Say in what a model with the effects is worse than none, so that it is not to be taken; empty for nothing.
+
+    Of rates it is what its file is trusted by; in gusts no playback has what their rotors answer.
+    """
+    if playback.at_end and all(end.worse for end in playback.at_end.values()):
+        return "all that is played back"
+    do_not = not gusts and trust_by_playback(playback) is Trust.DO_NOT_USE
+    return f"body rate within {CONTROL_HORIZON:g} s" if do_not else ""
 
 
 FIGURES = {
@@ -174,7 +181,7 @@ FIGURES = {
 }
 WORDS = {
     **GAP_WORDS,
-    **by_name(_farther_off, hidden_gaps, _leaving, loses),
+    **by_name(_farther_off, hidden_gaps, _leaving, loses_in),
     "axes": BODY_AXES,
     "finite": np.isfinite,
     "gust_words": axis_words,
@@ -221,7 +228,9 @@ def next_command(job: Job, found: Diagnosis, named: Command, unnamed: Command, d
         case GapVerdict.NAMED | GapVerdict.PARTIAL:
             # A model that is not to be taken is not gone on with.
             played = found.playback
-            left = played is not None and (loses(played) or (_farther_off(played) and not any(found.gusts)))
+            left = played is not None and (
+                bool(loses_in(played, gusts=any(found.gusts))) or (_farther_off(played) and not any(found.gusts))
+            )
             return unnamed if left else named
         case GapVerdict.AMBIGUOUS:
             return go_on(job, "trajectory", "--for", diagnosis, output=job.sibling("path.h5"))

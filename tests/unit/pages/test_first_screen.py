@@ -14,6 +14,7 @@ from cpfls_cli.playback.gusts import GustAxis
 from cpfls_cli.report.content import Box, Facts, Folded, Table, Text
 from cpfls_cli.result import Estimate, plain
 from cpfls_cli.simulators.results import Corrected
+from cpfls_cli.validation.trust import Trust
 from tests.builders import gap_artifacts as made
 from tests.builders.gap_artifacts import diagnosis
 from tests.builders.vehicle_search import CONFIG
@@ -187,6 +188,16 @@ def test_in_gusts_too_a_model_that_forecasts_worse_than_none_is_not_to_be_taken(
     said = next_steps(diagnosis(playback=worse, air=air))
     assert ("for a simulation take it all the same" in said) is taken
     assert ("Do not take the model with it" in said) is not taken
+
+
+def test_a_model_whose_own_file_says_do_not_use_is_not_to_be_taken():
+    """Better in attitude alone: its file goes by body rates, and so does what is said of it."""
+    played = made.played_pair(body_rate=(0.35, 0.3, 0.3, 0.6), attitude=(0.05, 0.2, 0.1, 0.3))
+    assert made.extended(playback=played).trust == Trust.DO_NOT_USE
+    said = next_steps(diagnosis("NAMED", playback=played))
+    assert said.startswith(
+        "Do not take the model with it, extended.h5, yet: it forecasts worse than no model in body rate"
+    )
 
 
 def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_separates():
