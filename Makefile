@@ -215,8 +215,8 @@ $(CIRCLE)/kept-trajectory.h5: $(CIRCLE)/.part/trajectory.yaml
 $(CIRCLE)/kept.h5: $(CIRCLE)/kept-trajectory.h5 $(CIRCLE)/.part/simulate.yaml
 	$(CPFLS) simulate configs/full-circle.yaml $< -o $@ --force
 
-# Structures other than the one that wins, as consequents-products-order-functions. Learned from all samples, chosen on a
-# flight kept for it and judged on another once; each is a file, so that a stopped loop goes on.
+# Structures other than the one that wins, as consequents-products-order-functions. Learned from all samples, chosen on
+# a flight kept for it and judged on another once; each is a file, so that a stopped loop goes on.
 STRUCTURES := $(addprefix seesaw-additive-2-,1 3 5 7) $(addprefix harmonic-additive-1-,1 3 5) \
 	$(addprefix harmonic-tensor-1-,1 3) harmonic-additive-2-3 $(addprefix harmonic-tensor-2-,1 3)
 of_structure = $(word $(1),$(subst -, ,$*))

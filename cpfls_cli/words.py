@@ -22,8 +22,7 @@ def some(names: Sequence[str], most: int, between: str = ", ") -> str:
 
 def few(names: Sequence[str], most: int = 6) -> str:
     """Join names to a phrase, not more than anybody reads in a sentence."""
-    rest = len(names) - most
-    return joined([*names[:most], f"{rest} more"] if rest > 0 else names)
+    return some(names, most) if len(names) > most else joined(names)
 
 
 def capitalised(words: str) -> str:

@@ -158,7 +158,7 @@ _BEHIND_AXES = ("dot", "ddot", "rate", "vel", "acc")
 
 
 def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:
-    """Look for the columns of the other axes wherever the first one stands in a name, whatever the case of a letter."""
+    """Look for the columns of the other axes wherever the first one is in a name, whatever the case of a letter."""
     cases = Counter(map(str.lower, names))
     # What is there in small letters and in capitals is two things.
     folded = {name.lower(): name for name in names if cases[name.lower()] == 1}

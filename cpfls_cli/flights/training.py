@@ -313,30 +313,35 @@ def numbered_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
 
 def hashes_of(path: Path, file: InputFile) -> tuple[str, ...]:
     """Give the hashes that a flight is known by: that of its file, and that of the log that it was imported from."""
+    log = _log_of(path)
+    return (file.sha256, log) if log else (file.sha256,)
+
+
+def _log_of(path: Path) -> str:
+    """Give the hash of the log that a flight was imported from; empty where it is one, or is from none."""
     log = None if is_log(path) else read_origin(path).inputs.get("log")
-    return (file.sha256,) if log is None else (file.sha256, log.sha256)
+    return "" if log is None else log.sha256
 
 
 def refuse_overlap(learned: Sequence[Path], held_out: Sequence[Path]) -> None:
     """Refuse to judge on a stretch of a log that overlaps another one, which is learned from."""
-    own, unseen = ([(path, *stretch) for path in paths if (stretch := _stretch(path))] for paths in (learned, held_out))
-    for (path, log, *ends), (other, its, *others) in product(unseen, own):
-        begin, end = max(ends[0], others[0]), min(ends[1], others[1])
-        if log == its and begin < end:
+    for path, other in product(held_out, learned):
+        if not (log := _log_of(path)) or log != _log_of(other):
+            continue
+        begins, ends = zip(*map(_stretch, (path, other)), strict=True)
+        begin, end = max(begins), min(ends)
+        if begin < end:
             raise InputError(
                 f"{path}: holds {begin:.1f} to {end:.1f} s of the log that {other.name} is from too, which is learned "
                 "from; part the two by import.crop_s, or hold out another flight"
             )
 
 
-def _stretch(path: Path) -> tuple[str, float, float] | None:
-    """Give the hash of the log that a flight was imported from, and its ends on the clock of that; None for others."""
-    log = None if is_log(path) else read_origin(path).inputs.get("log")
-    if log is None:
-        return None
+def _stretch(path: Path) -> tuple[float, float]:
+    """Give the ends of an imported flight on the clock of its log, s; NaN where that has none."""
     flight, _ = read_whole(path)
     begin, end = flight.begins + flight.signals["time"][[0, -1]]
-    return log.sha256, float(begin), float(end)
+    return float(begin), float(end)
 
 
 def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:

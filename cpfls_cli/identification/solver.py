@@ -272,7 +272,17 @@ class Solver:
     def fit(self, partitions: Breakpoints, products: Products | None = None, ridge: Ridge | None = None) -> Fit | None:
         """Solve for the linear parameters, with the ridge weight that these partitions need.
 
-        Products and ridge of these partitions are given where they are known; None where the regressor is not finite.
+        Parameters
+        ----------
+        products : Products, optional
+            Of these partitions, where they are known already.
+        ridge : Ridge, optional
+            The same of its ridge.
+
+        Returns
+        -------
+        Fit or None
+            None where the regressor is not finite.
         """
         products = products or self.products(partitions)
         if products is None:

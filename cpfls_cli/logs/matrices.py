@@ -59,7 +59,7 @@ _BUSES = {"rt_estim": _STATES, "rt_estimatedStates": _STATES, "rt_sensor": _SENS
 # What arrays of texts that name columns are called.
 _LABELS = re.compile("label|name|column|header|field|channel|key", re.IGNORECASE)
 _OBJECTS = "holds objects or tables, which MATLAB alone reads: save their columns as vectors"
-# Stands for values that are no numbers.
+# In place of values that are no numbers.
 _NO_NUMBERS = np.empty(2, dtype=object)
 
 

@@ -127,7 +127,8 @@ def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Seque
     if best.shows_loop and not far.any():
         return better
     # Of yaw torque and inertia a vehicle whose drag factor is open shows the ratio alone.
-    bounded = [True, True, "drag_factor" not in vehicle.unknown]
+    shown = [True, True, "drag_factor" not in vehicle.unknown]
+    bounded = shown & (best.low > 1 / ANY) & (best.high < ANY)
     ends = np.array([best.low / _FORMULAS, best.high * _FORMULAS]) * vehicle.inertia_kg_m2[:3]
     return better._replace(missed=found.explained, enclosed=np.where(bounded, ends, np.nan))
 
