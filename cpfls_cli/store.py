@@ -208,7 +208,9 @@ def _write_values(group: h5py.Group, name: str, value: Any, own: Described, abou
     array = array.astype(np.uint8) if array.dtype == bool else array
     if rows or (array.ndim and array.nbytes >= _PACKED_BYTES):
         shape, chunk = (rows or len(array), *array.shape[1:]), (min(rows, PART), *array.shape[1:]) if rows else True
-        dataset = group.create_dataset(name, shape, array.dtype, chunks=chunk, compression="gzip", shuffle=True).id
+        # A higher level saves 1 to 2 % of measured signals, and takes a twentieth of the time of a closed-loop flight.
+        packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+        dataset = group.create_dataset(name, shape, array.dtype, chunks=chunk, **packed).id
     else:
         # By `create_dataset` each takes twice as long.
         space = h5py.h5s.create_simple(array.shape) if array.ndim else h5py.h5s.create(h5py.h5s.SCALAR)
