@@ -58,11 +58,14 @@ def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None =
     before, bends = None, np.zeros_like(moved)
     for own, curved in places_of(found.hypothesis):
         bends[own] = bends[curved] = bool(found.values[curved].size)
+    fit_error = np.where(stated.values == found.values, found.estimates.left_out - found.values, 0.0)
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
-        values, left_out = _stepped(at, sources)
+        values, left_out = _stepped(at, sources, fit_error)
         # What follows from others is identified where they are.
-        now = np.any([*(numbers for _, numbers in sources), (left_out != values).any(axis=0)], axis=0)
+        now = np.any(
+            [*(own for _, own in sources), (left_out[: len(sources[0].products)] != values).any(axis=0)], axis=0
+        )
         if before is not None:
             # A number that no source identifies where it has come to is as uncertain as when one did.
             left_out[:, ~now] = before[:, ~now]
@@ -90,19 +93,26 @@ def _of_config(found: NamedFit) -> NamedFit:
     return found._replace(estimates=replace(found.estimates, linear=linear, parameters=stated))
 
 
-def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]:
+def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array) -> tuple[Array, Array]:
     """Move numbers to where instruments and residual do not correlate; and with each block left out.
 
-    Shapes that follow from coefficients follow them.
+    The equations of all sources are solved together, so that the error of a number that one source identifies is in
+    those that another one identifies. Shapes that follow from coefficients follow them.
+
+    Reference: Newey and McFadden 1994, section 6 (errors of estimates in two steps).
     """
     values, prior = found.values, known_before(found.hypothesis)
-    change, without = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
-    for products, numbers in sources:
-        ztx, score = products[:, :-1, :-1][:, numbers], products[:, :-1, -1][:, numbers]
-        # Without what those before it explain.
-        normal = Normal(ztx[:, :, numbers], score - ztx @ change)
-        step, left_out = one_step(normal, Prior.about_zero(prior[numbers]), values[numbers])
-        change[numbers], without[:, numbers] = step - values[numbers], left_out - values[numbers]
+    moving, equations = _together(sources)
+    normal = Normal(equations[:, moving[:, None], moving], equations[:, moving, -1])
+    step, left_out = one_step(normal, Prior.about_zero(prior[moving]), values[moving])
+    change, without = np.zeros(len(values)), np.zeros((len(left_out), len(values)))
+    change[moving], without[:, moving] = step - values[moving], left_out - values[moving]
+    # Without a block the fit has other values of the numbers that stay, and those that move answer these.
+    total = equations.sum(axis=0)[moving]
+    stay = fit_error.copy()
+    stay[:, moving] = 0.0
+    stay[:, moving] = -np.linalg.solve(total[:, moving] + np.diag(prior[moving]), total[:, :-1] @ stay.T).T
+    without = np.vstack([without, change + stay])
     # The only number of an effect may be 0: then there is none.
     shapes = [
         (0.0 if len(each.effect.shapes) == 1 else shape.grid[0], shape.grid[-1])
@@ -114,6 +124,14 @@ def _stepped(found: NamedFit, sources: Sequence[_Source]) -> tuple[Array, Array]
     said = np.array([found.hypothesis.following(row[:linear]) for row in rows])
     rows[:, linear:] = np.where(np.isnan(said), rows[:, linear:], said)
     return rows[0], rows[1:]
+
+
+def _together(sources: Sequence[_Source]) -> tuple[IntArray, Array]:
+    """List the numbers that sources identify, and stack the equations of each by its own source."""
+    equations = np.zeros_like(sources[0].products[:, :-1])
+    for products, numbers in sources:
+        equations[:, numbers] = products[:, :-1][:, numbers]
+    return np.flatnonzero(np.any([numbers for _, numbers in sources], axis=0)), equations
 
 
 def with_lean(found: NamedFit, across: Array) -> NamedFit:
@@ -243,7 +261,20 @@ def _sources(found: NamedFit, given: Instruments, held: BoolArray | None = None)
             numbers = _strong(flown, numbers)
             sources.append(_Source(products, numbers))
             open_ = open_ & ~numbers
-    return sources
+    return _strong_together(sources) if sources else sources
+
+
+def _strong_together(sources: list[_Source]) -> list[_Source]:
+    """Keep of later sources the numbers that are identified where those of the others are free too."""
+    while True:
+        moving, equations = _together(sources)
+        normal = Normal(equations[:, moving[:, None], moving], equations[:, moving, -1])
+        strength = conditional_strength(normal, Prior.none(len(moving)))
+        unclear = np.flatnonzero((strength <= STRONG) & ~sources[0].numbers[moving])
+        if not len(unclear):
+            return sources
+        weakest = moving[unclear[np.argmin(strength[unclear])]]
+        sources = [each._replace(numbers=each.numbers & (np.arange(len(each.numbers)) != weakest)) for each in sources]
 
 
 def _strong(ztx: Array, numbers: BoolArray) -> BoolArray:

@@ -7,7 +7,7 @@ Floors are of shape (6,), N m and N, by channel; a weight is the standard deviat
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +39,7 @@ class Estimates:
     parameters: tuple[Estimate, ...]  # Of the vehicle's own numbers.
     # Each shape (coefficient,): linear coefficients of each chosen effect; empty where it has none.
     of_effect: tuple[Array, ...]
+    left_out: Array = field(default_factory=lambda: np.zeros((0, 0)))  # Shape (block, number): without each block.
 
     @property
     def of_vehicle(self) -> Array:
@@ -219,6 +220,7 @@ def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimate
         ),
         parameters,
         tuple(values[linear] for _, (linear, _) in places),
+        left_out,
     )
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import ttest_1samp
 
+from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_instruments
@@ -16,6 +17,7 @@ from cpfls_cli.gap.naming.by_instruments import (
     _sources,
     _stepped,
     _strong,
+    _strong_together,
     _Windows,
     significant_effects,
     with_lean,
@@ -157,11 +159,59 @@ def test_the_hook_of_a_load_follows_its_torque_and_mass(monkeypatch):
     sources = _sources(found, None)
     identified = dict(zip([shape.name for shape in effect[0].effect.shapes], sources[0].numbers[linear:], strict=True))
     assert identified == {"length_m": True, "damping_1_s": True, "depth_m": False}
-    values, left_out = _stepped(found, sources)
+    values, left_out = _stepped(found, sources, np.zeros((0, len(found.values))))
     for moved in (values, *left_out):
         depth, _, _, mass = moved[linear - 4 : linear]
         assert moved[-1] == pytest.approx(np.clip(depth / mass, 0.0, 0.3))
     assert np.ptp(left_out[:, -1]) > 0
+
+
+def by_each(numbers, rng):
+    """Two numbers in gusts, of which each has its own source, whose products are of blocks of its own."""
+    sources = []
+    for number in range(2):
+        known = rng.standard_normal((BLOCKS, 5 * WINDOWS, 2)) @ np.array([[1.0, 0.8], [0.0, 0.6]])
+        gust = rng.standard_normal((BLOCKS, 5 * WINDOWS, 1))
+        moved = known + gust * [0.7, -0.5]
+        rows = np.concatenate([moved, gust + moved @ np.array(numbers)[:, None]], axis=2)
+        products = np.zeros((2 * BLOCKS, 3, 3))
+        products[number * BLOCKS :][:BLOCKS, :2] = np.einsum("bwk,bwl->bkl", known, rows)
+        sources.append(_Source(products, np.arange(2) == number))
+    return sources
+
+
+def test_the_error_of_a_number_holds_that_of_another_one_that_another_source_identifies(monkeypatch):
+    monkeypatch.setattr(by_instruments, "known_before", lambda _: np.zeros(2))
+    hypothesis = SimpleNamespace(chosen=[], following=lambda _: np.zeros(0))
+    found = SimpleNamespace(values=np.zeros(2), hypothesis=hypothesis, estimates=SimpleNamespace(linear=np.zeros(2)))
+    values, errors = [], []
+    for seed in range(200):
+        sources = by_each([1.0, -2.0], np.random.default_rng(seed))
+        moved, left_out = _stepped(found, sources, np.zeros((0, 2)))
+        for products, own in sources:
+            left = products[:, :, -1] - products[:, :, :2] @ moved
+            assert left[:, :2][:, own].sum() == pytest.approx(0.0, abs=1e-6 * np.abs(products).sum())
+        values.append(moved)
+        errors.append(jackknife_error(left_out))
+    assert np.mean(values, axis=0) == pytest.approx([1.0, -2.0], abs=0.05)
+    assert np.median(errors, axis=0) == pytest.approx(np.std(values, axis=0), rel=0.2)
+    # A number that stays where the fit found it is as uncertain as the fit, and so is what follows it.
+    alone = [sources[0]]
+    fits = np.array([[0.0, 0.3], [0.0, -0.3]])
+    _, left_out = _stepped(found, alone, fits)
+    slope = alone[0].products.sum(axis=0)
+    assert left_out[-2:, 1] == pytest.approx(fits[:, 1])
+    assert np.diff(left_out[-2:, 0]) == pytest.approx(np.diff(fits[:, 1]) * -slope[0, 1] / slope[0, 0])
+
+
+def test_a_number_that_trades_with_those_of_another_source_is_not_identified():
+    """A drag by the past and a wind by setpoints, which show but their product."""
+    rng = np.random.default_rng(3)
+    first, second = by_each([0.0, 0.0], rng)
+    assert [each.numbers.tolist() for each in _strong_together([first, second])] == [[True, False], [False, True]]
+    # What the second knows of its number is what the first knows of its own.
+    second.products[BLOCKS:, 1, :2] = first.products[:BLOCKS, 0, :2] + 0.01 * rng.standard_normal((BLOCKS, 2))
+    assert [each.numbers.tolist() for each in _strong_together([first, second])] == [[True, False], [False, False]]
 
 
 def test_what_follows_from_others_that_did_not_go_far_is_not_asked_for_again_and_again(monkeypatch):
@@ -171,7 +221,7 @@ def test_what_follows_from_others_that_did_not_go_far_is_not_asked_for_again_and
     found = fitted(flights, [load], np.full(6, 0.1), GapSettings())
     depth, count = found.values[-1], len(found.values)
 
-    def stepped(at, _):
+    def stepped(at, *_):
         begins = at.values[-1] == depth
         values = at.values + 0.05 * begins * (np.arange(count) == count - 1)
         return values, values + np.outer(np.arange(20.0), begins * 1e-4 * (np.arange(count) == count - 1))
