@@ -20,7 +20,7 @@ from cpfls_cli.gap.naming.results import Alternative, NamedEffect, NotExcited, U
 from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.residual.narrow_band import NarrowBand, narrow_band
-from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, RARE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, ERRORS, RARE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _USUAL_OF_BOUND = 0.2  # A coefficient that is large but not unheard of, as a share of its bound.
@@ -206,26 +206,27 @@ def untried(hypothesis: System, named: Sequence[NamedEffect], settings: GapSetti
 
 
 def not_separated(found: NamedFit, wrong: NamedEffect | None) -> Iterator[Alternative]:
-    """List the rivals of wrong numbers of the vehicle that, with these as stated, differ by nothing that shows.
+    """List the rivals of wrong numbers of the vehicle that, with these as stated, leave no surely larger residual.
 
-    Under a vehicle that hardly changes its speed a load on a cable does not swing, and is more weight. Its swing is
-    computed from measured motion, with the acceleration and from the velocity alone, because noise swings it too, and
-    that of each differently.
+    Under a vehicle that hardly changes its speed a load on a cable does not swing, and is more weight; in gusts its
+    swing may not show.
     """
     if wrong is None:
         return
     hypothesis, floor = found.hypothesis, found.floor
     named = np.array([each.name in wrong.coefficients for each in VEHICLE_NUMBERS.coefficients])
     stated = [replace(flight, turns=flight.turns * ~named) for flight in hypothesis.flights]
-    by_velocity = [replace(each, signals=replace(each.signals, acceleration=None), seen={}) for each in stated]
-    own = hypothesis.base @ fit_within_bounds(hypothesis, floor)[0]
+
+    def squares(there: System) -> Array:
+        """Sum the squared residual of each block, squared floors."""
+        rows = (there.residual_at(fit_within_bounds(there, floor)[0]) / floor) ** 2
+        return np.array([rows[found.block == number].sum() for number in np.unique(found.block)])
 
     def alike(candidate: Candidate) -> bool:
-        there, again = (system(flights, [*hypothesis.chosen, candidate]) for flights in (stated, by_velocity))
-        linear, _ = fit_within_bounds(there, floor)
-        left, anew = ((each.base @ linear - own) / floor for each in (there, again))
-        return bool((np.mean(left * anew, axis=0) < VISIBLE**2).all())
+        more = squares(system(stated, [*hypothesis.chosen, candidate])) - own
+        return bool(more.mean() <= ERRORS * mean_error(more))
 
+    own = squares(hypothesis)
     for name, separated_by in VEHICLE_NUMBERS.rivals.items():
         effect = CATALOGUE[name]
         untried = name in {*found.settings.ignore, *names_of(hypothesis.chosen)} or effect.columns is None
