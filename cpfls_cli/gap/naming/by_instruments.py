@@ -102,17 +102,23 @@ def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array) -> t
     Reference: Newey and McFadden 1994, section 6 (errors of estimates in two steps).
     """
     values, prior = found.values, known_before(found.hypothesis)
+    change = np.zeros(len(values))
+    # Source by source a step does not overshoot as one of all together does.
+    for products, numbers in sources:
+        ztx, score = products[:, :-1, :-1][:, numbers], products[:, :-1, -1][:, numbers]
+        # Without what those before it explain.
+        normal = Normal(ztx[:, :, numbers], score - ztx @ change)
+        change[numbers] = one_step(normal, Prior.about_zero(prior[numbers]), values[numbers])[0] - values[numbers]
     moving, equations = _together(sources)
     normal = Normal(equations[:, moving[:, None], moving], equations[:, moving, -1])
     step, left_out = one_step(normal, Prior.about_zero(prior[moving]), values[moving])
-    change, without = np.zeros(len(values)), np.zeros((len(left_out), len(values)))
-    change[moving], without[:, moving] = step - values[moving], left_out - values[moving]
-    # Without a block the fit has other values of the numbers that stay, and those that move answer these.
-    total = equations.sum(axis=0)[moving]
-    stay = fit_error.copy()
+    # Without a block, of a source or of the fit, whose numbers stay: all others answer what is left out.
+    apart = np.zeros((len(left_out), len(values)))
+    apart[:, moving] = left_out - step
+    stay, total = fit_error.copy(), equations.sum(axis=0)[moving]
     stay[:, moving] = 0.0
     stay[:, moving] = -np.linalg.solve(total[:, moving] + np.diag(prior[moving]), total[:, :-1] @ stay.T).T
-    without = np.vstack([without, change + stay])
+    without = change + np.vstack([apart, stay])
     # The only number of an effect may be 0: then there is none.
     shapes = [
         (0.0 if len(each.effect.shapes) == 1 else shape.grid[0], shape.grid[-1])

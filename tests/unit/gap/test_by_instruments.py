@@ -183,11 +183,20 @@ def by_each(numbers, rng):
 def test_the_error_of_a_number_holds_that_of_another_one_that_another_source_identifies(monkeypatch):
     monkeypatch.setattr(by_instruments, "known_before", lambda _: np.zeros(2))
     hypothesis = SimpleNamespace(chosen=[], following=lambda _: np.zeros(0))
-    found = SimpleNamespace(values=np.zeros(2), hypothesis=hypothesis, estimates=SimpleNamespace(linear=np.zeros(2)))
+
+    def stepped(sources, at, fits):
+        """Step from values; the products hold the residual of values 0."""
+        there = [each._replace(products=each.products.copy()) for each in sources]
+        for each in there:
+            each.products[:, :, -1] -= each.products[:, :, :2] @ at
+        found = SimpleNamespace(values=at, hypothesis=hypothesis, estimates=SimpleNamespace(linear=at))
+        return _stepped(found, there, fits)
+
     values, errors = [], []
     for seed in range(200):
-        sources = by_each([1.0, -2.0], np.random.default_rng(seed))
-        moved, left_out = _stepped(found, sources, np.zeros((0, 2)))
+        sources, moved = by_each([1.0, -2.0], np.random.default_rng(seed)), np.zeros(2)
+        for _ in range(60):
+            moved, left_out = stepped(sources, moved, np.zeros((0, 2)))
         for products, own in sources:
             left = products[:, :, -1] - products[:, :, :2] @ moved
             assert left[:, :2][:, own].sum() == pytest.approx(0.0, abs=1e-6 * np.abs(products).sum())
@@ -198,7 +207,7 @@ def test_the_error_of_a_number_holds_that_of_another_one_that_another_source_ide
     # A number that stays where the fit found it is as uncertain as the fit, and so is what follows it.
     alone = [sources[0]]
     fits = np.array([[0.0, 0.3], [0.0, -0.3]])
-    _, left_out = _stepped(found, alone, fits)
+    _, left_out = stepped(alone, np.zeros(2), fits)
     slope = alone[0].products.sum(axis=0)
     assert left_out[-2:, 1] == pytest.approx(fits[:, 1])
     assert np.diff(left_out[-2:, 0]) == pytest.approx(np.diff(fits[:, 1]) * -slope[0, 1] / slope[0, 0])
