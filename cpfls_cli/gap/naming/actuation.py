@@ -165,7 +165,7 @@ class _Sets:
         return {candidate.effect.name: numbers for candidate, numbers in pairs if candidate.effect.name in names}
 
     def traded(self, names: _Names) -> NamedFit:
-        """Give the fit of a set; the interval of one lag or delay holds what it is jointly with the other.
+        """Give the fit of a set; the interval of one lag or delay holds that which it has jointly with the other.
 
         That is where the other is more than its standard error, which is neither named nor excluded. Of a filter no
         number is a time that a lag could trade for.
@@ -173,7 +173,7 @@ class _Sets:
         fit, pairs = self.fits[names], [each for each in self.fits if set(names) < set(each)]
         joint = [self.numbers(each) for each in pairs if len(names) == 1 and self.count(each) == 2]
         own = [
-            each[names[0]][0].value
+            each[names[0]][0]
             for each in joint
             for name, (one, *_) in each.items()
             if name not in names and one.value > (one.high - one.value) / ERRORS
@@ -181,7 +181,8 @@ class _Sets:
         if not own:
             return fit
         ((number,),) = self.numbers(names).values()
-        wider = replace(number, low=min(number.low, *own), high=max(number.high, *own))
+        low = max(number.plausible[0], min(each.low for each in own))
+        wider = replace(number, low=min(number.low, low), high=max(number.high, *(each.high for each in own)))
         each_with = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
         effects = tuple((wider,) if candidate.effect.name in names else each for candidate, each in each_with)
         return fit._replace(estimates=replace(fit.estimates, effects=effects))
