@@ -180,7 +180,7 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
 def _time_column(logs: Sequence[KnownLog]) -> str | None:
     """Give the clock that suits all logs."""
     first = logs[0]
-    if all(first.recognition.time_column in one.columns for one in logs):
+    if all(first.recognition.time_column in {*one.columns, one.recognition.time_column} for one in logs):
         wrong = [one for one in logs if one.recognition.time_unit != first.recognition.time_unit]
     else:
         # Every topic has stamps of its own.

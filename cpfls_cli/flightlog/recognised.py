@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.agreement import handed
+from cpfls_cli.flightlog.agreement import body_rate_from, fit_axes, handed, slow
 from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
 from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, evenly_rising, named_signals, nameless_clock
 from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
-from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
+from cpfls_cli.flightlog.topics import STAMP, Topics, column_names, rows_clock
 from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName, known_unit
 
 if TYPE_CHECKING:
@@ -39,6 +40,11 @@ _SLOWEST_HZ = 0.5  # Below which a signal shows nothing of a flight.
 _FEWEST_SAMPLES = 20  # For medians and rates.
 # Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses.
 _LARGEST_SPAN = 100
+# Of rows without stamps: how many show their rate, Hz, which rates are a log's, and which share of the gyroscope the
+# attitude explains.
+_FEWEST_ROWS, _ROWS_HZ, _TURNS_ALIKE = 200, (5.0, 4000.0), 0.8
+# Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
+_RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 _GRID_HZ = 100.0  # Rate at which signals are compared, whose motion is below a tenth of it.
 
 
@@ -52,7 +58,15 @@ class LogTable:
         samples = max(map(len, topics[""].values()), default=0) if self.flat else _FEWEST_SAMPLES
         if samples < _FEWEST_SAMPLES:
             raise InputError(f"holds only {samples} samples, too few for a flight")
-        stamps = _flat_time(topics[""], units) if self.flat else ("", "s", "")
+        try:
+            stamps = _flat_time(topics[""], units) if self.flat else ("", "s", "")
+        except InputError:
+            rows = _rows_by_motion(topics[""])
+            if not rows:
+                raise
+            doubt = f"it has no stamps: {rows} is taken for them, with which the attitude turns as the gyroscope reads"
+            stamps = rows, "s", doubt
+            self.topics = {"": {**topics[""], **rows_clock(rows, topics[""])}}
         self.time_column, self.time_unit, self.time_doubt = stamps
         if self.time_doubt:
             self._take_unit_of_motion()
@@ -186,11 +200,36 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     for name, step in even.items() if len(even) == 1 else ():
         for unit in (unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]):
             return name, unit, f"{name} alone rises evenly, by {step:.3g}: taken for the stamps, in {unit}"
-    unknown = (
-        "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp"
-    )
+    named = "it has to rise from row to row and be called t, time or timestamp"
+    unknown = [] if refused else [f"no column of time stamps is recognised: {named}"]
     how = f"rename {'another one' if refused else 'it'}, or write the config by hand (`cpfls config` prints every key)"
-    raise InputError("; ".join([*(refused[:_REFUSED] or [unknown]), how]))
+    rows = "" if refused else ", with import.time_column = row / 100 where 100 rows come in a second"
+    raise InputError("; ".join([*refused[:_REFUSED], *unknown, how + rows]))
+
+
+def _rows_by_motion(fields: Mapping[str, Array]) -> str:
+    """Find how often rows without stamps come, at which the attitude turns as the gyroscope reads; empty if nowhere."""
+    named = {own.signal: own for own in reversed(named_signals(column_groups((*fields,)), ""))}
+    if not named.keys() >= {"attitude", "body_rate"}:
+        return ""
+    angles, rates = (
+        named[name].scale * np.column_stack([fields[column] for column in named[name].group.columns])
+        for name in ("attitude", "body_rate")
+    )
+    whole = len(angles) == len(rates) and bool(np.isfinite(angles).all() and np.isfinite(rates).all())
+    if not whole or len(angles) < _FEWEST_ROWS:
+        return ""
+    degrees = named["attitude"].unit == "deg" or (named["attitude"].unit is None and np.abs(angles).max() > 2 * np.pi)
+    turns = Rotation.from_euler("xyz", angles, degrees=degrees)
+    # As if a hundred came in a second: what is slow is so many rows long then.
+    fit = fit_axes(slow(body_rate_from(turns, 1.0), _GRID_HZ), slow(rates, _GRID_HZ))
+    spread = float(np.sqrt(rates.var(axis=0).sum()))
+    unit = named["body_rate"].unit or (
+        "deg/s" if spread > _DEGREES_FROM else "rad/s" if spread < _RADIANS_UP_TO else ""
+    )
+    hz = fit.gain * known_unit(unit).factor if unit else 0.0
+    alike = fit.explained > _TURNS_ALIKE and _ROWS_HZ[0] < hz < _ROWS_HZ[1]
+    return f"row / {float(f'{hz:.2g}'):g}" if alike else ""
 
 
 def _steps_back(name: str, values: Array) -> str:

@@ -62,7 +62,7 @@ class Logged:
     gyroscope: str = about("whether the fastest gyroscope is in front of the autopilot's filters, behind them, or both")
     signals: tuple[SignalRow, ...] = part()
     faster: str = about("what to set in the autopilot to log faster what is too slow", default="")
-    warnings: str = about("what its reader found wrong with the file, a sentence a line", default="")
+    warnings: str = about("what is wrong with the file, and with what it is taken for, a sentence a line", default="")
 
 
 def what_is_logged(
@@ -99,7 +99,7 @@ def what_is_logged(
         gyroscope="behind" * bool(flight.autopilot) if flight.gyroscope_unfiltered is None else "both",
         signals=rows,
         faster=log_faster(joined(slow), FAST_HZ, flight.system, parameters=flight.parameters) if slow else "",
-        warnings="\n".join(warnings),
+        warnings="\n".join((*warnings, *recognition.warnings)),
     )
 
 
