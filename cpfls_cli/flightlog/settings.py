@@ -143,8 +143,8 @@ class ImportSettings(Settings):
     time_column: Annotated[
         str | None,
         Doc(
-            "name of the column of time stamps, or row / 100 where 100 rows come in a second; null: those of the fastest"
-            " mapped topic of a log of topics"
+            "name of the column of time stamps, or row / 100 where 100 rows come in a second; null: those of the"
+            " fastest mapped topic of a log of topics"
         ),
     ] = "t"
     time_unit: Annotated[Literal["s", "ms", "us", "ns"], Doc("unit of the time stamps")] = "s"
