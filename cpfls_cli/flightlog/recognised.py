@@ -58,16 +58,10 @@ class LogTable:
         samples = max(map(len, topics[""].values()), default=0) if self.flat else _FEWEST_SAMPLES
         if samples < _FEWEST_SAMPLES:
             raise InputError(f"holds only {samples} samples, too few for a flight")
-        try:
-            stamps = _flat_time(topics[""], units) if self.flat else ("", "s", "")
-        except InputError:
-            rows = _rows_by_motion(topics[""])
-            if not rows:
-                raise
-            doubt = f"it has no stamps: {rows} is taken for them, with which the attitude turns as the gyroscope reads"
-            stamps = rows, "s", doubt
-            self.topics = {"": {**topics[""], **rows_clock(rows, topics[""])}}
+        stamps = _flat_time(topics[""], units) if self.flat else ("", "s", "")
         self.time_column, self.time_unit, self.time_doubt = stamps
+        if self.flat and (rows := rows_clock(self.time_column, topics[""])):
+            self.topics = {"": {**topics[""], **rows}}
         if self.time_doubt:
             self._take_unit_of_motion()
         self.origin = float(next(filter(np.isfinite, self.clock("")))) if self.flat else 0.0
@@ -200,11 +194,16 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     for name, step in even.items() if len(even) == 1 else ():
         for unit in (unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]):
             return name, unit, f"{name} alone rises evenly, by {step:.3g}: taken for the stamps, in {unit}"
-    named = "it has to rise from row to row and be called t, time or timestamp"
-    unknown = [] if refused else [f"no column of time stamps is recognised: {named}"]
-    how = f"rename {'another one' if refused else 'it'}, or write the config by hand (`cpfls config` prints every key)"
-    rows = "" if refused else ", with import.time_column = row / 100 where 100 rows come in a second"
-    raise InputError("; ".join([*refused[:_REFUSED], *unknown, how + rows]))
+    by_hand = "write the config by hand (`cpfls config` prints every key)"
+    if refused:
+        raise InputError("; ".join([*refused[:_REFUSED], f"rename another one, or {by_hand}"]))
+    if rows := _rows_by_motion(fields):
+        doubt = f"it has no stamps: {rows} is taken for them, with which the attitude turns as the gyroscope reads"
+        return rows, "s", doubt
+    raise InputError(
+        "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
+        f" rename it, or {by_hand}, with import.time_column = row / 100 where 100 rows come in a second"
+    )
 
 
 def _rows_by_motion(fields: Mapping[str, Array]) -> str:

@@ -365,7 +365,7 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
     text = first.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
     if suffix != ".csv" and _NUMBERS.match(text):
         # Where some numbers are whole, rows differ in their commas.
-        if b"." not in text and len({line.count(b",") for line in text.splitlines()[:-1]}) > 1:
+        if b"." not in text and len({line.count(b",") for line in text.rpartition(b"\n")[0].splitlines()}) > 1:
             return (
                 "a table whose commas part its columns and stand in its numbers",
                 f"write points in them, {NAME_COLUMNS}",
