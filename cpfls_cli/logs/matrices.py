@@ -121,7 +121,9 @@ def _on_own_clocks(columns: Mapping[str, Array], units: Mapping[str, str]) -> Lo
     lengths = [{*map(len, own.values())} for own in groups.values()]
     if "" in groups or any(len(own) > 1 for own in lengths) or len(set[int]().union(*lengths)) < _FEWEST_CLOCKS:
         return None
-    topics, stated, left = {}, {}, []
+    topics: dict[str, dict[str, Array]] = {}
+    stated: dict[str, str] = {}
+    left = []
     for group, fields in groups.items():
         try:
             log = LogTable({"": fields}, units)
