@@ -20,7 +20,7 @@ from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
 from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, evenly_rising, named_signals, nameless_clock
 from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
-from cpfls_cli.flightlog.topics import STAMP, Topics, column_names, rows_clock
+from cpfls_cli.flightlog.topics import ROWS, STAMP, Topics, column_names, rows_clock
 from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName, known_unit
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ def _rows_by_motion(fields: Mapping[str, Array]) -> str:
     )
     hz = fit.gain * known_unit(unit).factor if unit else 0.0
     alike = fit.explained > _TURNS_ALIKE and _ROWS_HZ[0] < hz < _ROWS_HZ[1]
-    return f"row / {float(f'{hz:.2g}'):g}" if alike else ""
+    return f"{ROWS}{hz:.0f}" if alike else ""
 
 
 def _steps_back(name: str, values: Array) -> str:

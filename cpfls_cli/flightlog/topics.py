@@ -20,7 +20,8 @@ STAMP = "timestamp"  # The field of a topic that holds its time stamps.
 REBUILT = "rebuilt"  # The topic of commands of rotors that are rebuilt (`flightlog.rebuilt`).
 # The topic that a reader adds, of turns of the estimated yaw that it has undone: when, and `turn`, rad.
 YAW_RESETS = "yaw_resets"
-_ROWS = re.compile(r"row / (\d*[1-9]\d*(?:\.\d+)?)")
+ROWS = "row / "  # With which stamps of rows that come so many times a second begin.
+_ROWS_HZ = re.compile(rf"{ROWS}(\d*[1-9]\d*(?:\.\d+)?)")
 _ANGLES_THAT_JUMP = (0, 2)
 # Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it.
 _STEPS_HELD = 3
@@ -34,7 +35,7 @@ _ROUNDING = 1 + 1e-9
 
 def rows_clock(name: str, columns: Mapping[str, Array]) -> dict[str, Array]:
     """Compute the stamps, s, that ``row / 100`` names, of rows that come 100 times a second; nothing of other names."""
-    rate = _ROWS.fullmatch(name)
+    rate = _ROWS_HZ.fullmatch(name)
     rows = max(map(len, columns.values()), default=0)
     return {name: np.arange(rows) / float(rate[1])} if rate and name not in columns else {}
 

@@ -373,6 +373,18 @@ def test_what_is_counted_or_means_another_thing_and_two_that_rise_are_no_clock(o
         proposed(t=rising, attitude=None)
 
 
+def test_logs_of_one_logger_without_stamps_have_one_clock():
+    one, other, slower = (
+        known_log(f"{factor}.csv", log.topics, log.units, log.parameters, log.system)
+        for factor in (1.0, 0.95, 0.5)
+        for log in [flat_log(OWN, t=None, rate=named(factor * OWN.rate, "gyro_x", "gyro_y", "gyro_z"))]
+    )
+    assert other.recognition.time_column != one.recognition.time_column
+    assert propose([one, other], None, None).time_column == one.recognition.time_column
+    with pytest.raises(InputError, match="the stamps are row / 100 in s and row / 50 in s, so one config cannot suit"):
+        propose([one, slower], None, None)
+
+
 def test_charge_is_no_voltage():
     level = np.round(np.linspace(42, 40, len(OWN.time)))
     assert "voltage" not in {guess.signal for guess in proposed(battery={"battery": level}).signals}
