@@ -44,7 +44,7 @@ _LARGEST_SPAN = 100
 # attitude explains.
 _FEWEST_ROWS, _ROWS_HZ, _TURNS_ALIKE = 200, (5.0, 4000.0), 0.8
 # Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
-_RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
+RADIANS_UP_TO, DEGREES_FROM = 2.0, 10.0
 _GRID_HZ = 100.0  # Rate at which signals are compared, whose motion is below a tenth of it.
 
 
@@ -211,21 +211,19 @@ def _rows_by_motion(fields: Mapping[str, Array]) -> str:
     named = {own.signal: own for own in reversed(named_signals(column_groups((*fields,)), ""))}
     if not named.keys() >= {"attitude", "body_rate"}:
         return ""
-    angles, rates = (
-        named[name].scale * np.column_stack([fields[column] for column in named[name].group.columns])
-        for name in ("attitude", "body_rate")
-    )
-    whole = len(angles) == len(rates) and bool(np.isfinite(angles).all() and np.isfinite(rates).all())
-    if not whole or len(angles) < _FEWEST_ROWS:
+    pair = named["attitude"], named["body_rate"]
+    columns = [np.asarray(fields[column], dtype=float) for own in pair for column in own.group.columns]
+    if len({*map(len, columns)}) > 1 or len(columns[0]) < _FEWEST_ROWS or not np.isfinite(columns).all():
         return ""
+    angles, rates = (
+        own.scale * np.column_stack(part) for own, part in zip(pair, (columns[:3], columns[3:]), strict=True)
+    )
     degrees = named["attitude"].unit == "deg" or (named["attitude"].unit is None and np.abs(angles).max() > 2 * np.pi)
     turns = Rotation.from_euler("xyz", angles, degrees=degrees)
     # As if a hundred came in a second: what is slow is so many rows long then.
     fit = fit_axes(slow(body_rate_from(turns, 1.0), _GRID_HZ), slow(rates, _GRID_HZ))
     spread = float(np.sqrt(rates.var(axis=0).sum()))
-    unit = named["body_rate"].unit or (
-        "deg/s" if spread > _DEGREES_FROM else "rad/s" if spread < _RADIANS_UP_TO else ""
-    )
+    unit = named["body_rate"].unit or ("deg/s" if spread > DEGREES_FROM else "rad/s" if spread < RADIANS_UP_TO else "")
     hz = fit.gain * known_unit(unit).factor if unit else 0.0
     alike = fit.explained > _TURNS_ALIKE and _ROWS_HZ[0] < hz < _ROWS_HZ[1]
     return f"{ROWS}{hz:.0f}" if alike else ""

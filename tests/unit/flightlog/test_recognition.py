@@ -457,6 +457,9 @@ def test_rows_without_stamps_come_as_often_as_the_attitude_turns_as_the_gyroscop
     with pytest.raises(InputError, match=r"import.time_column = row / 100 where 100 rows come in a second"):
         # Of another flight.
         seen(flat_log(own, t=None, rate=named(own.rate[::-1], *GYRO)))
+    with pytest.raises(InputError, match="no column of time stamps is recognised"):
+        # As a matrix of another length.
+        seen(flat_log(own, t=None, rate=named(own.rate[::2], *GYRO)))
 
 
 def test_time_on_the_ground_and_idling_is_cut(own):
