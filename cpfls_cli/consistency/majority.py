@@ -35,6 +35,7 @@ from cpfls_cli.words import joined
 _ROUNDS = 3  # Channels that are mended one after the other: there are no more.
 # Parts of the flights whose scatter says whether a reading surely fits better, and by how many standard errors.
 _PARTS, _PARTS_SIGMAS = 16, 4.0
+_SHAKEN_M_S2 = 0.5  # From sample to sample, which no filtered accelerometer scatters by.
 _MOVES_M_S2 = 0.1  # Below this a vehicle hovers, and noise points anywhere.
 # Of 23 real flights with attitude all correlate by 0.91 and more in the plane, turned by 4 degrees at most, and by 0.33
 # and more along z.
@@ -485,12 +486,28 @@ def _grave(channel: str, checks: Sequence[PairCheck]) -> bool:
     return any(problem.contradiction for check in checks if channel in check.pair for problem in check.problems)
 
 
+def shaken_in_words(flights: Sequence[Signals]) -> str:
+    """Say of accelerometers that differ from sample to sample more than the motion does that vibration does so."""
+    felt = [signals.specific_force for signals in flights if signals.specific_force is not None]
+    # What is smooth lies between its neighbours.
+    apart = np.concatenate([own[1:-1] - 0.5 * (own[:-2] + own[2:]) for own in felt])
+    jumps, size = apart.std(axis=0) / np.sqrt(1.5), np.concatenate(felt).std(axis=0)
+    worst = int(np.argmax(jumps))
+    if jumps[worst] < max(_SHAKEN_M_S2, 0.5 * size[worst]):
+        return ""
+    often = f"one of {1 / flights[0].period:.3g} samples a second to the next"
+    return (
+        f"; along {AXES[worst]} it scatters by {jumps[worst]:.2g} m/s^2 from {often}, as vibration does that is logged"
+        " too slowly: log it faster, or leave it out"
+    )
+
+
 def _left_out(now: _Compared, name: str, witnesses: Sequence[str]) -> ChannelRepair:
     channel = CHANNELS[name]
     finding = Finding(
         f"the {channel.words} contradicts the {joined(witnesses)}, and no error of unit, gravity, axes or "
         "delay explains it",
-        f"check {channel.keys}",
+        f"check {channel.keys}{shaken_in_words(now.flights) if name == 'specific_force' else ''}",
         (channel.words, *witnesses),
         contradiction=_grave(name, now.checks),
         repairable=True,

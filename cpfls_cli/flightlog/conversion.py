@@ -12,7 +12,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError, SettingError
 from cpfls_cli.flightlog.agreement import rotations_of
 from cpfls_cli.flightlog.repair import continuous_attitude
-from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, ImportSettings
+from cpfls_cli.flightlog.settings import SETPOINTS, ColumnMap, ImportSettings, SignalMap
 from cpfls_cli.units import STANDARD_GRAVITY, to_si
 from cpfls_cli.words import some
 
@@ -46,16 +46,20 @@ def present_choices(columns: Container[str], settings: ImportSettings) -> Import
     return replace(settings, signals=signals)
 
 
-def drop_absent_signals(columns: Container[str], settings: ImportSettings) -> ImportSettings:
+def drop_absent_signals(columns: Collection[str], settings: ImportSettings) -> ImportSettings:
     """Leave out the optional signals whose columns the log does not hold; what is left has to describe a flight.
 
-    A signal with some of its columns stays, so that the missing ones are named like those of a required signal.
+    A signal with some of its columns stays, so that the missing ones are named like those of a required signal, unless
+    all that is missing is of topics that the log lacks.
     """
-    absent = [
-        name
-        for name, signal in settings.signals.items()
-        if not signal.required and not any(column in columns for column in signal.columns)
-    ]
+    topics = {column.partition(".")[0] for column in columns}
+
+    def lacks(signal: SignalMap) -> bool:
+        missing = [column for column in signal.columns if column not in columns]
+        lost = ["." in column and column.partition(".")[0] not in topics for column in missing]
+        return len(missing) == len(signal.columns) or (bool(lost) and all(lost))
+
+    absent = [name for name, signal in settings.signals.items() if not signal.required and lacks(signal)]
     if not absent:
         return settings
     present = {name: signal for name, signal in settings.signals.items() if name not in absent}

@@ -17,7 +17,7 @@ from cpfls_cli.flightlog.agreement import (
 from cpfls_cli.flightlog.airframe import explained_by_rotors
 from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, SENSED, Reading, angle_unit, nearest
 from cpfls_cli.flightlog.names import Named
-from cpfls_cli.flightlog.recognised import Guess, LogTable, Rival, Seen, Sure, called
+from cpfls_cli.flightlog.recognised import DEGREES_FROM, RADIANS_UP_TO, Guess, LogTable, Rival, Seen, Sure, called
 from cpfls_cli.flightlog.settings import SignalName
 from cpfls_cli.flightlog.vocabulary import Row, sizes
 from cpfls_cli.rotations import body_rate
@@ -27,8 +27,6 @@ from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 # Wind and clocks change a size by less than the first, and never from one unit of length to the next.
 _TOLERANCE, _TEN = 1.4, 10.0
 _FASTEST_M_S = 100.0  # Speed over a second that no multirotor flies.
-# Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
-_RADIANS_UP_TO, _DEGREES_FROM = 2.0, 10.0
 # Rate beyond which no gyroscope reads, deg/s, and the counts that one deg/s is to those of 16 bits for 2000 deg/s.
 _FASTEST_DEG_S, _COUNTS = 4100.0, 16.4
 _USUAL = 0.999  # Share of a flight in which no sample is damaged.
@@ -115,8 +113,8 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
         return
     values = seen.grid(named)
     spread = float(np.sqrt(values.var(axis=0).sum()))
-    between = _RADIANS_UP_TO <= spread <= _DEGREES_FROM
-    unit = stated or ("deg/s" if spread > _DEGREES_FROM else "rad/s")
+    between = RADIANS_UP_TO <= spread <= DEGREES_FROM
+    unit = stated or ("deg/s" if spread > DEGREES_FROM else "rad/s")
     rivals = (Rival("unit: deg/s", f"a spread of {spread:.2g} fits both"),) if between and not stated else ()
     size_in_words = f"a spread of {spread:.2g} in flight" if stated is None else f"which is in {stated}"
     # A few samples may be damaged.

@@ -15,7 +15,7 @@ from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.flightlog.repair import common_rate, same_rate
 from cpfls_cli.flightlog.settings import ROTORS, SETPOINTS, ColumnMap, SignalMap, SignalName
 from cpfls_cli.flightlog.stated_vehicle import Parameters, plain, stated_vehicle, vehicles_apart
-from cpfls_cli.flightlog.topics import Topics, column_names
+from cpfls_cli.flightlog.topics import ROWS, Topics, column_names
 from cpfls_cli.units import UnitName, known_unit
 from cpfls_cli.vehicle_limits import IN_ROOM, room, thrust_number
 from cpfls_cli.words import joined
@@ -30,6 +30,7 @@ _SAME_RANGE: Final = 0.01
 _ROOM = 1.2  # By which a limit of the rotor speeds lies above the fastest one that is logged.
 # Share by which an arm that is given may differ from the places that a log states: both are rounded.
 _SAME_ARM: Final = 0.05
+_SAME_ROWS: Final = 1.1  # Ratio of the rates of rows in two logs of one logger.
 DECIDES_ROTORS: Final = "a log with more motion, or a look at the vehicle, decides"
 # Ratio of loads up to which two flights may be of one mass: by rotor speeds and an accelerometer; otherwise, since
 # batteries empty, and who leans looks heavier. By commands three flights of one Crazyflie differ by 1.06.
@@ -180,7 +181,11 @@ def _require_same_vehicle(first: KnownLog, other: KnownLog) -> None:
 def _time_column(logs: Sequence[KnownLog]) -> str | None:
     """Give the clock that suits all logs."""
     first = logs[0]
-    if all(first.recognition.time_column in one.columns for one in logs):
+    rows_hz = [float(one.recognition.time_column.partition(ROWS)[2] or 0) for one in logs]
+    if max(rows_hz) < _SAME_ROWS * min(rows_hz):
+        # Of one logger: the motion shows its rate within some per cent.
+        return first.recognition.time_column
+    if all(first.recognition.time_column in {*one.columns, one.recognition.time_column} for one in logs):
         wrong = [one for one in logs if one.recognition.time_unit != first.recognition.time_unit]
     else:
         # Every topic has stamps of its own.

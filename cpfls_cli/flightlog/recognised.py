@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.spatial.transform import Rotation
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.agreement import handed
+from cpfls_cli.flightlog.agreement import body_rate_from, fit_axes, handed, slow
 from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
 from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, evenly_rising, named_signals, nameless_clock
 from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
-from cpfls_cli.flightlog.topics import STAMP, Topics, column_names
+from cpfls_cli.flightlog.topics import ROWS, STAMP, Topics, column_names, rows_clock
 from cpfls_cli.units import KNOWN_UNITS, STANDARD_GRAVITY, UnitName, known_unit
 
 if TYPE_CHECKING:
@@ -39,6 +40,11 @@ _SLOWEST_HZ = 0.5  # Below which a signal shows nothing of a flight.
 _FEWEST_SAMPLES = 20  # For medians and rates.
 # Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses.
 _LARGEST_SPAN = 100
+# Of rows without stamps: how many show their rate, Hz, which rates are a log's, and which share of the gyroscope the
+# attitude explains.
+_FEWEST_ROWS, _ROWS_HZ, _TURNS_ALIKE = 200, (5.0, 4000.0), 0.8
+# Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
+RADIANS_UP_TO, DEGREES_FROM = 2.0, 10.0
 _GRID_HZ = 100.0  # Rate at which signals are compared, whose motion is below a tenth of it.
 
 
@@ -54,6 +60,8 @@ class LogTable:
             raise InputError(f"holds only {samples} samples, too few for a flight")
         stamps = _flat_time(topics[""], units) if self.flat else ("", "s", "")
         self.time_column, self.time_unit, self.time_doubt = stamps
+        if self.flat and (rows := rows_clock(self.time_column, topics[""])):
+            self.topics = {"": {**topics[""], **rows}}
         if self.time_doubt:
             self._take_unit_of_motion()
         self.origin = float(next(filter(np.isfinite, self.clock("")))) if self.flat else 0.0
@@ -186,11 +194,39 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     for name, step in even.items() if len(even) == 1 else ():
         for unit in (unit for unit, factor in _TIME_UNITS.items() if _STEPS_S[0] <= step * factor <= _STEPS_S[1]):
             return name, unit, f"{name} alone rises evenly, by {step:.3g}: taken for the stamps, in {unit}"
-    unknown = (
-        "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp"
+    by_hand = "write the config by hand (`cpfls config` prints every key)"
+    if refused:
+        raise InputError("; ".join([*refused[:_REFUSED], f"rename another one, or {by_hand}"]))
+    if rows := _rows_by_motion(fields):
+        doubt = f"it has no stamps: {rows} is taken for them, with which the attitude turns as the gyroscope reads"
+        return rows, "s", doubt
+    raise InputError(
+        "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
+        f" rename it, or {by_hand}, with import.time_column = row / 100 where 100 rows come in a second"
     )
-    how = f"rename {'another one' if refused else 'it'}, or write the config by hand (`cpfls config` prints every key)"
-    raise InputError("; ".join([*(refused[:_REFUSED] or [unknown]), how]))
+
+
+def _rows_by_motion(fields: Mapping[str, Array]) -> str:
+    """Find how often rows without stamps come, at which the attitude turns as the gyroscope reads; empty if nowhere."""
+    named = {own.signal: own for own in reversed(named_signals(column_groups((*fields,)), ""))}
+    if not named.keys() >= {"attitude", "body_rate"}:
+        return ""
+    pair = named["attitude"], named["body_rate"]
+    columns = [np.asarray(fields[column], dtype=float) for own in pair for column in own.group.columns]
+    if len({*map(len, columns)}) > 1 or len(columns[0]) < _FEWEST_ROWS or not np.isfinite(columns).all():
+        return ""
+    angles, rates = (
+        own.scale * np.column_stack(part) for own, part in zip(pair, (columns[:3], columns[3:]), strict=True)
+    )
+    degrees = named["attitude"].unit == "deg" or (named["attitude"].unit is None and np.abs(angles).max() > 2 * np.pi)
+    turns = Rotation.from_euler("xyz", angles, degrees=degrees)
+    # As if a hundred came in a second: what is slow is so many rows long then.
+    fit = fit_axes(slow(body_rate_from(turns, 1.0), _GRID_HZ), slow(rates, _GRID_HZ))
+    spread = float(np.sqrt(rates.var(axis=0).sum()))
+    unit = named["body_rate"].unit or ("deg/s" if spread > DEGREES_FROM else "rad/s" if spread < RADIANS_UP_TO else "")
+    hz = fit.gain * known_unit(unit).factor if unit else 0.0
+    alike = fit.explained > _TURNS_ALIKE and _ROWS_HZ[0] < hz < _ROWS_HZ[1]
+    return f"{ROWS}{hz:.0f}" if alike else ""
 
 
 def _steps_back(name: str, values: Array) -> str:

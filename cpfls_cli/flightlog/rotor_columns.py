@@ -144,11 +144,14 @@ def find_mixed(log: LogTable) -> RotorColumns | None:
     return RotorColumns(None, command, command_is, warnings=tuple(too_slow(command, CRAZYFLIE, {})))
 
 
+TOO_SLOW = "the rotors are logged at"  # With which the warning begins.
+
+
 def too_slow(guess: Guess, system: str, parameters: Parameters) -> Iterator[str]:
     """Say of rotors that are logged too slowly how to log them faster."""
     if guess.rate_hz < SLOW_HZ:
         yield (
-            f"the rotors are logged at {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that"
+            f"{TOO_SLOW} {guess.rate_hz:.3g} Hz ({guess.columns.columns[0]}): too slow for motors that"
             f" respond within some 50 ms; {log_faster('them', FAST_HZ, system, parameters=parameters)}"
         )
 

@@ -141,7 +141,11 @@ class ImportSettings(Settings):
     """Settings of the import of a flight log."""
 
     time_column: Annotated[
-        str | None, Doc("name of the column of time stamps; null: those of the fastest mapped topic of a log of topics")
+        str | None,
+        Doc(
+            "name of the column of time stamps, or row / 100 where 100 rows come in a second; null: those of the"
+            " fastest mapped topic of a log of topics"
+        ),
     ] = "t"
     time_unit: Annotated[Literal["s", "ms", "us", "ns"], Doc("unit of the time stamps")] = "s"
     signals: Annotated[

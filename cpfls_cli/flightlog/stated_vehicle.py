@@ -247,7 +247,7 @@ def _by_outputs(parameters: Parameters) -> Iterator[VehicleKind]:
 
 
 def _by_header(topics: Topics, parameters: Parameters) -> Iterator[VehicleKind]:
-    """Look at the header and the columns of a blackbox log."""
+    """Look at the header of a blackbox log, and at columns that only vehicles with wings have."""
     for key, kinds in _HEADERS.items():
         said, number = str(parameters.get(key, "")).upper(), whole(parameters, key)
         by_word = next((what for word, what in TABLE["header_words"].items() if word in said), None)
@@ -257,6 +257,9 @@ def _by_header(topics: Topics, parameters: Parameters) -> Iterator[VehicleKind]:
     columns = topics.get("", {})
     if "fwAltP" in columns and "mcPosAxisP[0]" not in columns:
         yield VehicleKind(AIRPLANE, "it logs the altitude control of a fixed wing, fwAltP")
+    # Of forks of ArduPlane under names of their own; on rotors it logs QTUN too.
+    if "NavRoll" in topics.get("CTUN", {}) and "QTUN" not in topics:
+        yield VehicleKind(f"{AIRPLANE} or its like", "it logs CTUN.NavRoll")
     motors = sum(name.startswith("motor[") for name in columns)
     if "gyroADC[0]" in columns and 0 < motors < _FEWEST_MOTORS and any(own.startswith("servo[") for own in columns):
         yield VehicleKind(f"{AIRPLANE} or its like", f"it logs {motors} of motor[*] and servos")

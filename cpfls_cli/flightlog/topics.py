@@ -20,6 +20,8 @@ STAMP = "timestamp"  # The field of a topic that holds its time stamps.
 REBUILT = "rebuilt"  # The topic of commands of rotors that are rebuilt (`flightlog.rebuilt`).
 # The topic that a reader adds, of turns of the estimated yaw that it has undone: when, and `turn`, rad.
 YAW_RESETS = "yaw_resets"
+ROWS = "row / "  # With which stamps of rows that come so many times a second begin.
+_ROWS_HZ = re.compile(rf"{ROWS}(\d*[1-9]\d*(?:\.\d+)?)")
 _ANGLES_THAT_JUMP = (0, 2)
 # Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it.
 _STEPS_HELD = 3
@@ -29,6 +31,13 @@ _ON_TIME = 0.01
 _THINNED = 1.5  # Times as fast that a topic has to be for its thinning to matter.
 # Stamps are rounded, so a pause of exactly the allowed length must pass.
 _ROUNDING = 1 + 1e-9
+
+
+def rows_clock(name: str, columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Compute the stamps, s, that ``row / 100`` names, of rows that come 100 times a second; nothing of other names."""
+    rate = _ROWS_HZ.fullmatch(name)
+    rows = max(map(len, columns.values()), default=0)
+    return {name: np.arange(rows) / float(rate[1])} if rate and name not in columns else {}
 
 
 def column_names(topics: Topics) -> tuple[str, ...]:
@@ -62,7 +71,8 @@ def on_one_clock(
                 "import.time_column = null takes the stamps of a topic, but this log has no topics: name the column of"
                 f" its stamps; {columns_in_words(columns)}"
             )
-        converted = {time: columns[time] / known_unit(settings.time_unit).factor} if time in units else {}
+        stated = {time: columns[time]} if time in units else rows_clock(time, columns)
+        converted = {name: own / known_unit(settings.time_unit).factor for name, own in stated.items()}
         chosen = present_choices(columns, settings)
         return {**columns, **converted}, chosen, _say_choices(settings, chosen)
     mapped = [(column, *topic_and_field(column)) for column in settings.mapped_columns]

@@ -139,8 +139,9 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         raise InputError(f"{path}: not a CSV file: its first line, the column names, does not end")
     if not header.strip():
         raise InputError(f"{path}: is empty; a log starts with a line of column names")
-    if remark and all(map(_kind, _fields(header))):
-        # What writes numbers only has its column names in the last remark.
+    numeric = list(map(_kind, _fields(header)))
+    # What writes numbers has its column names in the last remark; a few columns of words have names there too.
+    if remark and (all(numeric) or len(numeric) == len(_fields(remark)) < 2 * sum(map(bool, numeric))):
         header, lines, line = remark, chain([header], lines), line - 1
     names = [name.strip() for name in _fields(header)]
     numbers = [name for name in names if name and _kind(name) == "number"]

@@ -364,6 +364,12 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
         return "telemetry of MAVLink", _CONVERT_TLOG
     text = first.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
     if suffix != ".csv" and _NUMBERS.match(text):
+        # Where some numbers are whole, rows differ in their commas.
+        if b"." not in text and len({line.count(b",") for line in text.rpartition(b"\n")[0].splitlines()}) > 1:
+            return (
+                "a table whose commas part its columns and stand in its numbers",
+                f"write points in them, {NAME_COLUMNS}",
+            )
         bare = "take the brackets around each line away, " if text.startswith(b"(") else ""
         return "a table of numbers without names", f"{bare}{NAME_COLUMNS}, and let its name end in .csv"
     if suffix != ".csv" and _NAMED_NUMBERS.match(text):

@@ -10,6 +10,7 @@ import zipfile
 import zlib
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from math import prod
 from pathlib import Path
@@ -21,13 +22,15 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import FileState, is_sealed, longest_read_s, most_held, state_of
+from cpfls_cli.flightlog.recognised import LogTable
+from cpfls_cli.flightlog.topics import STAMP
 from cpfls_cli.flightlog.vocabulary import PARROT
 from cpfls_cli.logs.dataflash import exported
 from cpfls_cli.logs.formats import MOST_LISTED, LogContents
 from cpfls_cli.units import known_unit
 from cpfls_cli.words import some
 
-_MOST_COLUMNS = 64
+_MOST_COLUMNS, _FEWEST_CLOCKS = 64, 2
 _PROBE = """
 import sys, h5py
 states = 0
@@ -70,6 +73,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     s. What is wider than 64 columns, or holds no numbers, is left out.
     """
     hdf5 = h5py.is_hdf5(path)
+    # Of topics, which have clocks of their own, all is read.
+    wanted = None if wanted is not None and any("." in name for name in wanted) else wanted
     kind, load = ("NumPy", _arrays) if path.suffix.lower() == ".npz" else ("MATLAB", _variables)
     try:
         if hdf5:
@@ -94,14 +99,44 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
             else ""
         )
         raise InputError(f"{path}: holds no vectors or matrices of numbers{way}")
-    columns = _of_one_length(columns)
     lost = f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}"
+    own = _on_own_clocks(columns, units) if wanted is None else None
+    if own is not None:
+        return replace(own, warnings=(*own.warnings, *[lost] * bool(others)))
+    columns = _of_one_length(columns)
     system = (
         f"{PARROT} minidrone"
         if any(name.startswith((*_BUSES, "rt_motor", "rt_yout/motors")) for name in columns)
         else ""
     )
     return LogContents({"": columns}, units, system=system, warnings=(lost,) if others and wanted is None else ())
+
+
+def _on_own_clocks(columns: Mapping[str, Array], units: Mapping[str, str]) -> LogContents | None:
+    """Make topics of structures or groups of several lengths with stamps each; None where few columns have them."""
+    groups: dict[str, dict[str, Array]] = {}
+    for name, values in columns.items():
+        if len(values) > 1:
+            groups.setdefault(name.rpartition("/")[0], {})[name] = values
+    lengths = [{*map(len, own.values())} for own in groups.values()]
+    if "" in groups or any(len(own) > 1 for own in lengths) or len(set[int]().union(*lengths)) < _FEWEST_CLOCKS:
+        return None
+    topics: dict[str, dict[str, Array]] = {}
+    stated: dict[str, str] = {}
+    left = []
+    for group, fields in groups.items():
+        try:
+            log = LogTable({"": fields}, units)
+        except InputError:
+            left.append(group)
+            continue
+        named = {name.removeprefix(f"{group}/"): name for name in fields if name != log.time_column}
+        topics[group] = {STAMP: log.clock(""), **{own: fields[name] for own, name in named.items()}}
+        stated |= {f"{group}.{own}": units[name] for own, name in named.items() if name in units}
+    if len(topics) < _FEWEST_CLOCKS or 2 * sum(map(len, topics.values())) < sum(map(len, groups.values())):
+        return None
+    words = f"without stamps that rise from row to row, and left out: {some(left, MOST_LISTED)}"
+    return LogContents(topics, stated, warnings=(words,) if left else ())
 
 
 def _of_one_length(columns: dict[str, Array]) -> dict[str, Array]:

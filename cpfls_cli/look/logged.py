@@ -9,6 +9,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, runs
 from cpfls_cli.flightlog.recognised import Recognition
+from cpfls_cli.flightlog.rotor_columns import TOO_SLOW
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, stated_frame
 from cpfls_cli.flightlog.topics import logged_hz
 from cpfls_cli.look.columns import LookedLog
@@ -62,7 +63,7 @@ class Logged:
     gyroscope: str = about("whether the fastest gyroscope is in front of the autopilot's filters, behind them, or both")
     signals: tuple[SignalRow, ...] = part()
     faster: str = about("what to set in the autopilot to log faster what is too slow", default="")
-    warnings: str = about("what its reader found wrong with the file, a sentence a line", default="")
+    warnings: str = about("what is wrong with the file, and with what it is taken for, a sentence a line", default="")
 
 
 def what_is_logged(
@@ -99,7 +100,8 @@ def what_is_logged(
         gyroscope="behind" * bool(flight.autopilot) if flight.gyroscope_unfiltered is None else "both",
         signals=rows,
         faster=log_faster(joined(slow), FAST_HZ, flight.system, parameters=flight.parameters) if slow else "",
-        warnings="\n".join(warnings),
+        # How to log faster is said by itself.
+        warnings="\n".join((*warnings, *(own for own in recognition.warnings if not own.startswith(TOO_SLOW)))),
     )
 
 

@@ -92,6 +92,12 @@ class LoopBounds(NamedTuple):
         """What is explained about roll or pitch, the less of the two; infinite where neither is known."""
         return float(np.nanmin([*self.explained[:2], np.inf]))
 
+    def up_to(self, highest_hz: float) -> LoopBounds:
+        """Leave out the fastest band, which no bound rests on, where most of it is above a frequency, Hz."""
+        shown = self.by_band.copy()
+        shown[-1:][np.sqrt(self.band_hz[-1:].prod(axis=1)) > highest_hz] = np.nan
+        return self._replace(by_band=shown)
+
 
 def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopBounds:
     """Bound the moments of inertia that the flights of a closed loop allow, in those of a model.

@@ -23,12 +23,12 @@ from cpfls_cli.consistency.findings import Finding
 from cpfls_cli.errors import ConfigError, CpflsError, InputError
 from cpfls_cli.flightlog.airframe import Airframe, RotorPlace, usual_airframe
 from cpfls_cli.flightlog.proposal import DECIDES_ROTORS, Proposal, known_log, propose
-from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Rival
+from cpfls_cli.flightlog.recognised import Guess, KeyChoice, Recognition, Rival
 from cpfls_cli.flightlog.settings import ROTORS, ColumnMap
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, USUAL, log_faster
 from cpfls_cli.flights.models import found_vehicle, is_found
 from cpfls_cli.flights.recordings import check_flight, imported, read_import, seen_twice
-from cpfls_cli.logs.formats import about_flight, log_contents, suffixes_in_words
+from cpfls_cli.logs.formats import MOST_LISTED, about_flight, log_contents, suffixes_in_words
 from cpfls_cli.page import TEMPLATES
 from cpfls_cli.pages.trust import contradicted
 from cpfls_cli.report.content import Command, number
@@ -40,7 +40,7 @@ from cpfls_cli.simulators.study import VehicleOf, of_log
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle_limits import beyond_any_vehicle, figures_of, room
-from cpfls_cli.words import by_name, capitalised, joined
+from cpfls_cli.words import by_name, capitalised, joined, some
 
 _IMPORTED = 4
 """Logs that are imported one by one; more are taken as they are."""
@@ -167,15 +167,23 @@ class Proposed:
         return _rotor(rotor, None if self.proposal is None else self.proposal.airframe, self.stated)
 
 
-def _by_topic(names: Sequence[str]) -> Iterator[str]:
-    """List columns, those of each topic by themselves, and those that differ in a number alone as one."""
+def _unused(recognition: Recognition) -> Iterator[str]:
+    """List unused columns, those of each topic by themselves, which differ in a number alone as one; whole topics."""
+    columns = (column for guess in recognition.signals for column in guess.columns.columns)
+    taken = {column.partition(".")[0] for column in columns if "." in column}
     topics: dict[str, dict[str, list[str]]] = {}
-    for name in names:
+    whole: dict[str, None] = {}
+    for name in recognition.unused:
         topic, dot, _ = name.partition(".")
+        if dot and taken and topic not in taken:
+            whole[topic.partition("[")[0]] = None
+            continue
         same = topics.setdefault(topic if dot else "", {})
         same.setdefault(re.sub(r"\d+(?=\]?$)", "*", name), []).append(name)
     for same in topics.values():
         yield ", ".join(_in_braces(own) for own in same.values())
+    if whole:
+        yield f"anything of {some(list(whole), MOST_LISTED)}"
 
 
 def _in_braces(names: Sequence[str]) -> str:
@@ -249,7 +257,7 @@ def _asked_words(keys: Sequence[str]) -> str:
     return ", ".join([*others, *(f"{joined(list(own))} of {joined(rotors)}" for own, rotors in by_keys.items())])
 
 
-@stage(Proposed, words=by_name(_by_topic, contradicted, _in_braces, _unit, _rotors_in_words))
+@stage(Proposed, words=by_name(_unused, contradicted, _in_braces, _unit, _rotors_in_words))
 def init(
     run: Run,
     logs: MayLogsArgument = None,

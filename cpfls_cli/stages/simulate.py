@@ -17,6 +17,7 @@ from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.job import require_numbers
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.effects.registry import effect as find
+from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.flightlog.results import MOTION, Flight
 from cpfls_cli.flights.path import PlannedPath
@@ -28,6 +29,7 @@ from cpfls_cli.simulation.model import Simulated, played_gusts, simulated_effect
 from cpfls_cli.stage import Run, stage, stage_named
 from cpfls_cli.stages._flight import FIGURES, STILL_AIR, WORDS, infeasible_sentence
 from cpfls_cli.store import read
+from cpfls_cli.vehicle.settings import VehicleSettings
 
 if TYPE_CHECKING:
     from cpfls_cli.playback.model import VehicleModel
@@ -172,14 +174,29 @@ def _inverse(run: Run, time: Array, planned: dict[str, Array], trajectory: Path)
         flight = fly_exactly(time, planned, run.study.vehicle, run.study.simulation, generator(run.study, "simulate"))
     if flight.infeasible and run.study.simulation.infeasible == "stop":
         problems = [infeasible_sentence(each) for each in flight.infeasible]
-        remedy = "fly more gently, change the vehicle, or set simulation.infeasible: report"
+        gently = "fly more gently, change the vehicle, or set simulation.infeasible: report"
+        # What turns about its centre of mass, and is held there, carries no weight.
+        remedy = (_too_heavy(run.study.vehicle) if {*_MOVED} <= planned.keys() else "") or gently
         raise ComputationError("\n".join([*problems, f"{trajectory}: no flight was written; {remedy}"]))
     run.go_on("reduce", run.output, output=run.sibling("selection.h5"))
     return flight
 
 
+def _too_heavy(vehicle: VehicleSettings) -> str:
+    """Say what to check of a vehicle that its rotors cannot carry; empty for one that can hover."""
+    hover, most = hover_speed(vehicle), vehicle.rotor_speed_max_rad_s
+    if hover <= most:
+        return ""
+    return (
+        f"the rotors lift {100 * (most / hover) ** 2:.2g} % of the weight at most, so nothing can be flown: check"
+        " mass_kg, rotor_speed_max_rad_s and thrust_factor_n_s2 of the vehicle"
+    )
+
+
 def _closed_loop(run: Run, time: Array, planned: dict[str, Array], model: VehicleModel | None) -> Simulated:
     study, rng = run.study, generator(run.study, "simulate")
+    if heavy := _too_heavy(study.vehicle if model is None else model.vehicle):
+        raise ComputationError(heavy)
     flight = measure(time, planned, study.vehicle, study.simulation, rng, run.progress, model)
     if model is not None and model.gusts is not None and not study.simulation.closed_loop.gusts:
         run.say(STILL_AIR)

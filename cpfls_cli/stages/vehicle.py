@@ -303,6 +303,9 @@ def vehicle(
         checkpoint.remove()
     run.until_written.enter_context(checkpoint.kept())
     found, signal = _found(run, training, settings, checkpoint, kept or {})
+    # Rotors show nothing above half the rate at which they are logged.
+    rotors_hz = min(flight.logged_hz for flight in training if not flight.group)
+    found = replace(found, loop=found.loop.up_to(rotors_hz / 2))
     first = [_FIRST_ANSWER] if settings.quick else []
     warnings = [*first, *limit, *twice, *(warning for flight in read for warning in flight.warnings)]
     sizes = [sum(map(len, flight.parts)) for flight in training]

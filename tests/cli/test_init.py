@@ -501,6 +501,15 @@ def test_every_column_that_is_not_used_is_listed(proposed, tmp_path, own):
     assert "not used: oil[{0,1,2}], paint" in result.stdout
 
 
+def test_topics_of_which_nothing_is_used_are_named_once(proposed, tmp_path, own):
+    other = ("float load;float ram_usage", 5, own.rate[:, :2])
+    path = put_file(tmp_path / "log.ulg", ulog_of_flight(own, asked={"cpuload": other, "system_power": other}))
+    result, _, _ = proposed(path, "--mass", MASS, "--arm", ARM, "-v")
+    assert "not used: anything of cpuload, system_power\n" in result.stdout
+    assert "not used: actuator_motors.control[{4,5,6,7,8,9,10,11}]\n" in result.stdout
+    assert "ram_usage" not in result.stdout
+
+
 def test_matrices_of_usual_names_are_read_by_what_moves(proposed, tmp_path, own):
     """A motor[*] of nobody in particular is not one of Betaflight, whose numbers nothing here speaks for."""
     data = {"time": own.time[:, None], "position": own.position, "attitude": own.angles, "gyro": own.rate}

@@ -182,6 +182,11 @@ def test_control_by_a_model_is_refused_with_what_to_use_instead(short, refuse, t
     assert "is no longer a mode: leave it out; a model is flown by `simulate --model` in closed loop" in line
 
 
+def test_a_vehicle_that_its_rotors_cannot_carry_is_refused_with_what_to_check(short, refuse, tmp_path):
+    (line,) = refuse("simulate", *short, "--set", "vehicle.mass_kg=150", "-o", tmp_path / "flight.h5", code=1)
+    assert "of the weight at most, so nothing can be flown: check mass_kg" in line
+
+
 def test_lost_flight_is_refused_with_a_remedy(short, refuse, tmp_path):
     words = ("--effect", "parameter_error.thrust_scale=-0.8", "--set", "simulation.closed_loop.deviation_max_m=5")
     (line,) = refuse("simulate", *short, *words, "-o", tmp_path / "flight.h5", code=1)

@@ -115,3 +115,13 @@ def test_what_torque_explains_is_of_no_size(flights):
         inertia = tuple(factor * moment for moment in vehicle.inertia_kg_m2)
         found = loop_bounds(VehicleModel(vehicle=replace(vehicle, inertia_kg_m2=inertia)), flown)
         np.testing.assert_allclose(found.explained[:2], right.explained[:2], rtol=0.02)
+
+
+def test_a_band_that_the_rotors_are_logged_too_slowly_for_is_not_shown(bounds):
+    found = next(iter(bounds.values()))
+    found = found._replace(by_band=np.full_like(found.by_band, 0.5))
+    slowly, fast = found.up_to(5.0), found.up_to(50.0)
+    assert np.isnan(slowly.by_band[-1]).all()
+    np.testing.assert_array_equal(slowly.by_band[:-1], found.by_band[:-1])
+    np.testing.assert_array_equal(fast.by_band, found.by_band)
+    assert found._replace(by_band=np.zeros((0, 3)), band_hz=np.zeros((0, 2))).up_to(5.0).by_band.shape == (0, 3)

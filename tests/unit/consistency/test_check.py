@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from cpfls_cli.consistency.check import check
+from cpfls_cli.consistency.majority import shaken_in_words
 from cpfls_cli.consistency.rotors import beyond_belief, beyond_propellers
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.settings import GapSettings
@@ -44,6 +45,17 @@ def guessed(signals, factor):
 
 def test_nothing_is_said_of_a_flight_that_agrees_with_itself(flight):
     assert check([flight], SETTINGS) == ()
+
+
+@pytest.mark.parametrize(
+    ("scatter", "words"), [(0.0, ""), (2.0, "; along z it scatters by 2 m/s^2 from one of 100 samples")]
+)
+def test_an_accelerometer_that_scatters_more_than_the_motion_is_said_to_vibrate(flight, scatter, words):
+    felt = np.einsum("tji,tj->ti", flight.rotation, flight.acceleration + np.array([0.0, 0.0, 9.80665]))
+    felt[:, 2] += scatter * np.random.default_rng(2).standard_normal(len(felt))
+    said = shaken_in_words([flight, replace(flight, specific_force=felt)])
+    assert said.startswith(words)
+    assert bool(said) == bool(words)
 
 
 def test_a_touchdown_is_no_flight(flight):

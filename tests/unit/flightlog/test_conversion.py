@@ -2,7 +2,12 @@ import numpy as np
 import pytest
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.conversion import acceleration_from_specific_force, attitude_to_enu_flu, to_program_frames
+from cpfls_cli.flightlog.conversion import (
+    acceleration_from_specific_force,
+    attitude_to_enu_flu,
+    drop_absent_signals,
+    to_program_frames,
+)
 from cpfls_cli.flightlog.importing import import_log
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
@@ -126,6 +131,19 @@ def test_a_signal_with_some_of_its_columns_is_an_error_though_it_may_be_lacking(
     del columns["y"]
     with pytest.raises(InputError, match=r"signals.position.columns: the log has no column 'y'"):
         imported(columns, mapped("body_rate", "position"))
+
+
+def test_a_signal_of_several_topics_is_left_out_where_some_of_them_are_not_there():
+    columns = ["PSCD.TPD", "PSCD.DVD", "RATE.R", "PSCN.DVN"]
+    position, velocity = (
+        SignalMap(columns=own, unit=unit, required=False)
+        for own, unit in ((("PSCN.TPN", "PSCE.TPE", "PSCD.TPD"), "m"), (("PSCN.DVN", "PSCE.DVE", "PSCD.DVD"), "m/s"))
+    )
+    rate = SignalMap(columns=("RATE.R", "RATE.P", "RATE.Y"), unit="deg/s", required=False)
+    signals = {"setpoint_position": position, "setpoint_velocity": velocity, "body_rate": rate}
+    kept = drop_absent_signals(columns, ImportSettings(signals=signals, torque_source=None)).signals
+    # PSCN is there and lacks a column: that is named, as a column of a required signal is.
+    assert kept.keys() == {"setpoint_position", "body_rate"}
 
 
 def test_a_signal_is_needed_unless_the_config_says_otherwise():

@@ -26,6 +26,8 @@ def first(names, signal, system=""):
         ("ang_vel_x ang_vel_y ang_vel_z", "body_rate", "ang_vel_x ang_vel_y ang_vel_z"),
         ("angVelX angVelY angVelZ", "body_rate", "angVelX angVelY angVelZ"),
         ("px py pz", "position", "px py pz"),
+        ("pose_rpy.x pose_rpy.y pose_rpy.z", "position", "pose_rpy.x pose_rpy.y pose_rpy.z"),
+        ("pose_rpy.roll pose_rpy.pitch pose_rpy.yaw", "attitude", "pose_rpy.roll pose_rpy.pitch pose_rpy.yaw"),
         ("posX posY posZ", "position", "posX posY posZ"),
         ("ax ay az gx gy gz", "body_rate", "gx gy gz"),
         ("gx gy gz gyro_x gyro_y gyro_z", "body_rate", "gyro_x gyro_y gyro_z"),

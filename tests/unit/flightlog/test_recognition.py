@@ -445,6 +445,23 @@ def test_stamps_in_microseconds_are_known_by_their_steps(own):
     assert (recognition.time_column, recognition.time_unit) == ("timestamp", "us")
 
 
+@pytest.mark.parametrize("degrees", [1.0, 180 / np.pi])
+def test_rows_without_stamps_come_as_often_as_the_attitude_turns_as_the_gyroscope_reads(own, degrees):
+    log = flat_log(
+        own, t=None, rate=named(degrees * own.rate, *GYRO), attitude=named(degrees * own.angles, "roll", "pitch", "yaw")
+    )
+    recognition = seen(log)
+    assert (recognition.time_column, recognition.time_unit) == (f"row / {1 / own.time[1]:g}", "s")
+    assert recognition.warnings[0].startswith(f"it has no stamps: row / {1 / own.time[1]:g} is taken for them")
+    assert recognition.signal("body_rate").columns.unit == ("rad/s" if degrees == 1.0 else "deg/s")
+    with pytest.raises(InputError, match=r"import.time_column = row / 100 where 100 rows come in a second"):
+        # Of another flight.
+        seen(flat_log(own, t=None, rate=named(own.rate[::-1], *GYRO)))
+    with pytest.raises(InputError, match="no column of time stamps is recognised"):
+        # As a matrix of another length.
+        seen(flat_log(own, t=None, rate=named(own.rate[::2], *GYRO)))
+
+
 def test_time_on_the_ground_and_idling_is_cut(own):
     recognition = seen(flat_log(with_ground(own)))
     begin, end = recognition.flown.span_s
@@ -457,7 +474,7 @@ def test_time_on_the_ground_and_idling_is_cut(own):
     ("changed", "message"),
     [
         ({"speed": named(np.zeros((2000, 4)), "cmd1", "cmd2", "cmd3", "cmd4")}, "the rotors (cmd*) never change"),
-        ({"t": None}, "no column of time stamps is recognised"),
+        ({"t": None, "attitude": None}, "no column of time stamps is recognised"),
         (
             {"t": {"t": np.arange(2000) % 1500 * 0.015}},
             "t falls once, at row 1501 of 2000, from 22.485 to 0: keep the rows of one flight",

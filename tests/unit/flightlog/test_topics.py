@@ -157,6 +157,16 @@ def test_a_flat_log_is_on_one_clock_and_must_be_said_which_column_it_is():
         on_one_clock(flat, {}, replace(settings, time_column=None))
 
 
+def test_rows_that_come_evenly_need_no_stamps():
+    flat = {"": {"v": np.array([3.0, 4.0, 5.0])}}
+    settings = ImportSettings(
+        time_column="row / 50", torque_source=None, signals=signals(voltage=("v",), body_rate=RATE)
+    )
+    assert on_one_clock(flat, {}, settings)[0]["row / 50"].tolist() == [0.0, 0.02, 0.04]
+    assert on_one_clock(flat, {}, replace(settings, time_unit="ms"))[0]["row / 50"].tolist() == [0.0, 20.0, 40.0]
+    assert "row / 0" not in on_one_clock(flat, {}, replace(settings, time_column="row / 0"))[0]
+
+
 def test_the_first_map_is_taken_whose_columns_are_all_there():
     old = ColumnMap(columns=("old.x", "old.y", "old.z"), unit="deg/s", scale=2.0)
     older = ColumnMap(columns=("older[0].x", "older.y", "older.z"), unit="rpm")

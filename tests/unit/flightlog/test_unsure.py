@@ -366,8 +366,23 @@ def test_what_is_counted_or_means_another_thing_and_two_that_rise_are_no_clock(o
     others = {name: np.round(values, 6) for name, values in others.items()}
     if "x_ref" in others:
         others |= dict.fromkeys(("y_ref", "z_ref"), np.sin(OWN.time))
+    rising = {"step": np.arange(len(OWN.time), dtype=float), **others}
+    # The rows themselves are timed by the motion, where it shows how often they come.
+    assert proposed(t=rising).time_column == f"row / {1 / OWN.time[1]:g}"
     with pytest.raises(InputError, match="no column of time stamps is recognised"):
-        proposed(t={"step": np.arange(len(OWN.time), dtype=float), **others})
+        proposed(t=rising, attitude=None)
+
+
+def test_logs_of_one_logger_without_stamps_have_one_clock():
+    one, other, slower = (
+        known_log(f"{factor}.csv", log.topics, log.units, log.parameters, log.system)
+        for factor in (1.0, 0.95, 0.5)
+        for log in [flat_log(OWN, t=None, rate=named(factor * OWN.rate, "gyro_x", "gyro_y", "gyro_z"))]
+    )
+    assert other.recognition.time_column != one.recognition.time_column
+    assert propose([one, other], None, None).time_column == one.recognition.time_column
+    with pytest.raises(InputError, match="the stamps are row / 100 in s and row / 50 in s, so one config cannot suit"):
+        propose([one, slower], None, None)
 
 
 def test_charge_is_no_voltage():

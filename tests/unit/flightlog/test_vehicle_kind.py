@@ -41,6 +41,7 @@ def columns(*names):
         ("Rotorflight 4.3.0", {}, {}, "a helicopter"),
         ("INAV 7.1.0", {"platform_type": "AIRPLANE"}, {}, "an airplane"),
         ("INAV 7.1.0", {}, columns("fwAltP", "motor[0]"), "an airplane"),
+        ("ArduRocket 4.6.1", {}, {"CTUN": {"NavRoll": np.zeros(2)}}, "an airplane or its like"),
         ("Betaflight 4.4.0", {"mixer": 14.0}, {}, "an airplane"),
         ("Betaflight 4.4.0", {}, columns("gyroADC[0]", "motor[0]", "servo[3]"), "an airplane or its like"),
     ],
@@ -55,6 +56,7 @@ def test_what_no_rotors_carry_is_refused_with_what_it_is(system, parameters, top
     [
         ("ArduCopter 4.5", {"FRAME_CLASS": 1.0, **MOTORS, "SERVO9_FUNCTION": 7.0}, {}),
         ("ArduCopter 3.3", {"FRAME": 1.0, "RC7_FUNCTION": 10.0}, {}),
+        ("ArduOther 4.5", {}, {"CTUN": {"NavRoll": np.zeros(2)}, "QTUN": {"ThO": np.zeros(2)}}),
         ("PX4 1.15.0", {"MAV_TYPE": 13.0, "SYS_AUTOSTART": 6001.0, "CA_AIRFRAME": 0.0}, status(vehicle_type=[1, 1])),
         ("Betaflight 4.4.0", {}, columns("gyroADC[0]", *(f"motor[{n}]" for n in range(4)))),
         ("", {}, {}),

@@ -330,6 +330,18 @@ def test_separators_decimal_commas_and_remarks(tmp_path: Path, text: str) -> Non
     np.testing.assert_array_equal(np.column_stack(list(own.topics[""].values())), ROWS)
 
 
+def test_names_in_a_remark_are_those_of_rows_with_some_words(tmp_path: Path) -> None:
+    """As `rostopic echo -p` writes messages."""
+    text = "%time,header.frame_id,child,pose.x,pose.y,pose.z\n1630747466824311984,world,cf2,0.5,-1,2e-3\n"
+    own = contents(_written(tmp_path / "log.csv", text))
+    assert own.topics[""]["pose.z"].tolist() == [2e-3]
+    assert own.topics[""]["time"].tolist() == [1630747466824311984.0]
+    assert own.warnings == ("columns that hold text are left out: child, header.frame_id",)
+    # A remark of another length names nothing.
+    own = contents(_written(tmp_path / "log.csv", "# a flight\ntime,x\n1,2\n"))
+    assert list(own.topics[""]) == ["time", "x"]
+
+
 def test_names_with_spaces_are_of_commas(tmp_path: Path) -> None:
     own = contents(_written(tmp_path / "log.csv", "time (us), gyroADC[0], vbat latest (V)\n1, 2, 3\n"))
     assert list(own.topics[""]) == ["time (us)", "gyroADC[0]", "vbat latest (V)"]
@@ -574,6 +586,29 @@ def test_columns_of_matlab_are_paths(tmp_path, version):
     if version == "5":
         expected |= {f"log/imu/acc[{axis}]": RATE[:, axis].tolist() for axis in range(3)}
     assert columns_of(log_contents(tmp_path / "log.mat")) == expected
+
+
+def test_structures_with_stamps_of_their_own_are_topics(tmp_path):
+    fast, slow = 0.01 * np.arange(400.0), 0.1 * np.arange(40.0)
+    data = {
+        "att": {"time": fast, "roll": np.sin(fast)},
+        "out": {"time_ms": 5e3 + 1e3 * slow, "c1": np.cos(slow)},
+        # Two sensors in turn, with the stamps of one.
+        "imu": {"time": np.repeat(fast, 2), "accX": np.zeros(800)},
+    }
+    scipy.io.savemat(tmp_path / "log.mat", data)
+    contents = log_contents(tmp_path / "log.mat")
+    assert contents.warnings == ("without stamps that rise from row to row, and left out: imu",)
+    assert {topic: list(fields) for topic, fields in contents.topics.items()} == {
+        "att": ["timestamp", "roll"],
+        "out": ["timestamp", "c1"],
+    }
+    np.testing.assert_allclose(contents.topics["out"]["timestamp"], 5 + slow)
+    again = log_contents(tmp_path / "log.mat", {"att.roll", "out.c1"})
+    np.testing.assert_array_equal(again.topics["att"]["roll"], np.sin(fast))
+    # Groups of one length are on one clock, whose name says so.
+    scipy.io.savemat(tmp_path / "log.mat", {"att": data["att"], "more": {"time": fast, "x": fast}})
+    assert set(log_contents(tmp_path / "log.mat").topics) == {""}
 
 
 def structure(time, values, label="", block="model/To Workspace"):
@@ -839,6 +874,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.yaml", b"time: 1.5\r\nroll: 0.1\r\n---\r\ntime: 1.6\r\n", "YAML, as `ros2 topic echo`", "ros2 bag record"),
         ("a.data", b"0.5 12 IMU_GYRO 0.1 0.2 0.3\n", "a log of Paparazzi", "write its numbers as CSV"),
         ("a.txt", b"0.5 12 -0.1 1e-3 0.3\n0.6 12 0 0 0\n", "a table of numbers without names", "names each column"),
+        ("a.txt", b"0,11,88,0,058,0\n0,02,11,9,0,058,0\n", "a table whose commas part its columns", "write points in"),
         ("a.log", b"1,2,3,4,\r\n", "a table of numbers without names", "let its name end in .csv"),
         ("a.dat", 999 * b"0.25 ", "a table of numbers without names", "let its name end in .csv"),
         ("a.dat", b"12.1 -0.5\n12.2 0.25\n", "a table of numbers without names", "names each column"),

@@ -250,6 +250,8 @@ def test_what_is_logged_and_how_fast():
     assert rows["setpoint body rate"].source == ""
     assert "SDLOG_PROFILE" in logged.faster
     assert logged.warnings == "one\ntwo"
+    doubted = replace(recognition, warnings=(*recognition.warnings, "three"))
+    assert what_is_logged(found, log, doubted, 1.7e9, ("one",)).warnings == "one\nthree"
 
 
 def test_rate_setpoints_that_nothing_follows_are_logged():
