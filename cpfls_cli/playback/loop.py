@@ -65,12 +65,6 @@ class LoopBounds(NamedTuple):
     missed: Annotated[
         Array, _by_axis("share explained by the model that was found, where rotors that only lag explain much more")
     ] = np.full(3, np.nan)
-    enclosed: Annotated[
-        Array,
-        About(
-            "bounds on a moment of inertia by rotors that only lag, there", ("end", "axis"), "kg m^2", BODY, gaps=True
-        ),
-    ] = np.full((2, 3), np.nan)
 
     @property
     def shows_loop(self) -> bool:
@@ -84,7 +78,7 @@ class LoopBounds(NamedTuple):
 
     @property
     def unexplained(self) -> bool:
-        """Whether numbers may be none of the vehicle's: those of the loop, or of a model that explains no flight."""
+        """Whether numbers of a fit may be none of the vehicle's: those of the loop, or of what explains no flight."""
         return self.shows_loop or self.misses
 
     @property
@@ -113,7 +107,9 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
 def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> LoopBounds:
     """Bound as `loop_bounds` does, and judge flights by what explains them best: a model, or rotors that only lag.
 
-    A model that was found and is wrong explains little of flights that show the vehicle well.
+    A model that was found and is wrong explains little of flights that show the vehicle well. The bounds are then those
+    of the rotors, in the stated moments of inertia, about yaw in their ratio to the drag factor; not finite where any
+    body would do.
     """
     found = loop_bounds(model, flights)
     if not found.shows_loop:
@@ -126,11 +122,9 @@ def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Seque
     far = (left > 1 - EXPLAINED) & less(1 - best.explained[:2], _LEAVES_LESS * left)
     if best.shows_loop and not far.any():
         return better
-    # Of yaw torque and inertia a vehicle whose drag factor is open shows the ratio alone.
-    shown = [True, True, "drag_factor" not in vehicle.unknown]
-    bounded = shown & (best.low > 1 / ANY) & (best.high < ANY)
-    ends = np.array([best.low / _FORMULAS, best.high * _FORMULAS]) * vehicle.inertia_kg_m2[:3]
-    return better._replace(missed=found.explained, enclosed=np.where(bounded, ends, np.nan))
+    bounded = (best.low > 1 / ANY) & (best.high < ANY)
+    low, high = np.where(bounded, [best.low / _FORMULAS, best.high * _FORMULAS], np.nan)
+    return better._replace(missed=found.explained, low=low, high=high)
 
 
 def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], logged_hz: float) -> bool:

@@ -89,8 +89,9 @@ _TRIED = {
     "added": "named effects added",
     "everything": "all blocks",
     "nothing": "stated vehicle",
+    "free": "chosen with any body",
 }
-_MARKERS = {"chosen": "s", "best": "^", "added": "v", "everything": "D", "nothing": "x"}
+_MARKERS = {"chosen": "s", "best": "^", "added": "v", "everything": "D", "nothing": "x", "free": "P"}
 _PANELS = (
     *(("torque", "N m", each) for each in ("x (roll to the right)", "y (nose down)", "z (yaw to the left)")),
     *(("force", "N", each) for each in ("x (ahead)", "y (left)", "z (up)")),
@@ -182,6 +183,7 @@ WORDS: Mapping[str, Any] = {
     "TRIED": _TRIED,
     "WHAT_TO_FLY": WHAT_TO_FLY,
     "by_name": lambda rows: {each.name: each for each in rows},
+    "moments": lambda r: [each for key in INERTIA[:3] if (each := r.parameters[key]).low is not None],
     "clipped": lambda share: float(np.clip(share, 0.0, 1.0)),
     "section": lambda r: to_yaml({"vehicle": vehicle_section(r)}).rstrip(),
     "shares": shares_in_words,
