@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
-from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others, six_parameters
+from cpfls_cli.inertia import FLAT, INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others
 from cpfls_cli.playback.constants import Constants, UsedInstruments, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.evaluation import OF_A_WEIGHT, Group, JointNumbers
@@ -229,50 +229,55 @@ class Held(NamedTuple):
         """Correlate the numbers: those that trade, entirely."""
         names = [number.name for number in self.numbers]
         traded = [{trade.first, trade.second} for trade in self.trades]
-        return np.array([[float(one == other or {one, other} in traded) for one in names] for other in names])
+        pairs = [[one == other or {one, other} in traded for one in names] for other in names]
+        return np.reshape(np.array(pairs, dtype=float), (len(names), len(names)))
 
 
 def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[FoundNumber]) -> Held:
     """Hold the body of a vehicle in the middle of its bounds, where a fit explains no flight.
 
     Moments of inertia stay as stated where all of these lie between their bounds. About yaw the bounds are those of the
-    drag factor where that is not known, or of its ratio to the moment. The thrust factor is that of the fit, for it
-    carries the weight, unless a law of the rotors carries a part. Numbers are given as exact, for the loop widens them
-    to the bounds (`widened_by_loop`); what has none is as begun, and open by a factor of ten.
+    drag factor where that is not known, or of its ratio to the moment, which is then that of a flat body. The thrust
+    factor is that of the fit, for it carries the weight, unless a law of the rotors carries a part. Numbers are given
+    as exact, for the loop widens them to the bounds (`widened_by_loop`); what has none is open by a factor of ten.
     """
     found, rotor = {number.name: number for number in fitted}, vehicle.rotors[0]
     open_thrust, open_drag, open_body = (name in vehicle.unknown for name in ("thrust_factor", "drag_factor", INERTIA))
     carries = open_thrust and LAW not in found
     thrust = found["thrust_factor"].value / rotor.thrust_factor_n_s2 if carries else 1.0
     low, high = np.array([loop.low, loop.high]) * [thrust, thrust, 1.0]
-    middle, bounded = np.nan_to_num(np.sqrt(low * high), nan=1.0), np.isfinite(low)
-    of_body = np.array([True, True, not open_drag])
-    found_body = open_body or bool((((low > 1) | (high < 1)) & of_body).any())
-    moved = np.where(of_body, middle, 1.0) if found_body else np.ones(3)
-    inertia = six_parameters(vehicle.inertia_kg_m2) * [*moved, 1.0, 1.0, 1.0]
-    drag = 1 / middle[2] if open_drag else 1.0
+    bounded, middle = np.isfinite(low), np.nan_to_num(np.sqrt(low * high), nan=1.0)
+    of_body = bounded & [True, True, not open_drag]
+    outside = of_body & ((low > 1) | (high < 1))
+    inertia = np.array(vehicle.inertia_kg_m2, dtype=float)
+    if open_body or outside.any():
+        inertia[:3] *= np.where(of_body, middle, 1.0)
+    if open_body and not of_body[2]:
+        inertia[2] = FLAT * inertia[:2].sum()
+    moved = inertia[:3] / vehicle.inertia_kg_m2[:3]
+    drag = moved[2] / middle[2] if open_drag and bounded[2] else 1.0
+    ratio = [*moved[:2], moved[2] / drag]
+    loop, traded = loop._replace(low=low / ratio, high=high / ratio), False
     numbers = []
     if open_thrust:
-        number = _open("thrust_factor", "N s^2", rotor.thrust_factor_n_s2)
+        number = _held_at("thrust_factor", "N s^2", rotor.thrust_factor_n_s2)
         numbers.append(found["thrust_factor"] if carries else number)
     if open_drag:
-        exact = bool(bounded[2]) and not found_body
-        numbers.append(_open("drag_factor", "N m s^2", drag * rotor.drag_factor_n_m_s2, exact=exact))
-    if found_body:
+        exact = bool(bounded[2]) and not (open_body or outside.any())
+        numbers.append(_held_at("drag_factor", "N m s^2", drag * rotor.drag_factor_n_m_s2, exact=exact))
+    if open_body or outside.any():
         stated = [np.nan] * 3 if open_body else vehicle.inertia_kg_m2[:3]
-        rows = zip(INERTIA_PARAMETERS, inertia.tolist(), stated, (bounded & of_body).tolist(), strict=False)
-        numbers += [_open(f"inertia.{name}", "kg m^2", value, before, exact=sure) for name, value, before, sure in rows]
-    width = np.log(ANY) / np.hypot(np.log(ANY), np.log(high[2] / low[2]) / 2)
-    traded = open_drag and found_body and width > _TRADED
-    return Held(
-        replace(with_factors(vehicle, thrust, drag), inertia_kg_m2=tuple(inertia.tolist()), unknown=()),
-        tuple(numbers),
-        (Trade("drag_factor", "inertia.Izz", float(width)),) if traded else (),
-        loop._replace(low=low / np.where(of_body, moved, middle), high=high / np.where(of_body, moved, middle)),
-    )
+        rows = zip(INERTIA_PARAMETERS, inertia.tolist(), stated, of_body.tolist(), strict=False)
+        numbers += [_held_at(f"inertia.{name}", "kg m^2", value, own, exact=exact) for name, value, own, exact in rows]
+        # Of two numbers that are open by a factor of ten, by how much their ratio is.
+        known = np.log(ANY) / np.hypot(np.log(ANY), np.log(high[2] / low[2]) / 2)
+        traded = open_drag and known > _TRADED
+    body = replace(with_factors(vehicle, thrust, drag), inertia_kg_m2=tuple(inertia.tolist()), unknown=())
+    trades = (Trade("drag_factor", "inertia.Izz", float(known)),) if traded else ()
+    return Held(body, tuple(numbers), trades, loop)
 
 
-def _open(name: str, unit: str, value: float, stated: float = np.nan, *, exact: bool = False) -> FoundNumber:
+def _held_at(name: str, unit: str, value: float, stated: float = np.nan, *, exact: bool = False) -> FoundNumber:
     factor = 1.0 if exact else ANY
     return FoundNumber(name, unit, value, value / factor, value * factor, stated, exact, False)
 
