@@ -165,8 +165,6 @@ def _reason(vehicle: Vehicle, number: FoundNumber) -> str:
         return ON_BOUND
     if vehicle.loop.shows_loop and alone:
         return "these flights show the loop, not the vehicle"
-    if vehicle.by_bounds and name in OF_TURNING and not too_heavy(vehicle):
-        return f"bounds from {number.low:.3g} to {number.high:.3g} leave it open"
     if name in OF_TURNING and too_heavy(vehicle):
         return too_heavy(vehicle)
     if name in excess(vehicle):
@@ -177,6 +175,8 @@ def _reason(vehicle: Vehicle, number: FoundNumber) -> str:
     others = [second if first == name else first for first, second in pairs if name in (first, second)]
     if others:
         return f"only its ratio to {' and '.join(others)} is known: they trade against each other"
+    if vehicle.by_bounds and name in OF_TURNING:
+        return f"bounds from {number.low:.3g} to {number.high:.3g} leave it open"
     return "the flights say too little, the interval is too wide"
 
 

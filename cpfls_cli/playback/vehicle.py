@@ -255,7 +255,7 @@ def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[
     if open_body and not of_body[2]:
         inertia[2] = FLAT * inertia[:2].sum()
     moved = inertia[:3] / vehicle.inertia_kg_m2[:3]
-    drag = moved[2] / middle[2] if open_drag and bounded[2] else 1.0
+    drag = float(moved[2] / middle[2]) if open_drag and bounded[2] else 1.0
     ratio = [*moved[:2], moved[2] / drag]
     loop, traded = loop._replace(low=low / ratio, high=high / ratio), False
     numbers = []

@@ -28,6 +28,7 @@ from cpfls_cli.artifacts.vehicle_model import (
     CENTRE,
     DELAY,
     DRAG,
+    FOUND_AS,
     INERTIA,
     LAG,
     OF_NONE,
@@ -151,6 +152,14 @@ def known_bands(bounds: LoopBounds, axis: int) -> tuple[Band, Band | None] | Non
     return first, last if best != worst else None
 
 
+def bounded(r: Vehicle) -> list[Parameter]:
+    """List the moments of inertia that were found between bounds; about yaw a drag factor that is open has them."""
+    known = np.isfinite(r.loop.low) & [True, True, FOUND_AS[DRAG] not in r.found]
+    return [
+        r.parameters[key] for key, own in zip(INERTIA, known.tolist(), strict=False) if own and FOUND_AS[key] in r.found
+    ]
+
+
 def shares_in_words(shares: Sequence[Share], first: int) -> str:
     """Compare what has a name with what is learned, next to the rotors: of torque from 0, of force from 3."""
     sizes = {each.name: float(np.linalg.norm(each.wrench[first : first + 3])) for each in shares}
@@ -167,7 +176,17 @@ WORDS: Mapping[str, Any] = {
     **MODEL_WORDS,
     **PLAYBACK_WORDS,
     **by_name(
-        excess, few, flown_by_hand, gust_words, is_learned, known_bands, log_faster, shown_slowly, _to_know, too_heavy
+        bounded,
+        excess,
+        few,
+        flown_by_hand,
+        gust_words,
+        is_learned,
+        known_bands,
+        log_faster,
+        shown_slowly,
+        _to_know,
+        too_heavy,
     ),
     "ACCEPTABLE": ACCEPTABLE,
     "ANY": ANY,
@@ -183,7 +202,6 @@ WORDS: Mapping[str, Any] = {
     "TRIED": _TRIED,
     "WHAT_TO_FLY": WHAT_TO_FLY,
     "by_name": lambda rows: {each.name: each for each in rows},
-    "moments": lambda r: [each for key in INERTIA[:3] if (each := r.parameters[key]).low is not None],
     "clipped": lambda share: float(np.clip(share, 0.0, 1.0)),
     "section": lambda r: to_yaml({"vehicle": vehicle_section(r)}).rstrip(),
     "shares": shares_in_words,
