@@ -7,7 +7,10 @@ import pytest
 
 from cpfls_cli.playback.loop import loop_and_plain, loop_bounds
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.rotors import RotorResponse
+from cpfls_cli.playback.settings import PlaybackSettings
+from cpfls_cli.playback.vehicle import find_vehicle
 from tests.builders.gusty_flights import CALM, GUSTS, LARGE, SMALL, STORM, Flight, gusty_flights
 
 TRUTHS = {"45 g": SMALL, "1.5 kg": LARGE}
@@ -92,14 +95,10 @@ def test_a_model_that_explains_nothing_is_not_taken_for_the_loop(flights, bounds
     np.testing.assert_array_equal(found.missed, loop_bounds(wrong, still).explained)
     # Whatever the config guesses, its rotors alone enclose the body, and the yaw of one whose drag factor is known.
     truth = np.array(SMALL.vehicle.inertia_kg_m2[:3])
-    for vehicle in (
-        replace(SMALL.vehicle, inertia_kg_m2=tuple(3 * truth)),
-        replace(SMALL.vehicle, unknown=("inertia",)),
-    ):
-        low, high = loop_and_plain(wrong, vehicle, still).enclosed
+    for stated in (3 * truth, truth):
+        found = loop_and_plain(wrong, replace(SMALL.vehicle, inertia_kg_m2=tuple(stated)), still)
+        low, high = found.low * stated, found.high * stated
         assert ((low < truth) & (truth < high) & (high < 1.6 * low)).all()
-    open_drag = replace(SMALL.vehicle, unknown=("drag_factor", "inertia"))
-    assert np.isnan(loop_and_plain(wrong, open_drag, still).enclosed[:, 2]).all()
     for bandwidth in BANDWIDTHS[:2]:
         key = ("45 g", GUSTS, bandwidth)
         gusty = loop_and_plain(VehicleModel(vehicle=SMALL.vehicle), SMALL.vehicle, flights[key])
@@ -115,3 +114,39 @@ def test_what_torque_explains_is_of_no_size(flights):
         inertia = tuple(factor * moment for moment in vehicle.inertia_kg_m2)
         found = loop_bounds(VehicleModel(vehicle=replace(vehicle, inertia_kg_m2=inertia)), flown)
         np.testing.assert_allclose(found.explained[:2], right.explained[:2], rtol=0.02)
+
+
+@pytest.mark.parametrize("unknown", [("inertia",), ("drag_factor", "inertia", "thrust_factor")])
+@pytest.mark.parametrize("share", [0.0, 0.3])
+@pytest.mark.parametrize("truth", TRUTHS.values(), ids=TRUTHS)
+def test_a_fit_that_explains_no_flight_leaves_a_body_by_bounds(truth, share, unknown):
+    """Commands alone, rotors that lag, and no block by which a fit could lag: it finds another response, and a body."""
+    late, gusts = truth._replace(lag_s=0.06), tuple(share * size for size in GUSTS)
+    # Too short for instruments.
+    flown = gusty_flights(
+        [Flight(late, gusts, path=path, bandwidth=8.0, reach=3.0, commands=True) for path in range(4)], seconds=7.5
+    )
+    vehicle = replace(
+        late.vehicle, unknown=unknown, inertia_kg_m2=tuple(3 * each for each in truth.vehicle.inertia_kg_m2)
+    )
+    left_out = tuple(block for block in blocks_of(vehicle) if block != "slow_actuation")
+    settings = PlaybackSettings(leave_out=left_out, search_windows=40, folds=2, quick=True)
+    found = find_vehicle(vehicle, [replace(each, setpoints={}) for each in flown], settings, lambda *_: None)
+    assert found.by_bounds
+    numbers = {number.name: number for number in found.numbers}
+    assert set(numbers) == {*(f"inertia.{name}" for name in ("Ixx", "Iyy", "Izz")), *unknown} - {"inertia"}
+    for name, true in zip(("Ixx", "Iyy"), truth.inertia, strict=False):
+        own = numbers[f"inertia.{name}"]
+        assert own.low < true < own.high < 1.6 * own.low
+        assert own.determined
+        assert own.value == pytest.approx(np.sqrt(own.low * own.high))
+    np.testing.assert_allclose(np.diag(found.model.body.inertia)[:2], truth.inertia[:2], rtol=0.1)
+    ratio = found.model.vehicle.rotors[0].drag_factor_n_m_s2 / found.model.vehicle.inertia_kg_m2[2]
+    still = share == 0
+    assert numbers["inertia.Izz"].determined == (still and "drag_factor" not in unknown)
+    # About yaw still air shows the moment, or its ratio to a drag factor that is not known, and gusts neither.
+    if still:
+        assert ratio == pytest.approx(truth.drag_factor / truth.inertia[2], rel=0.1)
+    assert bool(found.trades) == (still and "drag_factor" in unknown)
+    assert [each.name for each in found.structures].count("free") == 1
+    assert len(found.correlation) == len(found.numbers)
