@@ -165,6 +165,11 @@ class Choice:
     free: Judged | None = None
 
     @property
+    def evaluated(self) -> int:
+        """How many structures were judged."""
+        return len(self.judged)
+
+    @property
     def tried(self) -> tuple[TriedStructure, ...]:
         """The baselines, then the front."""
         baselines = [(name, found) for name in BASELINES if (found := getattr(self, name)) is not None]

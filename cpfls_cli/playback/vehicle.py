@@ -183,7 +183,7 @@ def find_vehicle(
         # What was sensed, or is held, goes with no number of the fit.
         correlation=block_diag(np.eye(len(sensed)), held.correlation, correlation),
         structures=choice.tried,
-        evaluated=len(choice.judged),
+        evaluated=choice.evaluated,
         complete=choice.complete,
         blocks=spread.blocks,
         guessed=tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
