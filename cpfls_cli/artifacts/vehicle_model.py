@@ -344,7 +344,8 @@ class Vehicle(VehicleFit, AnyModel):
         if self.instruments is None:
             identified = identified and self.identifies_yaw
             return capped(
-                self._by_playback,
+                # Of flights that show the loop as well no forecast judges the vehicle.
+                self._by_playback if self.forecast is None else Trust.NOT_JUDGED,
                 self.contradictions,
                 loop=self.loop.shows_loop,
                 lacks=self.responses_off,

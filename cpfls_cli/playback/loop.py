@@ -65,6 +65,9 @@ class LoopBounds(NamedTuple):
     missed: Annotated[
         Array, _by_axis("share explained by the model that was found, where rotors that only lag explain much more")
     ] = np.full(3, np.nan)
+    lags_s: Annotated[
+        Array, About("lag of these rotors, after the next shorter and before the next longer one tried", ("3",), "s")
+    ] = np.zeros(3)
 
     @property
     def shows_loop(self) -> bool:
@@ -75,6 +78,11 @@ class LoopBounds(NamedTuple):
     def misses(self) -> bool:
         """Whether a model explains much less of roll or pitch than rotors that only lag."""
         return bool(np.isfinite(self.missed[:2]).any())
+
+    @property
+    def misses_alone(self) -> bool:
+        """Whether that model is all that is wrong: rotors that only lag explain the flights, and so show no loop."""
+        return self.misses and not (self.explained[:2] < EXPLAINED).any()
 
     @property
     def unexplained(self) -> bool:
@@ -115,8 +123,9 @@ def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Seque
     if not found.shows_loop:
         return found
     known = np.isfinite(found.by_band[:, :2])
-    plain = [bounds for bounds in _plain_bounds(vehicle, flights) if np.isfinite(bounds.by_band[:, :2])[known].all()]
-    best = largest([found, *plain], lambda bounds: bounds.least)
+    tried = enumerate(_plain_bounds(vehicle, flights))
+    plain = [(at, bounds) for at, bounds in tried if np.isfinite(bounds.by_band[:, :2])[known].all()]
+    at, best = largest([(0, found), *plain], lambda each: each[1].least)
     better = found._replace(explained=best.explained, by_band=best.by_band)
     left = 1 - found.explained[:2]
     far = (left > 1 - EXPLAINED) & less(1 - best.explained[:2], _LEAVES_LESS * left)
@@ -124,7 +133,8 @@ def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Seque
         return better
     bounded = (best.low > 1 / ANY) & (best.high < ANY)
     low, high = np.where(bounded, [best.low / _FORMULAS, best.high * _FORMULAS], np.nan)
-    return better._replace(missed=found.explained, low=low, high=high)
+    lags = np.array([_LAGS[max(at - 1, 0)], _LAGS[at], (*_LAGS, 2 * _LAGS[-1])[at + 1]])
+    return better._replace(missed=found.explained, low=low, high=high, lags_s=lags)
 
 
 def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], logged_hz: float) -> bool:

@@ -135,7 +135,7 @@ BASELINES = ("chosen", "best", "added", "everything", "nothing", "free")
 class TriedStructure(NamedTuple):
     """A structure of the Pareto front, or a baseline, judged on the flights kept aside."""
 
-    name: Annotated[str, About("chosen, best, added, everything, nothing, front, or free")]
+    name: Annotated[str, About("chosen, best, added, everything, nothing, free, held, or front")]
     blocks: Annotated[tuple[str, ...], About("its blocks", ("block",))]
     error: Annotated[float, About("mean error of the windows kept aside; about 1.1 for rates that stay")]
     worse: Annotated[float, About("error less that of the best")]
@@ -178,6 +178,16 @@ class Choice:
             for name, own in [*baselines, *(("front", own) for own in self.front)]
             for worse, uncertain in [own.worse_than(self.best)]
         )
+
+    def judge(
+        self, name: str, own: FittedNumbers, flights: Sequence[PlaybackFlight], settings: PlaybackSettings
+    ) -> TriedStructure:
+        """Judge numbers that another way found on the same windows."""
+        windows = WindowSet(tuple(each for part in parts_of(flights, settings) for each in part))
+        errors = windows.errors(own.free, own.values)
+        worse = block_errors(errors) - self.best.by_block
+        means = (float(each) for each in (np.concatenate(errors).mean(), worse.mean(), mean_error(worse)))
+        return TriedStructure(name, own.free.base.chosen, *means, len(own.values), 1.0)
 
 
 Progress = Callable[[Sequence[Judged], int], None]
@@ -370,6 +380,7 @@ def choose(
 _HELD = ("thrust_factor", "drag_factor", "thrust_law", INERTIA, PRODUCTS)
 """Blocks that make up for a body that is off, if they can."""
 
+_TRIM = "torque_bias"
 _OF_A_LOOP = ("slow_actuation", *LEARNED)
 """Blocks that explain what an autopilot does against gusts."""
 
@@ -564,3 +575,12 @@ def fitted_to_all(
     windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
     known = judged.fit.free.named(judged.fit.values)
     return fit(judged.structure.free(vehicle, groups), windows, known, _STEPS, _TOLERANCE), windows
+
+
+def fitted_rotors(
+    body: VehicleSettings, lag_s: float, flights: Sequence[PlaybackFlight], settings: PlaybackSettings
+) -> tuple[Fitted, list[FitWindows]]:
+    """Fit the torque that is always there, which trims a vehicle, to a body that is held with rotors that only lag."""
+    windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
+    blocks = tuple(block for block in (_TRIM,) if block not in settings.leave_out)
+    return fit(JointNumbers(FreeNumbers(body, blocks, lag_s=lag_s)), windows, {}, _STEPS, _TOLERANCE), windows

@@ -26,7 +26,15 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import INERTIA, LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Kept, Progress, TriedStructure, choose, choose_again, fitted_to_all
+from cpfls_cli.playback.structure import (
+    Kept,
+    Progress,
+    TriedStructure,
+    choose,
+    choose_again,
+    fitted_rotors,
+    fitted_to_all,
+)
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.rotors import with_factors
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -155,22 +163,29 @@ def find_vehicle(
     fitted, windows = fitted_to_all(choice.chosen, begun, flights, settings, groups)
     loop = loop_and_plain(fitted.model, begun, own)
     constants = _identified(begun, own, given, settings, loop, fitted.model)
-    held = Held(begun, (), (), loop)
+    held, forecast = Held(begun, (), (), loop), None
     if loop.misses and constants is None:
         held = held_by_bounds(begun, loop, tuple(found_numbers(fitted, uncertainty(fitted, windows))))
-        choice = choose_again(held.vehicle, choice, own, settings, progress)
-        fitted, windows = fitted_to_all(choice.chosen, held.vehicle, flights, settings, groups)
-    solved, spread, forecast = fitted, uncertainty(fitted, windows), None
+        if loop.misses_alone:
+            choice = choose_again(held.vehicle, choice, own, settings, progress)
+            fitted, windows = fitted_to_all(choice.chosen, held.vehicle, flights, settings, groups)
+    tried = choice.tried
     if constants is not None:
         solved, spread, forecast = constants.fitted, constants.spread, fitted.model
+    elif loop.misses and not loop.misses_alone:
+        solved, along = fitted_rotors(held.vehicle, loop.lags_s[1], own, settings)
+        spread, forecast = uncertainty(solved, along), fitted.model
+        tried = (*tried, choice.judge("held", solved, own, settings))
+    else:
+        solved, spread = fitted, uncertainty(fitted, windows)
     model = replace(solved.model, vehicle=replace(solved.model.vehicle, unknown=()))
     numbers = (*sensed, *bodily(begun, (*held.numbers, *found_numbers(solved, spread))))
-    if forecast is None:
+    if constants is None:
         numbers = tuple(widened_by_loop(numbers, held.loop))
     gusts: FoundGusts | None = None
-    if forecast is not None or not loop.unexplained:
+    if constants is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
-        gusts = find_gusts(model, given, determined, identified=forecast is not None)
+        gusts = find_gusts(model, given, determined, identified=constants is not None)
     shares, airspeed = _shares(model, own)
     correlation = estimate_correlation(solved, spread)
     past = choice.complete and settings.history_s and not settings.quick
@@ -182,7 +197,7 @@ def find_vehicle(
         trades=(*held.trades, *_trades(solved.free.physical(solved.values), correlation)),
         # What was sensed, or is held, goes with no number of the fit.
         correlation=block_diag(np.eye(len(sensed)), held.correlation, correlation),
-        structures=choice.tried,
+        structures=tried,
         evaluated=choice.evaluated,
         complete=choice.complete,
         blocks=spread.blocks,
@@ -272,6 +287,9 @@ def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[
         # Of two numbers that are open by a factor of ten, by how much their ratio is.
         known = np.log(ANY) / np.hypot(np.log(ANY), np.log(high[2] / low[2]) / 2)
         traded = open_drag and known > _TRADED
+    if loop.lags_s[1] and not loop.misses_alone:
+        shorter, lag, longer = loop.lags_s.tolist()
+        numbers.append(FoundNumber("lag.time_constant_s", "s", lag, shorter, longer, np.nan, False, False))
     body = replace(with_factors(vehicle, thrust, drag), inertia_kg_m2=tuple(inertia.tolist()), unknown=())
     trades = (Trade("drag_factor", "inertia.Izz", float(known)),) if traded else ()
     return Held(body, tuple(numbers), trades, loop)

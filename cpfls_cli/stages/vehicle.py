@@ -91,8 +91,9 @@ _TRIED = {
     "everything": "all blocks",
     "nothing": "stated vehicle",
     "free": "chosen with any body",
+    "held": "body by bounds, rotors that only lag",
 }
-_MARKERS = {"chosen": "s", "best": "^", "added": "v", "everything": "D", "nothing": "x", "free": "P"}
+_MARKERS = {"chosen": "s", "best": "^", "added": "v", "everything": "D", "nothing": "x", "free": "P", "held": "P"}
 _PANELS = (
     *(("torque", "N m", each) for each in ("x (roll to the right)", "y (nose down)", "z (yaw to the left)")),
     *(("force", "N", each) for each in ("x (ahead)", "y (left)", "z (up)")),
