@@ -186,8 +186,8 @@ class Choice:
         windows = WindowSet(tuple(each for part in parts_of(flights, settings) for each in part))
         errors = windows.errors(own.free, own.values)
         worse = block_errors(errors) - self.best.by_block
-        means = (float(each) for each in (np.concatenate(errors).mean(), worse.mean(), mean_error(worse)))
-        return TriedStructure(name, own.free.base.chosen, *means, len(own.values), 1.0)
+        error, uncertain = float(np.concatenate(errors).mean()), float(mean_error(worse))
+        return TriedStructure(name, own.free.base.chosen, error, float(worse.mean()), uncertain, len(own.values), 1.0)
 
 
 Progress = Callable[[Sequence[Judged], int], None]
