@@ -393,7 +393,7 @@ def _trusted(run: Run, model: Path) -> Vehicle:
 
 def _missing(run: Run, record: Vehicle) -> str:
     """Say which flight would make a vehicle good."""
-    judged = record.held_out is not None or record.instruments is not None
+    judged = record.held_out is not None or record.instruments is not None or record.forecast is not None
     if record.verdict is Trust.NOT_JUDGED and not judged:
         return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
     return missing_flight(run, record)

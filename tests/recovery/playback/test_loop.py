@@ -150,3 +150,37 @@ def test_a_fit_that_explains_no_flight_leaves_a_body_by_bounds(truth, share, unk
     assert bool(found.trades) == (still and "drag_factor" in unknown)
     assert [each.name for each in found.structures].count("free") == 1
     assert len(found.correlation) == len(found.numbers)
+
+
+@pytest.mark.parametrize("truth", TRUTHS.values(), ids=TRUTHS)
+def test_in_gusts_a_body_by_bounds_has_rotors_that_only_lag_and_the_fit_stays_a_forecast(truth):
+    """What fits best takes an autopilot that answers gusts for rotors that are slow, and for a body."""
+    flown = gusty_flights(
+        [Flight(truth, GUSTS, path=path, bandwidth=12.0, commands=True) for path in range(4)], seconds=7.5
+    )
+    guessed = tuple(1.7 * each for each in truth.vehicle.inertia_kg_m2)
+    vehicle = replace(truth.vehicle, unknown=("inertia",), inertia_kg_m2=guessed)
+    named = ("lag", "delay", "slow_actuation", "linear_damping", "rotor_drag", "torque_bias")
+    settings = PlaybackSettings(
+        leave_out=tuple(block for block in blocks_of(vehicle) if block not in named),
+        search_windows=60,
+        folds=3,
+        quick=True,
+    )
+    found = find_vehicle(vehicle, [replace(each, setpoints={}) for each in flown], settings, lambda *_: None)
+    assert found.by_bounds
+    assert found.forecast is not None
+    assert [each.name for each in found.model.effects] == ["torque_bias"]
+    assert 0.01 <= found.model.response.lag_s <= 0.05
+    assert found.model.response.delay_s == 0
+    numbers = {number.name: number for number in found.numbers}
+    for name, true in zip(("Ixx", "Iyy"), truth.inertia, strict=False):
+        own = numbers[f"inertia.{name}"]
+        assert own.low < true < own.high
+        assert not own.determined
+        assert np.abs(np.log(own.value / true)) < np.log(1.6)
+    lag = numbers["lag.time_constant_s"]
+    assert lag.low <= truth.lag_s <= lag.high
+    # It forecasts no better, as in gusts the true vehicle does not; how well is said.
+    errors = {each.name: each.error for each in found.structures}
+    assert errors["chosen"] < errors["held"]
