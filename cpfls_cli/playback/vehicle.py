@@ -23,7 +23,7 @@ from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import ANY, LoopBounds, loop_and_plain
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import INERTIA, LAW, ROOM, Physical, needs_velocity
+from cpfls_cli.playback.parameters import INERTIA, LAG, LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import (
@@ -289,7 +289,7 @@ def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[
         traded = open_drag and known > _TRADED
     if loop.lags_s[1] and not loop.misses_alone:
         shorter, lag, longer = loop.lags_s.tolist()
-        numbers.append(FoundNumber("lag.time_constant_s", "s", lag, shorter, longer, np.nan, False, False))
+        numbers.append(FoundNumber(LAG, "s", lag, shorter, longer, np.nan, False, False))
     body = replace(with_factors(vehicle, thrust, drag), inertia_kg_m2=tuple(inertia.tolist()), unknown=())
     trades = (Trade("drag_factor", "inertia.Izz", float(known)),) if traded else ()
     return Held(body, tuple(numbers), trades, loop)
@@ -440,6 +440,9 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
     for number in numbers:
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above
+        if loop.misses and number.name == LAG:
+            # What fits a body that is off is another lag than the one that explains most.
+            ends = min(ends[0], float(loop.lags_s[0])), max(ends[1], float(loop.lags_s[2]))
         known = ends[1] <= KNOWN * ends[0] if number.name in factors else not loop.misses
         identified = number.name in carries or (known and not loop.shows_loop)
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and identified)
