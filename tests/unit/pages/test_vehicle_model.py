@@ -253,6 +253,17 @@ def test_a_body_that_is_held_between_bounds_is_known_as_far_as_they_are_narrow()
     assert wide.parameters["inertia_kg_m2.0"].reason == "bounds from 1.3e-05 to 2.7e-05 leave it open"
 
 
+def test_where_flights_show_the_loop_too_no_forecast_judges_a_body_by_bounds():
+    narrow, trades = ((1.3e-5, 2.3e-5), (1.4e-5, 2.5e-5)), (Trade("drag_factor", "inertia.Izz", 1.0),)
+    alone = bounded(*narrow, trades=trades, held_out=held_out(1.0))
+    both = replace(alone, forecast=alone.model)
+    assert (alone.forecast_verdict, alone.verdict) == (Trust.SIMULATION, Trust.SIMULATION)
+    assert (both.forecast_verdict, both.verdict) == (Trust.SIMULATION, Trust.NOT_JUDGED)
+    assert "and the rest was found with it." in " ".join(against(alone))
+    assert "with the lag that explains most." in " ".join(against(both))
+    assert any("`cpfls replay` plays" in line for line in texts(both))
+
+
 def test_a_body_that_bounds_enclose_stays_as_stated():
     assert "the body is held as stated" in " ".join(against(bounded()))
 
