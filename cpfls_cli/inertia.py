@@ -21,6 +21,9 @@ tenth then, less than a fifth of the usual gain margin of 6 dB."""
 KNOWN = 2.0
 """Ratio of the ends of an interval from which on a moment of inertia, or what is positive like it, is not known."""
 
+FLAT = 0.85
+"""Izz over the sum of Ixx and Iyy of a multirotor: 1 for a flat body, and no body has more."""
+
 MEASURED = 1.1
 """What a largest moment may have over the sum of the others: moments are measured, not exact."""
 

@@ -54,6 +54,7 @@ OF_TURNING = frozenset(FOUND_AS[key] for key in (DRAG, *INERTIA))
 
 _UNITS = {THRUST: "N s^2", DRAG: "N m s^2", LAG: "s", DELAY: "s", **dict.fromkeys(CENTRE, "m")}
 ON_BOUND = "at the limit of the search"
+BY_BOUNDS = "the middle of its bounds, whatever the autopilot answers"
 OF_NONE = "impossible for such a vehicle; it fits these flights, but is not a constant of the vehicle"
 
 STATED = (THRUST, DRAG, *INERTIA)
@@ -113,7 +114,7 @@ class Parameter(NamedTuple):
     def identified(self) -> str:
         """Whether the flights identify it, in a word."""
         if self.determined:
-            return "yes"
+            return "by bounds" if self.reason == BY_BOUNDS else "yes"
         if self.value is None:
             return "a guess"
         if self.low is None:
@@ -142,7 +143,7 @@ def parameters_of(vehicle: Vehicle) -> Iterator[Parameter]:
             number = vehicle.found[name]
             stated = number.stated if np.isfinite(number.stated) else None
             reason, possible = _reason(vehicle, number), name not in vehicle.impossible
-            why = reason or "found in flights"
+            why = reason or (BY_BOUNDS if vehicle.by_bounds and name in OF_TURNING else "found in flights")
             yield Parameter(key, number.value, unit, number.low, number.high, stated, not reason, why, possible)
         elif key in guesses:
             reason = "not known: neither velocity nor accelerometer separates thrust from weight"
@@ -164,8 +165,6 @@ def _reason(vehicle: Vehicle, number: FoundNumber) -> str:
         return ON_BOUND
     if vehicle.loop.shows_loop and alone:
         return "these flights show the loop, not the vehicle"
-    if vehicle.loop.misses and alone:
-        return "what was found does not explain these flights"
     if name in OF_TURNING and too_heavy(vehicle):
         return too_heavy(vehicle)
     if name in excess(vehicle):
@@ -176,6 +175,8 @@ def _reason(vehicle: Vehicle, number: FoundNumber) -> str:
     others = [second if first == name else first for first, second in pairs if name in (first, second)]
     if others:
         return f"only its ratio to {' and '.join(others)} is known: they trade against each other"
+    if vehicle.by_bounds and name in OF_TURNING:
+        return f"bounds from {number.low:.3g} to {number.high:.3g} leave it open"
     return "the flights say too little, the interval is too wide"
 
 
@@ -341,9 +342,10 @@ class Vehicle(VehicleFit, AnyModel):
         """
         identified = self.identifies_turning and not set(FOUND_AS.values()) & set(self.on_bound)
         if self.instruments is None:
-            identified = identified and self.identifies_yaw and not self.loop.misses
+            identified = identified and self.identifies_yaw
             return capped(
-                self._by_playback,
+                # Of flights that show the loop as well no forecast judges the vehicle.
+                self._by_playback if self.forecast is None else Trust.NOT_JUDGED,
                 self.contradictions,
                 loop=self.loop.shows_loop,
                 lacks=self.responses_off,

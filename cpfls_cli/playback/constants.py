@@ -20,7 +20,7 @@ from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, half_width, jackknife_co
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step, solve
 from cpfls_cli.estimation.first_stage import FOLDS
 from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
-from cpfls_cli.inertia import EXPLAINED, KNOWN, VISIBLE
+from cpfls_cli.inertia import EXPLAINED, FLAT, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, PastBalances, Sums, fitting_bands
 from cpfls_cli.playback.evaluation import JointNumbers
 from cpfls_cli.playback.fit import Fitted, Uncertainty
@@ -32,8 +32,6 @@ from cpfls_cli.vehicle.settings import VehicleSettings
 
 _LONGEST_S = 8.0
 """Length from which on a run identifies something in all bands."""
-_FLAT = 0.85
-"""Izz over the sum of Ixx and Iyy of a multirotor: 1 for a flat body, and no body has more."""
 _NOT_TRIED = "slow_actuation"
 """It answers for whatever is slow, and is no constant of the vehicle."""
 _STEPS, _SETTLED = 12, 1e-3
@@ -378,7 +376,7 @@ def _of_a_flat_body(free: JointNumbers, values: Array) -> float:
     """Give the number of Izz that goes with those of Ixx and Iyy: a wrong one would turn the body as it rolls."""
     started = np.array(free.base.vehicle.inertia_kg_m2[:3])
     roll, pitch = started[:2] * np.exp(values[[free.index[name] for name in LOG_INERTIA[:2]]])
-    return float(np.log(_FLAT * (roll + pitch) / started[2]))
+    return float(np.log(FLAT * (roll + pitch) / started[2]))
 
 
 def _shares(ztx: Array) -> tuple[Array, Array]:

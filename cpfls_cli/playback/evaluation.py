@@ -83,7 +83,7 @@ class ParameterPoint:
         """Response of the rotors."""
         return RotorResponse(
             delay_s=self.get(DELAY, 0.0),
-            lag_s=self.get(LAG, 0.0),
+            lag_s=self.get(LAG, self.free.lag_s),
             slow_roll_pitch=self.get(SLOW_SHARES[0], 0.0),
             slow_yaw=self.get(SLOW_SHARES[1], 0.0),
             slow_s=float(np.exp(self.get(SLOW, float(np.log(RotorResponse().slow_s))))),

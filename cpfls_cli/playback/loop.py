@@ -65,12 +65,9 @@ class LoopBounds(NamedTuple):
     missed: Annotated[
         Array, _by_axis("share explained by the model that was found, where rotors that only lag explain much more")
     ] = np.full(3, np.nan)
-    enclosed: Annotated[
-        Array,
-        About(
-            "bounds on a moment of inertia by rotors that only lag, there", ("end", "axis"), "kg m^2", BODY, gaps=True
-        ),
-    ] = np.full((2, 3), np.nan)
+    lags_s: Annotated[
+        Array, About("lag of these rotors, after the next shorter and before the next longer one tried", ("3",), "s")
+    ] = np.zeros(3)
 
     @property
     def shows_loop(self) -> bool:
@@ -83,8 +80,13 @@ class LoopBounds(NamedTuple):
         return bool(np.isfinite(self.missed[:2]).any())
 
     @property
+    def misses_alone(self) -> bool:
+        """Whether that model is all that is wrong: rotors that only lag explain the flights, and so show no loop."""
+        return self.misses and not (self.explained[:2] < EXPLAINED).any()
+
+    @property
     def unexplained(self) -> bool:
-        """Whether numbers may be none of the vehicle's: those of the loop, or of a model that explains no flight."""
+        """Whether numbers of a fit may be none of the vehicle's: those of the loop, or of what explains no flight."""
         return self.shows_loop or self.misses
 
     @property
@@ -119,24 +121,26 @@ def loop_bounds(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> LoopB
 def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> LoopBounds:
     """Bound as `loop_bounds` does, and judge flights by what explains them best: a model, or rotors that only lag.
 
-    A model that was found and is wrong explains little of flights that show the vehicle well.
+    A model that was found and is wrong explains little of flights that show the vehicle well. The bounds are then those
+    of the rotors, in the stated moments of inertia, about yaw in their ratio to the drag factor; not finite where any
+    body would do.
     """
     found = loop_bounds(model, flights)
     if not found.shows_loop:
         return found
     known = np.isfinite(found.by_band[:, :2])
-    plain = [bounds for bounds in _plain_bounds(vehicle, flights) if np.isfinite(bounds.by_band[:, :2])[known].all()]
-    best = largest([found, *plain], lambda bounds: bounds.least)
+    tried = enumerate(_plain_bounds(vehicle, flights))
+    plain = [(at, bounds) for at, bounds in tried if np.isfinite(bounds.by_band[:, :2])[known].all()]
+    at, best = largest([(0, found), *plain], lambda each: each[1].least)
     better = found._replace(explained=best.explained, by_band=best.by_band)
     left = 1 - found.explained[:2]
     far = (left > 1 - EXPLAINED) & less(1 - best.explained[:2], _LEAVES_LESS * left)
     if best.shows_loop and not far.any():
         return better
-    # Of yaw torque and inertia a vehicle whose drag factor is open shows the ratio alone.
-    shown = [True, True, "drag_factor" not in vehicle.unknown]
-    bounded = shown & (best.low > 1 / ANY) & (best.high < ANY)
-    ends = np.array([best.low / _FORMULAS, best.high * _FORMULAS]) * vehicle.inertia_kg_m2[:3]
-    return better._replace(missed=found.explained, enclosed=np.where(bounded, ends, np.nan))
+    bounded = (best.low > 1 / ANY) & (best.high < ANY)
+    low, high = np.where(bounded, [best.low / _FORMULAS, best.high * _FORMULAS], np.nan)
+    lags = np.array([_LAGS[max(at - 1, 0)], _LAGS[at], (*_LAGS, 2 * _LAGS[-1])[at + 1]])
+    return better._replace(missed=found.explained, low=low, high=high, lags_s=lags)
 
 
 def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight], logged_hz: float) -> bool:

@@ -197,12 +197,13 @@ class FreeNumbers:
     """The numbers of a vehicle that are free, and what each adds to torque and force.
 
     `chosen` are blocks besides those of what is not known of the vehicle; `rules` are those of the remainder, where it
-    is among them.
+    is among them; `lag_s` is the lag of the rotors where that is not free.
     """
 
     vehicle: VehicleSettings
     chosen: tuple[str, ...]
     rules: Rules = _NO_RULES
+    lag_s: float = 0.0
 
     @cached_property
     def blocks(self) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ from cpfls_cli.playback.fit import (
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.parameters import INERTIA, LEARNED, FreeNumbers, Rules, blocks_of, needs_velocity
+from cpfls_cli.playback.parameters import INERTIA, LEARNED, PRODUCTS, FreeNumbers, Rules, blocks_of, needs_velocity
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending, at_most, less, smallest
@@ -128,14 +128,14 @@ class Judged:
         return float(difference.mean()), float(mean_error(difference))
 
 
-BASELINES = ("chosen", "best", "added", "everything", "nothing")
+BASELINES = ("chosen", "best", "added", "everything", "nothing", "free")
 """What is listed of a choice, by its attributes."""
 
 
 class TriedStructure(NamedTuple):
     """A structure of the Pareto front, or a baseline, judged on the flights kept aside."""
 
-    name: Annotated[str, About("chosen, best, added, everything, nothing, or front")]
+    name: Annotated[str, About("chosen, best, added, everything, nothing, free, held, or front")]
     blocks: Annotated[tuple[str, ...], About("its blocks", ("block",))]
     error: Annotated[float, About("mean error of the windows kept aside; about 1.1 for rates that stay")]
     worse: Annotated[float, About("error less that of the best")]
@@ -150,7 +150,8 @@ class Choice:
 
     `chosen` has the fewest numbers within one standard error of the best. `added` (named effects added to the stated
     vehicle alone), `everything` and `nothing` are baselines, None where the search was stopped before; `front` is not
-    dominated in error, numbers and condition number, by number; `evaluated` counts the structures judged.
+    dominated in error, numbers and condition number, by number; `judged` are all structures, and `free` is what was
+    chosen before the body was held.
     """
 
     chosen: Judged
@@ -159,8 +160,14 @@ class Choice:
     everything: Judged | None
     nothing: Judged
     front: tuple[Judged, ...]
-    evaluated: int
+    judged: tuple[Judged, ...]
     complete: bool
+    free: Judged | None = None
+
+    @property
+    def evaluated(self) -> int:
+        """How many structures were judged."""
+        return len(self.judged)
 
     @property
     def tried(self) -> tuple[TriedStructure, ...]:
@@ -171,6 +178,16 @@ class Choice:
             for name, own in [*baselines, *(("front", own) for own in self.front)]
             for worse, uncertain in [own.worse_than(self.best)]
         )
+
+    def judge(
+        self, name: str, own: FittedNumbers, flights: Sequence[PlaybackFlight], settings: PlaybackSettings
+    ) -> TriedStructure:
+        """Judge numbers that another way found on the same windows."""
+        windows = WindowSet(tuple(each for part in parts_of(flights, settings) for each in part))
+        errors = windows.errors(own.free, own.values)
+        worse = block_errors(errors) - self.best.by_block
+        error, uncertain = float(np.concatenate(errors).mean()), float(mean_error(worse))
+        return TriedStructure(name, own.free.base.chosen, error, float(worse.mean()), uncertain, len(own.values), 1.0)
 
 
 Progress = Callable[[Sequence[Judged], int], None]
@@ -357,7 +374,29 @@ def choose(
         complete = False
     known, (judged, best, chosen) = bench.known, _preferred(bench)
     everything, nothing = known.get(Structure(blocks)), known[Structure(())]
-    return Choice(chosen, best, added, everything, nothing, _front(judged), len(judged), complete)
+    return Choice(chosen, best, added, everything, nothing, _front(judged), tuple(judged), complete)
+
+
+_HELD = ("thrust_factor", "drag_factor", "thrust_law", INERTIA, PRODUCTS)
+"""Blocks that make up for a body that is off, if they can."""
+
+_TRIM = "torque_bias"
+_OF_A_LOOP = ("slow_actuation", *LEARNED)
+"""Blocks that explain what an autopilot does against gusts."""
+
+
+def choose_again(
+    held: VehicleSettings, first: Choice, flights: Sequence[PlaybackFlight], settings: PlaybackSettings, stop: Progress
+) -> Choice:
+    """Search for the structure of a vehicle whose body is held, after a first search that found a wrong one.
+
+    Only named effects are tried, and responses of the rotors that no autopilot makes. `stop` hears of the first search
+    alone: it can go on from there.
+    """
+    settings = replace(settings, leave_out=(*settings.leave_out, *_HELD, *_OF_A_LOOP))
+    found = choose(held, flights, settings, lambda *_: stop(first.judged, len(first.judged)))
+    complete = first.complete and found.complete
+    return replace(found, free=first.chosen, judged=(*first.judged, *found.judged), complete=complete)
 
 
 def _grow(bench: _Bench, blocks: tuple[str, ...]) -> Judged:
@@ -526,17 +565,22 @@ def _front(judged: Sequence[Judged]) -> tuple[Judged, ...]:
 
 
 def fitted_to_all(
-    structure: Structure,
+    judged: Judged,
     vehicle: VehicleSettings,
     flights: Sequence[PlaybackFlight],
     settings: PlaybackSettings,
-    start: Fitted,
     groups: tuple[Group, ...] = (),
 ) -> tuple[Fitted, list[FitWindows]]:
-    """Fit a structure to all training flights, those of other configurations as well, with windows close together.
-
-    `start` is the same structure fitted to some of them.
-    """
+    """Fit a structure to all training flights, those of other configurations as well, with windows close together."""
     windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
-    known = start.free.named(start.values)
-    return fit(structure.free(vehicle, groups), windows, known, _STEPS, _TOLERANCE), windows
+    known = judged.fit.free.named(judged.fit.values)
+    return fit(judged.structure.free(vehicle, groups), windows, known, _STEPS, _TOLERANCE), windows
+
+
+def fitted_rotors(
+    body: VehicleSettings, lag_s: float, flights: Sequence[PlaybackFlight], settings: PlaybackSettings
+) -> tuple[Fitted, list[FitWindows]]:
+    """Fit the torque that is always there, which trims a vehicle, to a body that is held with rotors that only lag."""
+    windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
+    blocks = tuple(block for block in (_TRIM,) if block not in settings.leave_out)
+    return fit(JointNumbers(FreeNumbers(body, blocks, lag_s=lag_s)), windows, {}, _STEPS, _TOLERANCE), windows

@@ -13,21 +13,30 @@ from scipy.linalg import block_diag
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
-from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others
-from cpfls_cli.playback.constants import UsedInstruments, find_constants
+from cpfls_cli.inertia import FLAT, INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others
+from cpfls_cli.playback.constants import Constants, UsedInstruments, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.evaluation import OF_A_WEIGHT, Group, JointNumbers
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
-from cpfls_cli.playback.loop import LoopBounds, loop_and_plain
+from cpfls_cli.playback.loop import ANY, LoopBounds, loop_and_plain
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import LAW, ROOM, Physical, needs_velocity
+from cpfls_cli.playback.parameters import INERTIA, LAG, LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.structure import Kept, Progress, TriedStructure, choose, fitted_to_all
+from cpfls_cli.playback.structure import (
+    Kept,
+    Progress,
+    TriedStructure,
+    choose,
+    choose_again,
+    fitted_rotors,
+    fitted_to_all,
+)
 from cpfls_cli.result import About, about, part, result
+from cpfls_cli.vehicle.rotors import with_factors
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _TRADED = 0.95
@@ -132,6 +141,11 @@ class VehicleFit:
     others: Mapping[str, VehicleModel] = field(default_factory=dict)
     """Other configurations, by name of the group."""
 
+    @property
+    def by_bounds(self) -> bool:
+        """Whether its body is held in the middle of bounds, see `held_by_bounds`."""
+        return self.loop.misses and self.instruments is None
+
 
 def find_vehicle(
     vehicle: VehicleSettings,
@@ -143,56 +157,147 @@ def find_vehicle(
     """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`."""
     own = [flight for flight in flights if not flight.group]
     begun, sensed = carrying_weight(vehicle, own)
-    choice = choose(begun, own, settings, progress, kept)
-    chosen = choice.chosen
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
-    fitted, windows = fitted_to_all(chosen.structure, begun, flights, settings, chosen.fit, groups)
-    loop, given = loop_and_plain(fitted.model, begun, own), instruments(own)
-    constants = find_constants(begun, own, given, settings.leave_out)
-    if loop.unexplained and (constants is None or not constants.identified):
-        constants = find_constants(begun, own, given, settings.leave_out, past=True) or constants
-    # Where instruments find the same body the fit is the vehicle's, and takes more from the flights.
-    if constants is not None and not (loop.unexplained or constants.contradict(fitted.model.body.inertia)):
-        constants = None
-    if constants is not None and constants.identified:
+    choice, given = choose(begun, own, settings, progress, kept), instruments(own)
+    fitted, windows = fitted_to_all(choice.chosen, begun, flights, settings, groups)
+    loop = loop_and_plain(fitted.model, begun, own)
+    constants = _identified(begun, own, given, settings, loop, fitted.model)
+    held, forecast = Held(begun, (), (), loop), None
+    if loop.misses and constants is None:
+        held = held_by_bounds(begun, loop, tuple(found_numbers(fitted, uncertainty(fitted, windows))))
+        if loop.misses_alone:
+            choice = choose_again(held.vehicle, choice, own, settings, progress)
+            fitted, windows = fitted_to_all(choice.chosen, held.vehicle, flights, settings, groups)
+    tried = choice.tried
+    if constants is not None:
         solved, spread, forecast = constants.fitted, constants.spread, fitted.model
+    elif loop.misses and not loop.misses_alone:
+        solved, along = fitted_rotors(held.vehicle, loop.lags_s[1], own, settings)
+        spread, forecast = uncertainty(solved, along), fitted.model
+        tried = (*tried, choice.judge("held", solved, own, settings))
     else:
-        solved, spread, forecast = fitted, uncertainty(fitted, windows), None
+        solved, spread = fitted, uncertainty(fitted, windows)
     model = replace(solved.model, vehicle=replace(solved.model.vehicle, unknown=()))
-    numbers = (*sensed, *bodily(begun, tuple(found_numbers(solved, spread))))
-    if forecast is None:
-        numbers = tuple(widened_by_loop(numbers, loop))
+    numbers = (*sensed, *bodily(begun, (*held.numbers, *found_numbers(solved, spread))))
+    if constants is None:
+        numbers = tuple(widened_by_loop(numbers, held.loop))
     gusts: FoundGusts | None = None
-    if forecast is not None or not loop.unexplained:
+    if constants is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
-        gusts = find_gusts(model, given, determined, identified=forecast is not None)
+        gusts = find_gusts(model, given, determined, identified=constants is not None)
     shares, airspeed = _shares(model, own)
     correlation = estimate_correlation(solved, spread)
-    used = None if forecast is None or constants is None else constants.used
     past = choice.complete and settings.history_s and not settings.quick
     return VehicleFit(
         model=replace(model, gusts=None if gusts is None else gusts.gusts),
         numbers=numbers,
         shares=shares,
         airspeed_m_s=airspeed,
-        trades=tuple(_trades(solved.free.physical(solved.values), correlation)),
-        # What was sensed goes with no number of the fit.
-        correlation=block_diag(np.eye(len(sensed)), correlation),
-        structures=choice.tried,
+        trades=(*held.trades, *_trades(solved.free.physical(solved.values), correlation)),
+        # What was sensed, or is held, goes with no number of the fit.
+        correlation=block_diag(np.eye(len(sensed)), held.correlation, correlation),
+        structures=tried,
         evaluated=choice.evaluated,
         complete=choice.complete,
         blocks=spread.blocks,
         guessed=tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
         differences=tuple(differences(fitted, uncertainty(fitted, windows))) if groups else (),
-        loop=loop,
-        instruments=used,
+        loop=held.loop,
+        instruments=None if constants is None else constants.used,
         forecast=None if forecast is None else replace(forecast, vehicle=replace(forecast.vehicle, unknown=())),
         disturbance=gusts,
-        history=find_history(chosen, fitted, own, settings) if past else None,
+        history=find_history(choice.chosen, fitted, own, settings) if past else None,
         sources=given,
         others={group.name: fitted.free.at(fitted.values, group.name).model for group in groups},
     )
+
+
+def _identified(
+    vehicle: VehicleSettings,
+    flights: Sequence[PlaybackFlight],
+    given: Instruments,
+    settings: PlaybackSettings,
+    loop: LoopBounds,
+    fitted: VehicleModel,
+) -> Constants | None:
+    """Give the constants that instruments identify, where the fit is not the vehicle's as well."""
+    constants = find_constants(vehicle, flights, given, settings.leave_out)
+    if loop.unexplained and (constants is None or not constants.identified):
+        constants = find_constants(vehicle, flights, given, settings.leave_out, past=True)
+    if constants is None or not constants.identified:
+        return None
+    # Where instruments find the same body the fit is the vehicle's, and takes more from the flights.
+    return constants if loop.unexplained or constants.contradict(fitted.body.inertia) else None
+
+
+class Held(NamedTuple):
+    """A vehicle whose body is held, its numbers that were open before, and the loop's bounds on the body."""
+
+    vehicle: VehicleSettings
+    numbers: tuple[FoundNumber, ...]
+    trades: tuple[Trade, ...]
+    loop: LoopBounds
+
+    @property
+    def correlation(self) -> Array:
+        """Correlate the numbers: those that trade, entirely."""
+        names = [number.name for number in self.numbers]
+        traded = [{trade.first, trade.second} for trade in self.trades]
+        pairs = [[one == other or {one, other} in traded for one in names] for other in names]
+        return np.reshape(np.array(pairs, dtype=float), (len(names), len(names)))
+
+
+def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[FoundNumber]) -> Held:
+    """Hold the body of a vehicle in the middle of its bounds, where a fit explains no flight.
+
+    Moments of inertia stay as stated where all of these lie between their bounds. About yaw the bounds are those of the
+    drag factor where that is not known, or of its ratio to the moment, which is then that of a flat body. The thrust
+    factor is that of the fit, for it carries the weight, unless a law of the rotors carries a part. Numbers are given
+    as exact, for the loop widens them to the bounds (`widened_by_loop`); what has none is open by a factor of ten.
+    """
+    found, rotor = {number.name: number for number in fitted}, vehicle.rotors[0]
+    open_thrust, open_drag, open_body = (name in vehicle.unknown for name in ("thrust_factor", "drag_factor", INERTIA))
+    carries = open_thrust and LAW not in found
+    thrust = found["thrust_factor"].value / rotor.thrust_factor_n_s2 if carries else 1.0
+    low, high = np.array([loop.low, loop.high]) * [thrust, thrust, 1.0]
+    bounded, middle = np.isfinite(low), np.nan_to_num(np.sqrt(low * high), nan=1.0)
+    of_body = bounded & [True, True, not open_drag]
+    outside = of_body & ((low > 1) | (high < 1))
+    inertia = np.array(vehicle.inertia_kg_m2, dtype=float)
+    if open_body or outside.any():
+        inertia[:3] *= np.where(of_body, middle, 1.0)
+    if open_body and not of_body[2]:
+        inertia[2] = FLAT * inertia[:2].sum()
+    moved = inertia[:3] / vehicle.inertia_kg_m2[:3]
+    drag = float(moved[2] / middle[2]) if open_drag and bounded[2] else 1.0
+    ratio = [*moved[:2], moved[2] / drag]
+    loop, traded = loop._replace(low=low / ratio, high=high / ratio), False
+    numbers = []
+    if open_thrust:
+        number = _held_at("thrust_factor", "N s^2", rotor.thrust_factor_n_s2)
+        numbers.append(found["thrust_factor"] if carries else number)
+    if open_drag:
+        exact = bool(bounded[2]) and not (open_body or outside.any())
+        numbers.append(_held_at("drag_factor", "N m s^2", drag * rotor.drag_factor_n_m_s2, exact=exact))
+    if open_body or outside.any():
+        stated = [np.nan] * 3 if open_body else vehicle.inertia_kg_m2[:3]
+        rows = zip(INERTIA_PARAMETERS, inertia.tolist(), stated, of_body.tolist(), strict=False)
+        numbers += [_held_at(f"inertia.{name}", "kg m^2", value, own, exact=exact) for name, value, own, exact in rows]
+        # Of two numbers that are open by a factor of ten, by how much their ratio is.
+        known = np.log(ANY) / np.hypot(np.log(ANY), np.log(high[2] / low[2]) / 2)
+        traded = open_drag and known > _TRADED
+    if loop.lags_s[1] and not loop.misses_alone:
+        shorter, lag, longer = loop.lags_s.tolist()
+        numbers.append(FoundNumber(LAG, "s", lag, shorter, longer, np.nan, False, False))
+    body = replace(with_factors(vehicle, thrust, drag), inertia_kg_m2=tuple(inertia.tolist()), unknown=())
+    trades = (Trade("drag_factor", "inertia.Izz", float(known)),) if traded else ()
+    return Held(body, tuple(numbers), trades, loop)
+
+
+def _held_at(name: str, unit: str, value: float, stated: float = np.nan, *, exact: bool = False) -> FoundNumber:
+    factor = 1.0 if exact else ANY
+    return FoundNumber(name, unit, value, value / factor, value * factor, stated, exact, False)
 
 
 def carrying_weight(
@@ -323,9 +428,10 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
     """Widen the intervals of inertia and drag factor by what the loop leaves open.
 
     About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where
-    the flights show the loop, or are not explained, nothing is determined but what carries the weight, for every effect
-    answers with it: the thrust factor, where no law of the rotors found jointly with it carries a part of the weight.
-    The bounds are in moments of inertia of the model whose numbers these are.
+    the flights show the loop, or a body is held by bounds, nothing else is determined but what carries the weight, for
+    every effect answers with the loop, or with a body that is off: the thrust factor, where no law of the rotors found
+    jointly with it carries a part of the weight. Bounds of flights that show the loop determine no body. They are in
+    moments of inertia of the model whose numbers these are.
     """
     low, high = np.fmin(loop.low, 1.0), np.fmax(loop.high, 1.0)
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}
@@ -334,8 +440,11 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
     for number in numbers:
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above
-        known = ends[1] <= KNOWN * ends[0] if number.name in factors else True
-        identified = known and (number.name in carries or not loop.unexplained)
+        if loop.misses and number.name == LAG:
+            # What fits a body that is off is another lag than the one that explains most.
+            ends = min(ends[0], float(loop.lags_s[0])), max(ends[1], float(loop.lags_s[2]))
+        known = ends[1] <= KNOWN * ends[0] if number.name in factors else not loop.misses
+        identified = number.name in carries or (known and not loop.shows_loop)
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and identified)
 
 

@@ -393,7 +393,7 @@ def _trusted(run: Run, model: Path) -> Vehicle:
 
 def _missing(run: Run, record: Vehicle) -> str:
     """Say which flight would make a vehicle good."""
-    judged = record.held_out is not None or record.instruments is not None
+    judged = record.held_out is not None or record.instruments is not None or record.forecast is not None
     if record.verdict is Trust.NOT_JUDGED and not judged:
         return "The flight that is missing: one that is kept aside to judge it, `cpfls vehicle` with --held-out FLIGHT"
     return missing_flight(run, record)
@@ -405,9 +405,14 @@ def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tu
     intervals, stated, assumed = {}, list[str](), list[str]()
     for key in (*INERTIA[:3], THRUST, DRAG, LAG, DELAY):
         each = known[key]
-        if each.determined and each.value and each.low is not None and each.high is not None:
+        # A lag or a delay that flights leave open is open here too: nothing else is known of it.
+        used = each.determined or key in (LAG, DELAY)
+        if used and each.value and each.low is not None and each.high is not None:
             # An end at or below zero says no more than that the number is small.
             intervals[key] = (max(each.low / each.value, 0.1), max(each.high / each.value, 0.1))
+        elif record.by_bounds and key == INERTIA[2] and np.isfinite(record.loop.low[2]):
+            # About yaw the bounds are those of the ratio that control meets.
+            intervals[key] = float(record.loop.low[2]), float(record.loop.high[2])
         elif key in INERTIA[:3] and FOUND_AS[key] in record.not_determined:
             intervals[key] = _ASSUMED_GAIN
             stated.append(each.name)

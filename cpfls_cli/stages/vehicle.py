@@ -28,6 +28,7 @@ from cpfls_cli.artifacts.vehicle_model import (
     CENTRE,
     DELAY,
     DRAG,
+    FOUND_AS,
     INERTIA,
     LAG,
     OF_NONE,
@@ -89,8 +90,10 @@ _TRIED = {
     "added": "named effects added",
     "everything": "all blocks",
     "nothing": "stated vehicle",
+    "free": "chosen with any body",
+    "held": "body by bounds, rotors that only lag",
 }
-_MARKERS = {"chosen": "s", "best": "^", "added": "v", "everything": "D", "nothing": "x"}
+_MARKERS = {"chosen": "s", "best": "^", "added": "v", "everything": "D", "nothing": "x", "free": "P", "held": "P"}
 _PANELS = (
     *(("torque", "N m", each) for each in ("x (roll to the right)", "y (nose down)", "z (yaw to the left)")),
     *(("force", "N", each) for each in ("x (ahead)", "y (left)", "z (up)")),
@@ -150,6 +153,14 @@ def known_bands(bounds: LoopBounds, axis: int) -> tuple[Band, Band | None] | Non
     return first, last if best != worst else None
 
 
+def bounded(r: Vehicle) -> list[Parameter]:
+    """List the moments of inertia that were found between bounds; about yaw a drag factor that is open has them."""
+    known = np.isfinite(r.loop.low) & [True, True, FOUND_AS[DRAG] not in r.found]
+    return [
+        r.parameters[key] for key, own in zip(INERTIA, known.tolist(), strict=False) if own and FOUND_AS[key] in r.found
+    ]
+
+
 def shares_in_words(shares: Sequence[Share], first: int) -> str:
     """Compare what has a name with what is learned, next to the rotors: of torque from 0, of force from 3."""
     sizes = {each.name: float(np.linalg.norm(each.wrench[first : first + 3])) for each in shares}
@@ -166,7 +177,17 @@ WORDS: Mapping[str, Any] = {
     **MODEL_WORDS,
     **PLAYBACK_WORDS,
     **by_name(
-        excess, few, flown_by_hand, gust_words, is_learned, known_bands, log_faster, shown_slowly, _to_know, too_heavy
+        bounded,
+        excess,
+        few,
+        flown_by_hand,
+        gust_words,
+        is_learned,
+        known_bands,
+        log_faster,
+        shown_slowly,
+        _to_know,
+        too_heavy,
     ),
     "ACCEPTABLE": ACCEPTABLE,
     "ANY": ANY,

@@ -10,6 +10,7 @@ from cpfls_cli.artifacts.gate import Origin
 from cpfls_cli.artifacts.vehicle_model import Vehicle
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.export.numbers import weights_of
+from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
 from cpfls_cli.playback.rotors import RotorResponse
@@ -121,6 +122,20 @@ def vehicle_of(model, **changed):
         "loop": LoopBounds(0.99 * np.ones(3), 1.01 * np.ones(3), 0.98 * np.ones(3)),
     }
     return Vehicle(**given | changed)
+
+
+def held_out(velocity):
+    """Playback over half a second that is twice as good as its rivals, but for the velocity."""
+    horizon = np.linspace(0.02, 0.5, 25)
+
+    def prediction(rate, speed):
+        errors = {"body_rate": rate, "velocity": speed}
+        made = {name: Errors(mae=factor * horizon, rms_by_axis=np.zeros((25, 3))) for name, factor in errors.items()}
+        return Prediction(diverged=0, **made)
+
+    factors = {"model": (1.0, velocity), "nothing-moves": (2, 2), "rate-stays": (2, 2), "stated": (9, 9)}
+    models = {name: prediction(*own) for name, own in factors.items()}
+    return AlongFlights(horizon_s=horizon, models=models, flights=("other.h5",), windows=9)
 
 
 def write_vehicle(path, vehicle, config=ORIGIN.config, **more):

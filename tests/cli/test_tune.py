@@ -11,13 +11,14 @@ import yaml
 from cpfls_cli import page, store
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.vibration import Change
+from cpfls_cli.playback.vehicle import Trade
 from cpfls_cli.stage import loaded
 from cpfls_cli.tuning.gains import Gains
 from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import save
 from tests.builders.dataflash_logs import dataflash
 from tests.builders.looked import PLANTS, looked_flight, looked_plant
-from tests.builders.vehicle_models import write_vehicle
+from tests.builders.vehicle_models import held_out, number_of, write_vehicle
 
 ENDINGS = {"px4": ".params", "ardupilot": ".param", "betaflight": ".txt", "crazyflie": ".yaml"}
 
@@ -85,6 +86,44 @@ def test_gains_are_those_of_the_least_favourable_vehicle(gains, folder):
     assert all(axis.command_worst.disk_deg <= axis.command.disk_deg for axis in found.sets["proposed"].axes)
     assert found.hover_thrust == pytest.approx(0.363, abs=0.01)
     assert "THR_MDL_FAC" in found.parameters
+
+
+@pytest.mark.usefixtures("gains")
+def test_gains_of_a_body_by_bounds_keep_their_margins_between_them(cpfls, refuse, folder, tmp_path):
+    """About yaw between the bounds of the ratio to the drag factor; of a lag that is open, over what it can be."""
+    plain = found_vehicle(instrumented=False)
+    known = {each.name: each for each in plain.numbers}
+    held = ("inertia.Ixx", "inertia.Iyy", "inertia.Izz")
+    loop = plain.loop._replace(low=np.full(3, 0.75), high=np.full(3, 1.3), missed=np.full(3, 0.02))
+
+    def gains_of(wider):
+        ends = [(known[name].value * 0.75 / wider, known[name].value * 1.3 * wider) for name in held]
+        numbers = [known[name]._replace(low=low, high=high) for name, (low, high) in zip(held, ends, strict=True)]
+        numbers[2] = numbers[2]._replace(
+            low=known[held[2]].value / 10, high=known[held[2]].value * 10, determined=False
+        )
+        numbers = [each._replace(determined=each.determined and each.high < 2 * each.low) for each in numbers]
+        lag = known["lag.time_constant_s"]._replace(low=0.02, high=0.04, determined=False)
+        drag = number_of("drag_factor", determined=False)
+        own = replace(
+            plain,
+            numbers=(*numbers, lag, drag),
+            correlation=np.eye(5),
+            trades=(Trade("drag_factor", held[2], 1.0),),
+            loop=loop,
+            held_out=held_out(1.0),
+        )
+        return folder / "study.yaml", write_vehicle(tmp_path / f"{wider}.h5", own, STUDY), "--autopilot", "px4"
+
+    cpfls.done("tune", *gains_of(1.0), "-o", tmp_path / "gains.h5")
+    found, narrow = read(tmp_path / "gains.h5"), read(folder / "px4.h5")
+    assert [axis.plants for axis in found.sets["proposed"].axes] == [5, 5, 5]
+    assert found.falls_short["proposed"] == ()
+    for axis, other in zip(found.sets["proposed"].axes, narrow.sets["proposed"].axes, strict=True):
+        assert axis.command_worst.disk_deg < axis.command.disk_deg
+        assert axis.bandwidth_hz < other.bandwidth_hz
+    message = refuse("tune", *gains_of(1.1), "-o", tmp_path / "gains.h5", "--force")
+    assert "constants not determined; not identified: Ixx, Iyy" in " ".join(message)
 
 
 @pytest.mark.usefixtures("sketched")

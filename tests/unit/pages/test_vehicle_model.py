@@ -14,14 +14,13 @@ from cpfls_cli.pages.gap_words import BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import against, slow_words
 from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
-from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.vehicle import Trade
 from cpfls_cli.report.content import Plot, Table, Text, unfolded
 from cpfls_cli.result import plain
 from cpfls_cli.stages.vehicle import remainder_curves, vehicle
 from cpfls_cli.validation.trust import Trust, capped
-from tests.builders.vehicle_models import number_of, remainder, source_of_vehicle, vehicle_of, whole
+from tests.builders.vehicle_models import held_out, number_of, remainder, source_of_vehicle, vehicle_of, whole
 
 NAMES = ("inertia.Ixx", "rotor_drag.k_d", "remainder.0_0_0", "remainder_force.3_0_0", "remainder_force.3_0_1")
 LOOP = LoopBounds(np.array([0.21, 0.23, np.nan]), np.array([2.6, 2.4, np.nan]), np.array([0.45, 0.47, np.nan]))
@@ -221,25 +220,52 @@ def test_the_band_in_which_torque_explains_little_is_said_with_the_one_in_which_
     assert WHAT_TO_FLY not in by_hand
 
 
-def test_a_model_that_explains_less_than_its_rotors_alone_is_none_and_no_loop_is_blamed():
+def bounded(*ends, **changed):
+    """A vehicle whose body is held between bounds on the moments of inertia about roll and pitch."""
     loop = LoopBounds(
-        np.full(3, 0.1),
-        np.array([10.0, 10.0, np.nan]),
+        np.array([0.75, 0.77, np.nan]),
+        np.array([1.33, 1.3, np.nan]),
         np.array([0.85, 0.79, np.nan]),
         np.array([[2.5, 6.7], [0.63, 1.7]]),
         np.array([[0.85, 0.86, np.nan], [0.91, 0.79, np.nan]]),
         missed=np.array([0.01, 0.02, np.nan]),
-        enclosed=np.array([[1.3e-5, 1.4e-5, np.nan], [2.3e-5, 2.5e-5, np.nan]]),
     )
-    own = vehicle_of(whole(), loop=loop)
-    assert own.verdict == Trust.NOT_DETERMINED
-    assert "what was found does not explain these flights" in title(own)
-    (said,) = [line for line in against(own) if line.startswith("What was found")]
+    numbers = tuple(
+        number_of(f"inertia.{name}", np.sqrt(low * high), low, high, determined=high < 2 * low)
+        for name, (low, high) in zip(("Ixx", "Iyy"), ends, strict=False)
+    )
+    return vehicle_of(whole(), loop=loop, **{"numbers": numbers, "correlation": np.eye(len(numbers))} | changed)
+
+
+def test_a_body_that_is_held_between_bounds_is_known_as_far_as_they_are_narrow():
+    own = bounded((1.3e-5, 2.3e-5), (1.4e-5, 2.5e-5), trades=(Trade("drag_factor", "inertia.Izz", 1.0),))
+    assert (own.by_bounds, own.verdict) == (True, Trust.NOT_JUDGED)
+    assert "Ixx and Iyy are known by bounds alone" in title(own)
+    (said,) = [line for line in against(own) if line.startswith("What fits")]
     assert "its torque explains 1 % of roll and 2 % of pitch acceleration" in said
     assert "but a lag 85 % of the roll acceleration from 2.5 to 6.7 Hz (91 % from 0.63 to 1.7 Hz)" in said
-    inside = "Ixx lies between 1.3 × 10⁻⁵ and 2.3 × 10⁻⁵ and Iyy lies between 1.4 × 10⁻⁵ and 2.5 × 10⁻⁵ kg m². Its"
-    assert inside in said
-    assert "the loop" not in " ".join(against(own))
+    assert "(Ixx from 1.3 × 10⁻⁵ to 2.3 × 10⁻⁵ and Iyy from 1.4 × 10⁻⁵ to 2.5 × 10⁻⁵ kg m²)" in said
+    assert {own.parameters[key].identified for key in ("inertia_kg_m2.0", "inertia_kg_m2.1")} == {"by bounds"}
+    assert "the loop," not in " ".join(against(own))
+    wide = bounded((1.3e-5, 2.7e-5), (1.4e-5, 2.9e-5))
+    assert wide.verdict == Trust.NOT_DETERMINED
+    assert "bounds leave Ixx and Iyy open" in title(wide)
+    assert wide.parameters["inertia_kg_m2.0"].reason == "bounds from 1.3e-05 to 2.7e-05 leave it open"
+
+
+def test_where_flights_show_the_loop_too_no_forecast_judges_a_body_by_bounds():
+    narrow, trades = ((1.3e-5, 2.3e-5), (1.4e-5, 2.5e-5)), (Trade("drag_factor", "inertia.Izz", 1.0),)
+    alone = bounded(*narrow, trades=trades, held_out=held_out(1.0))
+    both = replace(alone, forecast=alone.model)
+    assert (alone.forecast_verdict, alone.verdict) == (Trust.SIMULATION, Trust.SIMULATION)
+    assert (both.forecast_verdict, both.verdict) == (Trust.SIMULATION, Trust.NOT_JUDGED)
+    assert "and the rest was found with it." in " ".join(against(alone))
+    assert "with the lag that explains most." in " ".join(against(both))
+    assert any("`cpfls replay` plays" in line for line in texts(both))
+
+
+def test_a_body_that_bounds_enclose_stays_as_stated():
+    assert "the body is held as stated" in " ".join(against(bounded()))
 
 
 @pytest.mark.parametrize(
@@ -322,20 +348,6 @@ def test_constants_that_lack_something_are_not_good(given, number, trust):
     said = " ".join(evidence(own))
     assert ("Below 2.0 Hz they explain less" in said) == ("bands" in given)
     assert ("Other values of Ixx would explain about as much" in said) == (trust == Trust.NOT_DETERMINED)
-
-
-def held_out(velocity):
-    """Playback over half a second that is twice as good as its rivals, but for the velocity."""
-    horizon = np.linspace(0.02, 0.5, 25)
-
-    def prediction(rate, speed):
-        errors = {"body_rate": rate, "velocity": speed}
-        made = {name: Errors(mae=factor * horizon, rms_by_axis=np.zeros((25, 3))) for name, factor in errors.items()}
-        return Prediction(diverged=0, **made)
-
-    factors = {"model": (1.0, velocity), "nothing-moves": (2, 2), "rate-stays": (2, 2), "stated": (9, 9)}
-    models = {name: prediction(*own) for name, own in factors.items()}
-    return AlongFlights(horizon_s=horizon, models=models, flights=("other.h5",), windows=9)
 
 
 def on_bound(own):

@@ -169,5 +169,20 @@ def test_flights_that_show_the_loop_determine_what_carries_the_weight_alone():
     assert not any(number.determined for number in widened_by_loop(numbers, LOOP))
 
 
+def test_of_a_vehicle_whose_body_is_held_only_narrow_bounds_and_what_carries_the_weight_are_determined():
+    names = ("thrust_factor", "inertia.Ixx", "inertia.Iyy", "lag.time_constant_s", "rotor_drag.k_d")
+    numbers = [FoundNumber(name, "", 0.05, 0.05, 0.05, np.nan, True, False) for name in names]
+    held = LOOP._replace(
+        low=np.array([0.75, 0.6, np.nan]),
+        high=np.array([1.3, 1.7, np.nan]),
+        missed=np.full(3, 0.02),
+        lags_s=np.array([0.02, 0.05, 0.1]),
+    )
+    found = {number.name: number for number in widened_by_loop(numbers, held)}
+    assert [name for name, number in found.items() if number.determined] == ["thrust_factor", "inertia.Ixx"]
+    assert (found["inertia.Ixx"].low, found["inertia.Ixx"].high) == pytest.approx((0.0375, 0.065))
+    assert (found["lag.time_constant_s"].low, found["lag.time_constant_s"].high) == (0.02, 0.1)
+
+
 def replace_explained(bounds, share):
     return bounds._replace(explained=np.full(3, share))
