@@ -312,7 +312,7 @@ class _Traced:
 
     def inputs(self, name: str, count: int) -> tuple[Symbol, ...]:
         """Make arguments with one value for each rotor."""
-        return self.graph.inputs(name, count, by_rotor=True)
+        return self.graph.inputs(name, count, rotors=len(self.free.vehicle.rotors))
 
 
 @lru_cache(maxsize=256)
@@ -328,7 +328,7 @@ def traced_step(
     push = own.graph.inputs("push", 6 if pushed else 0)
     step = own.flown.stepped(state, Rotors(rotors[0], rotors[1], rotors[2], push or None), period, translates)
     arguments = {"state": state, "rotors": rotors, "push": push}
-    return traced_in_two(own.graph, ("number", (period, *own.values)), arguments, step[:2])
+    return traced_in_two(own.graph, ("number", (period, *own.values)), arguments, step[:2], short=True)
 
 
 @lru_cache(maxsize=256)

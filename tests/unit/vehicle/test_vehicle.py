@@ -167,7 +167,7 @@ def test_derivatives_are_written_as_numbers_with_derivatives_have_them():
         return Tangent(k, {0: 1.0}), Tangent(x, {1: 1.0})
 
     graph = Graph()
-    (k,), (x,), (w,) = graph.inputs("k", 1), graph.inputs("x", 1), graph.inputs("w", 1, by_rotor=True)
+    (k,), (x,), (w,) = graph.inputs("k", 1), graph.inputs("x", 1), graph.inputs("w", 1, rotors=3)
     found = of_rotors(array_symbols(3), *differentiated(k, x), w)
     slopes = [tuple(each.by[place] for place in (0, 1) if place in each.by) for each in found]
     written = traced_in_two(graph, ("k", (k,)), {"x": (x,), "w": (w,)}, [*slopes, tuple(each.value for each in found)])
