@@ -214,8 +214,12 @@ class ParameterPoint:
 
     @property
     def _nothing(self) -> tuple[bool, ...]:
-        """Which numbers are 0: what they are factors of is not evaluated, only their derivatives are."""
-        return tuple((self.values == 0).tolist())
+        """Which numbers are 0: what they are factors of is not evaluated, only their derivatives are.
+
+        None where they are few: a function for each such set takes longer to make than what it leaves out.
+        """
+        nothing = self.values == 0
+        return tuple((nothing & (2 * nothing.sum() >= len(nothing))).tolist())
 
     @cached_property
     def polynomial(self) -> Flown:
