@@ -174,7 +174,7 @@ def test_names_that_make_no_forecast_come_with_what_does():
     assert next_steps(lost) == f"{said}`cpfls vehicle` looks for one that forecasts."
     # No vehicle comes of rotors that are logged rarely.
     slowly = {name: replace(each, slow_rotors="logged slowly") for name, each in lost.recorded.items()}
-    assert next_steps(replace(lost, recorded=slowly)) == f"{said}log the rotors faster, as said above."
+    assert next_steps(replace(lost, recorded=slowly)) == f"{said}log the rotors at 100 Hz or faster."
     winning = made.played_pair(body_rate=(0.2, 0.3, 0.3, 0.6), attitude=(0.5, 0.3, 0.3, 0.7))
     assert "cpfls vehicle" not in next_steps(diagnosis("PARTIAL", playback=winning))
 
