@@ -355,7 +355,7 @@ class _InPlace:
                 self._free[wide].append(self._text[place])
 
 
-def _arrays_of(size: int, plain: int, wide: int, rotors: int, constants: Sequence[Array]) -> list[Array]:
+def _arrays_of(size: int, plain: int, wide: int, rotors: int, constants: Sequence[Array]) -> list[Any]:
     """Make the arrays that a function computes in; those with one value for each rotor, then their rows."""
     of_rotors = [np.empty((rotors, size)) for _ in range(wide)]
     spread = (np.array(np.broadcast_to(each, (rotors, size))) for each in constants)
