@@ -48,6 +48,11 @@ _NAMES = {
 }
 
 _FOUND_NAMES = {found: _NAMES[key] for key, found in FOUND_AS.items()}
+_FOUND_NAMES |= {
+    "slow_actuation.roll_pitch": "share of the slow pole in roll and pitch",
+    "slow_actuation.yaw": "share of the slow pole in yaw",
+    "slow_actuation.slow_s": "time constant of the slow pole",
+}
 
 OF_TURNING = frozenset(FOUND_AS[key] for key in (DRAG, *INERTIA))
 """Numbers of a fit that are known only as far as the torques are that turn the vehicle."""

@@ -214,8 +214,12 @@ class ParameterPoint:
 
     @property
     def _nothing(self) -> tuple[bool, ...]:
-        """Which numbers are 0: what they are factors of is not evaluated, only their derivatives are."""
-        return tuple((self.values == 0).tolist())
+        """Which numbers are 0: what they are factors of is not evaluated, only their derivatives are.
+
+        None where they are few: a function for each such set takes longer to make than what it leaves out.
+        """
+        nothing = self.values == 0
+        return tuple((nothing & (2 * nothing.sum() >= len(nothing))).tolist())
 
     @cached_property
     def polynomial(self) -> Flown:
@@ -312,7 +316,7 @@ class _Traced:
 
     def inputs(self, name: str, count: int) -> tuple[Symbol, ...]:
         """Make arguments with one value for each rotor."""
-        return self.graph.inputs(name, count, by_rotor=True)
+        return self.graph.inputs(name, count, rotors=len(self.free.vehicle.rotors))
 
 
 @lru_cache(maxsize=256)
@@ -328,7 +332,7 @@ def traced_step(
     push = own.graph.inputs("push", 6 if pushed else 0)
     step = own.flown.stepped(state, Rotors(rotors[0], rotors[1], rotors[2], push or None), period, translates)
     arguments = {"state": state, "rotors": rotors, "push": push}
-    return traced_in_two(own.graph, ("number", (period, *own.values)), arguments, step[:2])
+    return traced_in_two(own.graph, ("number", (period, *own.values)), arguments, step[:2], short=True)
 
 
 @lru_cache(maxsize=256)

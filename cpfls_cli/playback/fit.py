@@ -648,11 +648,10 @@ class Outlook:
 
     def errors(self, blocks: Collection[str]) -> Array:
         """Predict the mean errors of a model of some of the blocks, on each piece, shape (piece,)."""
-        loss, gradient, hessian, pieces = self._by_piece
-        own, errors = self._own(blocks), np.empty(len(loss))
-        for part, without in enumerate(self._without):
-            step, aside = self._step(without, own), pieces == part
-            errors[aside] = loss[aside] + (gradient[aside] + 0.5 * hessian[aside] @ step) @ step
+        own, errors = self._own(blocks), np.empty(len(self.sums.windows.owner))
+        for without, (aside, loss, gradient, hessian) in zip(self._without, self._by_part, strict=True):
+            step = self._step(without, own)
+            errors[aside] = loss + (gradient + 0.5 * (hessian @ step)) @ step
         return errors
 
     def start(self, blocks: Collection[str]) -> dict[str, float]:
@@ -661,19 +660,20 @@ class Outlook:
         return self.free.named(self.sums.values + self.free.scales * step)
 
     @cached_property
-    def _by_piece(self) -> tuple[Array, Array, Array, IntArray]:
-        """Mean loss of each piece, gradient and Hessian of it in scales, and the part that it is of."""
+    def _by_part(self) -> list[tuple[BoolArray, Array, Array, Array]]:
+        """Say of each part which pieces are of it, and give their mean loss, gradient and Hessian of it in scales."""
         sums, scale = self.sums, self.free.scales
         pieces = sums.windows.pieces
         count = np.concatenate([np.bincount(own) for own in pieces])
         loss = np.concatenate([np.bincount(own, each) for own, each in zip(pieces, sums.errors, strict=True)])
         gradient, hessian = sums.by_piece
-        return (
+        means = (
             loss / count,
             gradient * scale / count[:, None],
             hessian * scale[:, None] * scale / count[:, None, None],
-            self.part[sums.windows.owner],
         )
+        asides = (self.part[sums.windows.owner] == part for part in range(len(self._without)))
+        return [(aside, *(each[aside] for each in means)) for aside in asides]
 
     @cached_property
     def _without(self) -> list[FitPoint]:

@@ -6,12 +6,14 @@ What is computed twice is computed once, what no result needs is left out, and n
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from cpfls_cli.arrays import Array
 from cpfls_cli.vehicle.values import Each, Functions, Tangent, Value, differentiable, plus
 
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
@@ -33,6 +35,7 @@ class Graph:
         self._places: dict[tuple[Any, ...], int] = {}
         self.by_rotor: set[int] = set()
         """Arrays with one value for each rotor."""
+        self.rotors = 0
 
     def node(self, *operation: Any) -> Symbol:
         """Record an operation, or find it."""
@@ -56,10 +59,11 @@ class Graph:
         """Say what an operation gives, before it is recorded."""
         self._places[operation] = value.place
 
-    def inputs(self, name: str, count: int, *, by_rotor: bool = False) -> tuple[Symbol, ...]:
-        """Make arguments of the function that is traced."""
+    def inputs(self, name: str, count: int, *, rotors: int = 0) -> tuple[Symbol, ...]:
+        """Make arguments of the function that is traced, with one value for each of so many rotors."""
         made = tuple(self.node("input", f"{name}{index}") for index in range(count))
-        self.by_rotor.update(x.place for x in made if by_rotor)
+        self.by_rotor.update(x.place for x in made if rotors)
+        self.rotors = rotors or self.rotors
         return made
 
 
@@ -79,11 +83,14 @@ class Symbol:
 
     def made(self, name: str, *arguments: Value) -> Symbol:
         """Record an operation on numbers."""
-        return self.graph.node(name, *(self.graph.known(x).place for x in arguments))
+        known = self.graph.known
+        return self.graph.node(name, *[x.place if x.__class__ is Symbol else known(x).place for x in arguments])
 
     def by(self, name: str, a: Value, b: Value) -> Value:
         """Record an operation of which it is one side, unless another number makes it nothing."""
         other = a if b is self else b
+        if other.__class__ is Symbol:
+            return self._of_two(name, a, b)
         if isinstance(other, (Each, Tangent)):
             return NotImplemented
         if isinstance(other, (int, float)):
@@ -94,6 +101,17 @@ class Symbol:
             if other == 0 and (name == "*" or (name == "/" and a is other)):
                 return 0
         return self.made(name, a, b)
+
+    def _of_two(self, name: str, a: Symbol, b: Symbol) -> Symbol:
+        """Record an operation on symbols; what is subtracted is not made negative to be added."""
+        nodes, places = self.graph.nodes, (a.place, b.place)
+        if name in "+-":
+            if nodes[b.place][0] == "negative":
+                return self._of_two("-" if name == "+" else "+", a, Symbol(self.graph, nodes[b.place][1]))
+            if name == "+" and nodes[a.place][0] == "negative":
+                places = b.place, nodes[a.place][1]
+                name = "-"
+        return self.graph.node(name, *places)
 
     __add__, __radd__ = _operators("+")
     __sub__, __rsub__ = _operators("-")
@@ -204,35 +222,153 @@ def traced_in_two(
     first: tuple[str, Sequence[Symbol]],
     arguments: Mapping[str, Sequence[Symbol]],
     results: Sequence[Sequence[Value]],
+    *,
+    short: bool = False,
 ) -> Callable[..., Callable[..., Any]]:
     """Make a function of one argument that gives a function of the others, of arrays; see `traced`.
 
-    What depends on the first one alone is computed once.
+    What depends on the first one alone is computed once. `short`: of arrays of few values, for which it is worth longer
+    compiling.
     """
+    places = [[graph.known(x).place for x in group] for group in results]
     early = {x.place for x in first[1]}
     for place, (name, *inner) in enumerate(graph.nodes):
         if name in _GIVEN[1:] or (name not in _GIVEN and early.issuperset(inner)):
             early.add(place)
-    flat = [graph.known(x).place for group in results for x in group]
-    uses = _uses(graph, flat)
-    done = (place for place, node in enumerate(graph.nodes) if uses[place] and node[0] not in _GIVEN)
-    late = (graph.nodes[place][1:] for place in done if place not in early)
-    asked = {place for inner in late for place in inner if place in early} | early.intersection(flat)
-    kept = sorted(place for place in asked if graph.nodes[place][0] not in ("input", "number"))
-    lines, texts = written(graph, [Symbol(graph, place) for place in kept], ARRAYS)
-    lines += [f"known{place} = {text}" for place, text in zip(kept, texts, strict=True)]
-    step = python_source(graph, arguments, results, ARRAYS, {place: f"known{place}" for place in kept})
+    uses = _uses(graph, [*chain(*places)], early)
+    known = {place: f"known{place}" for place in sorted(early) if uses[place]}
+    lines, texts = written(graph, [Symbol(graph, place) for place in known], ARRAYS)
+    lines += [f"{name} = array({text})" for name, text in zip(known.values(), texts, strict=True)]
     unpacked = f"{', '.join(graph.nodes[x.place][1] for x in first[1])}, = {first[0]}" if first[1] else ""
-    body = "\n    ".join([unpacked, *lines, *step.splitlines(), "return step"])
+    if short:
+        step = [*_InPlace(graph, known, uses, places).written(arguments)]
+    else:
+        step = python_source(graph, arguments, results, ARRAYS, known).splitlines()
+    body = "\n    ".join([unpacked, *lines, *step, "return step"])
     return _compiled(f"def made({first[0]}):\n    {body}\n", arrays=True)["made"]  # type: ignore[no-any-return]
+
+
+_IN_PLACE = {name: name for name in ("negative", "sqrt", "exp", "sin", "cos", "floor")}
+_IN_PLACE |= {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "total": "add"}
+_IN_PLACE |= {"abs": "absolute", "atan2": "arctan2"}
+"""Functions of NumPy that write into an array that is there."""
+
+
+class _InPlace:
+    """A function of arrays that computes in arrays made once for a size, each again as soon as it is free.
+
+    A short operation of NumPy takes twice as long where it makes its result, and three times as long where one value
+    for all rotors meets one for each: those are computed rotor by rotor. What the function gives is made anew.
+    """
+
+    def __init__(
+        self, graph: Graph, known: Mapping[int, str], uses: list[int], results: Sequence[Sequence[int]]
+    ) -> None:
+        self._graph, self._known, self._uses, self._results = graph, known, uses, results
+        self._rotors, self._text, self._kept = range(graph.rotors), dict(known), {*chain(*results)}
+        self._lines: list[str] = []
+        # Names of arrays with one value, then of those with one for each rotor; all that were made, and those free.
+        self._made: tuple[dict[str, None], dict[str, None]] = {}, {}
+        self._free: tuple[list[str], list[str]] = [], []
+        # Inputs and constants that are taken rotor by rotor, and constants of rotors that are taken over the size.
+        self._split: dict[str, None] = {}
+        self._spread: dict[str, None] = {}
+        for place, (name, *inner) in enumerate(graph.nodes):
+            if self._uses[place] and place not in known:
+                self._text[place] = inner[0] if name == "input" else self._write(place, name, inner)
+
+    def written(self, arguments: Mapping[str, Sequence[Symbol]]) -> Iterator[str]:
+        """Write its lines."""
+        named = {name: [self._graph.nodes[x.place][1] for x in group] for name, group in arguments.items() if group}
+        rows = {name: _tuple(f"{name}_{row}" for row in self._rotors) for name in (*self._split, *self._made[1])}
+        constants = self._split.keys() & self._known.values()
+        yield from (f"{rows[name]} = [{name}[row, 0, ...] for row in {[*self._rotors]}]" for name in constants)
+        yield "room = {}"
+        yield f"def step({', '.join(arguments)}):"
+        yield from (f"    {', '.join(names)}, = {name}" for name, names in named.items())
+        plain, wide = self._made
+        if there := [*plain, *wide, *(rows[name] for name in wide), *(f"over_{name}" for name in self._spread)]:
+            size = f"{next(iter(named.values()))[0]}.shape[-1]"
+            counts = f"{len(plain)}, {len(wide)}, {len(self._rotors)}, {_tuple(self._spread)}"
+            yield f"    if {size} not in room:"
+            yield "        room.clear()"
+            yield f"        room[{size}] = arrays_of({size}, {counts})"
+            yield f"    {_tuple(there)} = room[{size}]"
+        yield from (f"    {rows[name]} = {name}" for name in self._split if name not in constants)
+        yield from (f"    {line}" for line in self._lines)
+        groups = (_tuple(self._text[place] for place in group) for group in self._results)
+        yield f"    return {_tuple(groups)}"
+
+    def _write(self, place: int, name: str, inner: Sequence[int]) -> str:
+        """Write an operation, and say where its result is."""
+        wide, kept, sums = place in self._graph.by_rotor, place in self._kept, name == "total"
+        if name not in _IN_PLACE or (wide and kept) or (sums and len(self._rotors) < 2):
+            self._lines.append(f"t{place} = {ARRAYS.written(name, [self._text[each] for each in inner])}")
+            self._release(inner)
+            return f"t{place}"
+        by_row = sums or (wide and any(x not in self._graph.by_rotor and x not in self._known for x in inner))
+        texts = [*zip(*map(self._rows, inner), strict=True)] if by_row else [tuple(self._over(x, wide) for x in inner)]
+        self._release(inner)
+        into = f"t{place}" if kept else self._taken(wide)
+        if sums:
+            (first,), (second,), *others = texts
+            texts = [(first, second), *((into, other) for (other,) in others)]
+        for row, operands in enumerate(texts):
+            own = f"{into}_{row}" if by_row and not sums else into
+            made = kept and row == 0
+            called = ", ".join(operands if made else (*operands, own))
+            self._lines.append(f"{f'{own} = ' if made else ''}{_IN_PLACE[name]}({called})")
+        return into
+
+    def _rows(self, place: int) -> list[str]:
+        """Name what there is for each rotor."""
+        text = self._text[place]
+        if place not in self._graph.by_rotor:
+            return [text] * len(self._rotors)
+        if text not in self._made[1]:
+            self._split[text] = None
+        return [f"{text}_{row}" for row in self._rotors]
+
+    def _over(self, place: int, wide: bool) -> str:
+        """Name an operand, a constant of rotors over the size."""
+        text = self._text[place]
+        if not wide or place not in self._known or place not in self._graph.by_rotor:
+            return text
+        self._spread[text] = None
+        return f"over_{text}"
+
+    def _taken(self, wide: bool) -> str:
+        """Name an array that is free."""
+        made, free = self._made[wide], self._free[wide]
+        if free:
+            return free.pop()
+        name = f"{'wide' if wide else 'one'}{len(made)}"
+        made[name] = None
+        return name
+
+    def _release(self, places: Sequence[int]) -> None:
+        """Free the arrays of what is not needed any more."""
+        for place in places:
+            self._uses[place] -= 1
+            wide = place in self._graph.by_rotor
+            if not self._uses[place] and self._text[place] in self._made[wide]:
+                self._free[wide].append(self._text[place])
+
+
+def _arrays_of(size: int, plain: int, wide: int, rotors: int, constants: Sequence[Array]) -> list[Any]:
+    """Make the arrays that a function computes in; those with one value for each rotor, then their rows."""
+    of_rotors = [np.empty((rotors, size)) for _ in range(wide)]
+    spread = (np.array(np.broadcast_to(each, (rotors, size))) for each in constants)
+    return [*(np.empty(size) for _ in range(plain)), *of_rotors, *(tuple(each) for each in of_rotors), *spread]
 
 
 @lru_cache(maxsize=32)
 def _compiled(source: str, arrays: bool = False) -> dict[str, Any]:
-    of_arrays = {name: getattr(np, _NUMPY.get(name, name)) for name in (*_FUNCTIONS, *_OF_ARRAYS)}
+    of_arrays = {name: getattr(np, _NUMPY.get(name, name)) for name in (*_FUNCTIONS, *_OF_ARRAYS, *_IN_PLACE.values())}
     names: dict[str, Any] = {
         **(of_arrays if arrays else _FUNCTIONS),
         "array": np.array,
+        "arrays_of": _arrays_of,
         # The method takes twice as long of few values.
         "sum_of": np.add.reduce,
         "inf": math.inf,

@@ -228,7 +228,9 @@ class _Fleet:
         self.still = np.zeros((self.flights, self.rotors))
         # As the model gives it to the last bit, its operations recorded once: in a quarter of the time.
         graph = Graph()
-        air, rate, rotors = (graph.inputs(name, 3, by_rotor=name == "rotors") for name in ("air", "rate", "rotors"))
+        air, rate, rotors = (
+            graph.inputs(name, 3, rotors=self.rotors * (name == "rotors")) for name in ("air", "rate", "rotors")
+        )
         wrench = replace(model.flown, functions=array_symbols(self.rotors)).wrench(air, rate, Rotors(*rotors))
         self.wrench = traced_in_two(graph, ("none", ()), {"air": air, "rate": rate, "rotors": rotors}, wrench)(())
 

@@ -84,6 +84,15 @@ def next_steps(found):
             "A parameter of the vehicle is wrong: Izz over yaw torque +24.0 % against the config.",
         ),
         (
+            {
+                "verdict": "AMBIGUOUS",
+                "named": ("com_offset", "motor_lag"),
+                "alternatives": (made.RIVAL, replace(made.RIVAL, name="command_delay", instead_of="motor_lag")),
+            },
+            "These flights cannot separate offset of the centre of mass from constant torque. Nor can they separate "
+            "motor lag from delay of the command.",
+        ),
+        (
             {"verdict": "UNEXPLAINED", "named": (), "closest": (made.effect(),)},
             "There is a gap that nothing in the catalogue explains.",
         ),
@@ -174,7 +183,7 @@ def test_names_that_make_no_forecast_come_with_what_does():
     assert next_steps(lost) == f"{said}`cpfls vehicle` looks for one that forecasts."
     # No vehicle comes of rotors that are logged rarely.
     slowly = {name: replace(each, slow_rotors="logged slowly") for name, each in lost.recorded.items()}
-    assert next_steps(replace(lost, recorded=slowly)) == f"{said}log the rotors faster, as said above."
+    assert next_steps(replace(lost, recorded=slowly)) == f"{said}log the rotors at 100 Hz or faster."
     winning = made.played_pair(body_rate=(0.2, 0.3, 0.3, 0.6), attitude=(0.5, 0.3, 0.3, 0.7))
     assert "cpfls vehicle" not in next_steps(diagnosis("PARTIAL", playback=winning))
 
@@ -331,6 +340,27 @@ def test_what_is_left_has_an_axis_a_cause_and_a_way_of_energy(left, said):
         f"In what it was fitted to: {said[0].lower()}{said[1:]}"
     )
     assert "Residual" not in screen(diagnosis())[1]
+
+
+def test_of_many_axes_that_are_left_the_worst_with_a_cause_is_shown_and_the_others_counted():
+    left = [("torque x", 9.0, None, 0.0, None, "neither"), ("force z", 2.2, None, 0.0, None, "neither")]
+    left.append(("torque z", 3.04, "speed", 0.4, None, "neither"))
+    _, facts, *_, below = screen(
+        diagnosis("UNEXPLAINED", named=(), unexplained=tuple(Unexplained(*each) for each in left))
+    )
+    assert facts["Residual"] == (
+        "In what it was fitted to: torque about z (yaw), 3.0 floors: follows speed most (40 % of it); 2 more, up to "
+        "9.0 floors."
+    )
+    assert dict(below)["Residual of each axis"].startswith("torque about x (roll), 9.0 floors: follows no one signal; ")
+
+
+def test_the_gap_of_many_channels_is_that_of_the_largest():
+    floors = np.array([9.0, 20.0, 30.0, 5.0, 40.0, 4.0])
+    _, facts, *_ = screen(diagnosis(gap=made.gap_change(floors, floors / 2)))
+    assert facts["Gap"] == (
+        "Held out, in noise floors: pitch torque 20 → 10, yaw torque 30 → 15, force y 40 → 20; 3 more."
+    )
 
 
 def test_the_closest_effects_are_not_the_answer_and_say_how_little_they_do():

@@ -162,19 +162,25 @@ def of_rotors(functions, k, x, w):
     return functions.total(lift**3), functions.total(limited / (2.0 + functions.sqrt(k * k))), angle - functions.cos(x)
 
 
-def test_derivatives_are_written_as_numbers_with_derivatives_have_them():
+@pytest.mark.parametrize("short", [False, True])
+def test_derivatives_are_written_as_numbers_with_derivatives_have_them(short):
     def differentiated(k, x):
         return Tangent(k, {0: 1.0}), Tangent(x, {1: 1.0})
 
     graph = Graph()
-    (k,), (x,), (w,) = graph.inputs("k", 1), graph.inputs("x", 1), graph.inputs("w", 1, by_rotor=True)
+    (k,), (x,), (w,) = graph.inputs("k", 1), graph.inputs("x", 1), graph.inputs("w", 1, rotors=3)
     found = of_rotors(array_symbols(3), *differentiated(k, x), w)
     slopes = [tuple(each.by[place] for place in (0, 1) if place in each.by) for each in found]
-    written = traced_in_two(graph, ("k", (k,)), {"x": (x,), "w": (w,)}, [*slopes, tuple(each.value for each in found)])
+    results = [*slopes, tuple(each.value for each in found)]
+    written = traced_in_two(graph, ("k", (k,)), {"x": (x,), "w": (w,)}, results, short=short)
 
     rng = np.random.default_rng(0)
     x, w = rng.normal(0.0, 1.0, 7), rng.normal(0.0, 1.0, (3, 7))
-    *by, values = written((0.4,))((x,), (w,))
+    function = written((0.4,))
+    *by, values = function((x,), (w,))
+    # What was given is not written into by what is computed later, also of other sizes.
+    function((x + 1.0,), (w - 1.0,))
+    function((x[:3],), (w[:, :3],))
     expected = of_rotors(ARRAYS, *differentiated(0.4, x), w)
     for own, value, each in zip(by, values, expected, strict=True):
         np.testing.assert_allclose(value, each.value, rtol=1e-13)
