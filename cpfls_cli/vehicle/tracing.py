@@ -270,7 +270,7 @@ class _InPlace:
         # Names of arrays with one value, then of those with one for each rotor; all that were made, and those free.
         self._made: tuple[dict[str, None], dict[str, None]] = {}, {}
         self._free: tuple[list[str], list[str]] = [], []
-        # Inputs and constants that are taken rotor by rotor, and constants of rotors that are taken over the size.
+        # What is taken rotor by rotor although it is none of these, and constants of rotors taken over the size.
         self._split: dict[str, None] = {}
         self._spread: dict[str, None] = {}
         for place, (name, *inner) in enumerate(graph.nodes):
@@ -280,8 +280,8 @@ class _InPlace:
     def written(self, arguments: Mapping[str, Sequence[Symbol]]) -> Iterator[str]:
         """Write its lines."""
         named = {name: [self._graph.nodes[x.place][1] for x in group] for name, group in arguments.items() if group}
-        rows = {name: _tuple(f"{name}_{row}" for row in self._rotors) for name in (*self._split, *self._made[1])}
-        constants = self._split.keys() & self._known.values()
+        rows = {name: self._names_of_rows(name) for name in (*self._split, *self._made[1])}
+        constants = (name for name in self._known.values() if name in self._split)
         yield from (f"{rows[name]} = [{name}[row, 0, ...] for row in {[*self._rotors]}]" for name in constants)
         yield "room = {}"
         yield f"def step({', '.join(arguments)}):"
@@ -294,7 +294,6 @@ class _InPlace:
             yield "        room.clear()"
             yield f"        room[{size}] = arrays_of({size}, {counts})"
             yield f"    {_tuple(there)} = room[{size}]"
-        yield from (f"    {rows[name]} = {name}" for name in self._split if name not in constants)
         yield from (f"    {line}" for line in self._lines)
         groups = (_tuple(self._text[place] for place in group) for group in self._results)
         yield f"    return {_tuple(groups)}"
@@ -325,9 +324,14 @@ class _InPlace:
         text = self._text[place]
         if place not in self._graph.by_rotor:
             return [text] * len(self._rotors)
-        if text not in self._made[1]:
+        if text not in self._made[1] and text not in self._split:
             self._split[text] = None
+            if place not in self._known:
+                self._lines.append(f"{self._names_of_rows(text)} = {text}")
         return [f"{text}_{row}" for row in self._rotors]
+
+    def _names_of_rows(self, text: str) -> str:
+        return _tuple(f"{text}_{row}" for row in self._rotors)
 
     def _over(self, place: int, wide: bool) -> str:
         """Name an operand, a constant of rotors over the size."""
