@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import half_width, jackknife_covariance
 
 _STEPS, _STEPS_LEFT_OUT = 60, 4
@@ -213,12 +213,17 @@ def _invertible(information: Array) -> Array:
     return information + _RIDGE * np.where(own == 0, 1.0, own)[..., None] * np.eye(information.shape[-1])
 
 
-def conditional_strength(normal: Normal, prior: Prior) -> Array:
+def conditional_strength(normal: Normal, prior: Prior, source: IntArray | None = None) -> Array:
     """Compute the F statistic of each number jointly with all others, shape (number,).
 
     What the instruments identify of a number, cleared of what identifies the others as far as the prior does not, over
     what chance would show of it; where that is not stated, over its scatter over blocks, with instruments that were
     found without the block.
+
+    Parameters
+    ----------
+    source : array, shape (block,), optional
+        Which equations a block has a part in; one scatters about the mean of its own. None: all are of the same.
 
     References
     ----------
@@ -233,7 +238,8 @@ def conditional_strength(normal: Normal, prior: Prior) -> Array:
     if normal.chance is not None:
         chance = np.einsum("ji,jk,ki->i", cleared, normal.chance, cleared)
         return np.asarray(explained / np.maximum(chance, _TINY))
-    scatter = np.sqrt(len(each)) * each.std(axis=0, ddof=1)
+    groups = [each] if source is None else [each[source == own] for own in np.unique(source)]
+    scatter = np.sqrt(sum(len(own) * own.var(axis=0, ddof=1) for own in groups))
     return np.asarray((explained / np.maximum(scatter, _TINY)) ** 2)
 
 

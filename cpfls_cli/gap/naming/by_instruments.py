@@ -272,10 +272,13 @@ def _sources(found: NamedFit, given: Instruments, held: BoolArray | None = None)
 
 def _strong_together(sources: list[_Source]) -> list[_Source]:
     """Keep of later sources the numbers that are identified where those of the others are free too."""
+    # Each source has blocks of its own; of those of the others it has nothing, which is no scatter.
+    flown = np.array([each.products.any(axis=(1, 2)) for each in sources])
+    known, source = flown.any(axis=0), flown.argmax(axis=0)
     while True:
         moving, equations = _together(sources)
-        normal = Normal(equations[:, moving[:, None], moving], equations[:, moving, -1])
-        strength = conditional_strength(normal, Prior.none(len(moving)))
+        normal = Normal(equations[:, moving[:, None], moving][known], equations[:, moving, -1][known])
+        strength = conditional_strength(normal, Prior.none(len(moving)), source[known])
         unclear = np.flatnonzero((strength <= STRONG) & ~sources[0].numbers[moving])
         if not len(unclear):
             return sources

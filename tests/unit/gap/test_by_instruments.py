@@ -166,16 +166,16 @@ def test_the_hook_of_a_load_follows_its_torque_and_mass(monkeypatch):
     assert np.ptp(left_out[:, -1]) > 0
 
 
-def by_each(numbers, rng):
+def by_each(numbers, rng, blocks=(BLOCKS, BLOCKS)):
     """Two numbers in gusts, of which each has its own source, whose products are of blocks of its own."""
     sources = []
-    for number in range(2):
-        known = rng.standard_normal((BLOCKS, 5 * WINDOWS, 2)) @ np.array([[1.0, 0.8], [0.0, 0.6]])
-        gust = rng.standard_normal((BLOCKS, 5 * WINDOWS, 1))
+    for number, own in enumerate(blocks):
+        known = rng.standard_normal((own, 5 * WINDOWS, 2)) @ np.array([[1.0, 0.8], [0.0, 0.6]])
+        gust = rng.standard_normal((own, 5 * WINDOWS, 1))
         moved = known + gust * [0.7, -0.5]
         rows = np.concatenate([moved, gust + moved @ np.array(numbers)[:, None]], axis=2)
-        products = np.zeros((2 * BLOCKS, 3, 3))
-        products[number * BLOCKS :][:BLOCKS, :2] = np.einsum("bwk,bwl->bkl", known, rows)
+        products = np.zeros((sum(blocks), 3, 3))
+        products[number * blocks[0] :][:own, :2] = np.einsum("bwk,bwl->bkl", known, rows)
         sources.append(_Source(products, np.arange(2) == number))
     return sources
 
@@ -221,6 +221,12 @@ def test_a_number_that_trades_with_those_of_another_source_is_not_identified():
     # What the second knows of its number is what the first knows of its own.
     second.products[BLOCKS:, 1, :2] = first.products[:BLOCKS, 0, :2] + 0.01 * rng.standard_normal((BLOCKS, 2))
     assert [each.numbers.tolist() for each in _strong_together([first, second])] == [[True, False], [False, False]]
+
+
+def test_blocks_of_one_source_are_no_scatter_of_another():
+    """Many blocks of the first made a number weak that the second identifies, however well."""
+    sources = by_each([0.0, 0.0], np.random.default_rng(3), (2 * BLOCKS, BLOCKS // 2))
+    assert [each.numbers.tolist() for each in _strong_together(sources)] == [[True, False], [False, True]]
 
 
 def test_what_follows_from_others_that_did_not_go_far_is_not_asked_for_again_and_again(monkeypatch):
