@@ -234,7 +234,11 @@ def with_small_effects(found: NamedFit, small: Sequence[SmallEffect], given: Ins
     hypothesis = system(found.hypothesis.flights, [*found.hypothesis.chosen, *(each.candidate for each in small)])
     values = np.concatenate([found.estimates.linear, *(each.linear for each in small), found.hypothesis.shape_values])
     start = _numbered(found._replace(hypothesis=hypothesis), values, small)
-    fit = by_instruments(start, given)
+    # Of all others the errors are those that they had.
+    first, own = len(found.estimates.linear), np.concatenate([each.linear for each in small])
+    others = np.insert(found.estimates.left_out, [first] * len(own), own, axis=1)
+    left_out = np.vstack([others, start.estimates.left_out])
+    fit = by_instruments(start._replace(estimates=replace(start.estimates, left_out=left_out)), given)
     return _numbered(fit, fit.values, small)
 
 

@@ -224,7 +224,7 @@ def not_separated(found: NamedFit, wrong: NamedEffect | None) -> Iterator[Altern
 
     def alike(candidate: Candidate) -> bool:
         more = squares(system(stated, [*hypothesis.chosen, candidate])) - own
-        return bool(more.mean() <= ERRORS * mean_error(more))
+        return len(more) < 2 or bool(more.mean() <= ERRORS * mean_error(more))
 
     own = squares(hypothesis)
     for name, separated_by in VEHICLE_NUMBERS.rivals.items():

@@ -10,7 +10,7 @@ from scipy.stats import ttest_1samp
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.weak_flight import Candidate
-from cpfls_cli.gap.naming import by_instruments
+from cpfls_cli.gap.naming import by_instruments, by_samples
 from cpfls_cli.gap.naming.by_instruments import (
     _chance,
     _Source,
@@ -227,6 +227,30 @@ def test_blocks_of_one_source_are_no_scatter_of_another():
     """Many blocks of the first made a number weak that the second identifies, however well."""
     sources = by_each([0.0, 0.0], np.random.default_rng(3), (2 * BLOCKS, BLOCKS // 2))
     assert [each.numbers.tolist() for each in _strong_together(sources)] == [[True, False], [False, True]]
+
+
+def test_small_effects_by_samples_leave_the_errors_of_all_others_as_they_were(monkeypatch):
+    """What stays where a fit found it is as uncertain as before; the small effect has blocks of its own."""
+    load = candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.1)
+    flights = [weak(fly(1, [(load, [0.06, 0.0, 0.0, 0.6])], seconds=30.0, speed=1.0), force=True)]
+    found = fitted(flights, [load], np.full(6, 0.1), GapSettings())
+    own = np.array([0.01, 0.02, 0.03])
+    without = own + np.random.default_rng(1).normal(0.0, 1e-3, (7, 3))
+    asked = []
+    monkeypatch.setattr(by_samples, "by_instruments", lambda start, _: asked.append(start) or start)
+    by_samples.with_small_effects(
+        found, [by_samples.SmallEffect(candidate("torque_bias"), 1e-4, own, without, ())], None
+    )
+    (start,) = asked
+    first, blocks = len(found.estimates.linear), len(found.estimates.left_out)
+    assert start.values == pytest.approx(np.insert(found.values, [first] * 3, own))
+    of_fit, of_samples = np.split(start.estimates.left_out, [blocks])
+    new = first + np.arange(3)
+    assert np.ptp(found.estimates.left_out, axis=0).any()
+    assert np.delete(of_fit, new, axis=1) == pytest.approx(found.estimates.left_out)
+    assert of_samples[:, new] == pytest.approx(without)
+    assert not np.ptp(of_fit[:, new], axis=0).any()
+    assert not np.ptp(np.delete(of_samples, new, axis=1), axis=0).any()
 
 
 def test_what_follows_from_others_that_did_not_go_far_is_not_asked_for_again_and_again(monkeypatch):

@@ -124,6 +124,12 @@ def test_a_load_that_hardly_swings_is_a_double_of_too_little_thrust(size, share,
     assert list(not_separated(ignoring, wrong)) == []
 
 
+def test_a_flight_of_one_block_shows_no_error_and_beats_no_rival():
+    found, wrong = with_wrong_thrust(carried(1.0, 0.12, 1.5))
+    short = found._replace(settings=GapSettings(block_s=1e3))
+    assert "payload" in [each.name for each in not_separated(short, wrong)]
+
+
 def number(name, value, half):
     return Estimate(name, "1", value, value - half, value + half, (-0.9, 3.0))
 

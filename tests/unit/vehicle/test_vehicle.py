@@ -159,7 +159,8 @@ def of_rotors(functions, k, x, w):
     lift = functions.rotors([1.0, -2.0, 3.0]) * w + x
     limited = functions.smallest(functions.largest(lift, -1.0), functions.absolute(x) + k)
     angle = functions.arctan2(functions.sin(x), functions.exp(k * x))
-    return functions.total(lift**3), functions.total(limited * x / (2.0 + functions.sqrt(k * k))), angle - functions.cos(x)
+    limited = limited * x / (2.0 + functions.sqrt(k * k))
+    return functions.total(lift**3), functions.total(limited), angle - functions.cos(x)
 
 
 @pytest.mark.parametrize("short", [False, True])
