@@ -229,6 +229,13 @@ def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_sepa
     assert next_steps(both).count("log velocity") == 1
     assert facts["How sure"] == "Of the held-out gap above the noise, 97 % is gone."
     assert "To separate" not in dict(below)
+    three = tuple(replace(rival, name=name, separated_by=name) for name in ("wind", "payload", "torque_bias"))
+    _, facts, _, _, below = screen(diagnosis("AMBIGUOUS", alternatives=three))
+    assert facts["Next"].count("To separate") == 2
+    assert "constant torque" not in facts["Next"]
+    assert [text for name, text in below if name == "To separate"] == [
+        "constant torque from offset of the centre of mass: torque_bias"
+    ]
 
 
 def test_two_effects_that_do_what_a_named_one_does_are_one_rival_and_no_path_shows_them():
@@ -353,6 +360,9 @@ def test_of_many_axes_that_are_left_the_worst_with_a_cause_is_shown_and_the_othe
         "9.0 floors."
     )
     assert dict(below)["Residual of each axis"].startswith("torque about x (roll), 9.0 floors: follows no one signal; ")
+    left.append(("torque y", 8.0, None, 0.7, 1.5, "neither"))
+    rings = screen(diagnosis("UNEXPLAINED", named=(), unexplained=tuple(Unexplained(*each) for each in left)))[1]
+    assert rings["Residual"].startswith("In what it was fitted to: torque about y (pitch), 8.0 floors: rings at 1.50 ")
 
 
 def test_the_gap_of_many_channels_is_that_of_the_largest():

@@ -421,6 +421,35 @@ def test_the_log_of_a_flight_is_kept_where_a_gap_was_found_in_it_too():
     assert joined_flights([again], [known]) == joined_flights([known], [again]) == (known,)
 
 
+def test_a_table_has_a_column_of_what_is_stated_where_it_has_any():
+    """Centres of mass and products alone are stated, which are behind the first five."""
+    names = ("thrust_factor", "drag_factor", *(f"inertia.I{axis}" for axis in ("xx", "yy", "zz")))
+    numbers = [number_of(name) for name in names] + [
+        number_of(f"products.{name}", stated=0.0) for name in ("Ixy", "Ixz")
+    ]
+    own = vehicle_of(whole(), numbers=tuple(numbers))
+    tables = [block for block in blocks_of(own) if isinstance(block, Table)]
+    stated = {each.header[0]: "In the config" in each.header for each in tables}
+    assert (stated["Constant"], stated["Another constant"]) == (False, True)
+
+
+def test_a_thrust_factor_comes_with_the_law_that_it_is_of():
+    numbers = (number_of("thrust_factor"), number_of("thrust_law.linear", -0.45, -0.8, -0.1))
+    said = blocks_of(vehicle_of(whole(), numbers=numbers))
+    law = "Thrust is the thrust factor times w (w − 0.450 w_h), with w_h the speed in hover."
+    first = next(at for at, block in enumerate(said) if isinstance(block, Table))
+    assert said[first + 1].text == law
+    assert sum(isinstance(block, Text) and block.text == law for block in said) == 1
+
+
+def test_flights_that_bound_no_body_name_no_bounds():
+    nothing = np.full(3, np.nan)
+    open_ = LoopBounds(nothing, nothing, LOOP.explained)
+    said = " ".join(against(vehicle_of(whole(), loop=open_)))
+    assert "45 % of the roll acceleration and 47 % of the pitch acceleration where it explains least. Fly in" in said
+    assert "By frequency" not in said
+
+
 def test_the_size_of_a_thrust_factor_goes_with_the_full_speed_that_is_assumed():
     numbers = (number_of("thrust_factor"), number_of("drag_factor", determined=False))
     shares = vehicle_of(whole(), numbers=numbers, full_speed_rad_s=1000.0)
