@@ -361,8 +361,11 @@ def test_of_many_axes_that_are_left_the_worst_with_a_cause_is_shown_and_the_othe
     )
     assert dict(below)["Residual of each axis"].startswith("torque about x (roll), 9.0 floors: follows no one signal; ")
     left.append(("torque y", 8.0, None, 0.7, 1.5, "neither"))
-    rings = screen(diagnosis("UNEXPLAINED", named=(), unexplained=tuple(Unexplained(*each) for each in left)))[1]
-    assert rings["Residual"].startswith("In what it was fitted to: torque about y (pitch), 8.0 floors: rings at 1.50 ")
+    rings = screen(diagnosis("UNEXPLAINED", named=(), unexplained=tuple(Unexplained(*each) for each in left[1:])))[1]
+    assert rings["Residual"] == (
+        "In what it was fitted to: torque about y (pitch), 8.0 floors: rings at 1.50 Hz (70 % of it); 2 more, up to "
+        "3.0 floors."
+    )
 
 
 def test_the_gap_of_many_channels_is_that_of_the_largest():
