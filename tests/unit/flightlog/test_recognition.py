@@ -19,6 +19,7 @@ GYRO = ("gyro_x", "gyro_y", "gyro_z")
 ACC = ("acc_x", "acc_y", "acc_z")
 PLACE, SPEED = ("x", "y", "z"), ("vx", "vy", "vz")
 LONG = flight(seconds=80.0, rate_hz=400.0, noise=0.1)
+HALVED = np.r_[0:16000:2, 16000:32000]
 
 
 @pytest.fixture(scope="module")
@@ -471,6 +472,12 @@ def test_rows_without_stamps_come_as_often_as_the_attitude_turns_as_the_gyroscop
         {"rate": named(np.round(1000 * LONG.rate), *GYRO)},
         # Taken for radians, of rows that come 7 times in a second.
         {"attitude": named(2 * LONG.angles, "roll", "pitch", "yaw"), "rate": named(2 * np.pi / 180 * LONG.rate, *GYRO)},
+        # Of rows that come half as often in the first half.
+        {
+            **dict.fromkeys(("force", "position", "velocity", "speed")),
+            "attitude": named(LONG.angles[HALVED], "roll", "pitch", "yaw"),
+            "rate": named(LONG.rate[HALVED], *GYRO),
+        },
         # Of other rows than the rest.
         {"attitude": named(LONG.angles[::2], "roll", "pitch", "yaw"), "rate": named(LONG.rate[::2], *GYRO)},
     ],
