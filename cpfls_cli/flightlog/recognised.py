@@ -41,8 +41,9 @@ _FEWEST_SAMPLES = 20  # For medians and rates.
 # Time that stamps span over that which rows of one rate fill, up to which they are a clock with pauses.
 _LARGEST_SPAN = 100
 # Of rows without stamps: how many show their rate, Hz, which rates are a log's, and which share of the gyroscope the
-# attitude explains.
-_FEWEST_ROWS, _ROWS_HZ, _TURNS_ALIKE = 200, (5.0, 4000.0), 0.8
+# attitude explains. The rates are less than 57 times apart: with degrees taken for radians most logs are beyond them.
+_FEWEST_ROWS, _ROWS_HZ, _TURNS_ALIKE = 200, (18.0, 1020.0), 0.8
+_HALVES = 1.25  # Ratio of the rates of both halves up to which noise parts them.
 # Standard deviation of a gyroscope in flight: below the first it reads rad/s, from the second on deg/s.
 RADIANS_UP_TO, DEGREES_FROM = 2.0, 10.0
 _GRID_HZ = 100.0  # Rate at which signals are compared, whose motion is below a tenth of it.
@@ -213,7 +214,11 @@ def _rows_by_motion(fields: Mapping[str, Array]) -> str:
         return ""
     pair = named["attitude"], named["body_rate"]
     columns = [np.asarray(fields[column], dtype=float) for own in pair for column in own.group.columns]
-    if len({*map(len, columns)}) > 1 or len(columns[0]) < _FEWEST_ROWS or not np.isfinite(columns).all():
+    # The clock is one of all rows.
+    if {*map(len, columns)} != {max(map(len, fields.values()))} or len(columns[0]) < _FEWEST_ROWS:
+        return ""
+    # A gyroscope of whole numbers may count what its sensor gives.
+    if not np.isfinite(columns).all() or (named["body_rate"].unit is None and not np.mod(columns[3:], 1.0).any()):
         return ""
     angles, rates = (
         own.scale * np.column_stack(part) for own, part in zip(pair, (columns[:3], columns[3:]), strict=True)
@@ -221,12 +226,20 @@ def _rows_by_motion(fields: Mapping[str, Array]) -> str:
     degrees = named["attitude"].unit == "deg" or (named["attitude"].unit is None and np.abs(angles).max() > 2 * np.pi)
     turns = Rotation.from_euler("xyz", angles, degrees=degrees)
     # As if a hundred came in a second: what is slow is so many rows long then.
-    fit = fit_axes(slow(body_rate_from(turns, 1.0), _GRID_HZ), slow(rates, _GRID_HZ))
+    turned, felt = slow(body_rate_from(turns, 1.0), _GRID_HZ), slow(rates, _GRID_HZ)
+    fit = fit_axes(turned, felt)
     spread = float(np.sqrt(rates.var(axis=0).sum()))
     unit = named["body_rate"].unit or ("deg/s" if spread > DEGREES_FROM else "rad/s" if spread < RADIANS_UP_TO else "")
     hz = fit.gain * known_unit(unit).factor if unit else 0.0
-    alike = fit.explained > _TURNS_ALIKE and _ROWS_HZ[0] < hz < _ROWS_HZ[1]
-    return f"{ROWS}{hz:.0f}" if alike else ""
+    if not (fit.explained > _TURNS_ALIKE and _ROWS_HZ[0] < hz < _ROWS_HZ[1]):
+        return ""
+    # Rows that come more often in one half of the motion than in the other have no rate.
+    done = np.cumsum((turned**2).sum(axis=1))
+    half = int(np.searchsorted(done, 0.5 * done[-1]))
+    early, late = (
+        np.linalg.norm(felt[part]) / np.linalg.norm(turned[part]) for part in (slice(half), slice(half, None))
+    )
+    return f"{ROWS}{hz:.0f}" if max(early, late) < _HALVES * min(early, late) else ""
 
 
 def _steps_back(name: str, values: Array) -> str:

@@ -21,7 +21,7 @@ REBUILT = "rebuilt"  # The topic of commands of rotors that are rebuilt (`flight
 # The topic that a reader adds, of turns of the estimated yaw that it has undone: when, and `turn`, rad.
 YAW_RESETS = "yaw_resets"
 ROWS = "row / "  # With which stamps of rows that come so many times a second begin.
-_ROWS_HZ = re.compile(rf"{ROWS}(\d*[1-9]\d*(?:\.\d+)?)")
+_ROWS_HZ = re.compile(r"row */ *(\d*[1-9]\d*(?:\.\d+)?)")
 _ANGLES_THAT_JUMP = (0, 2)
 # Of its usual steps for which a setpoint stays: the next one may be lost, and behind two nobody asks for it.
 _STEPS_HELD = 3

@@ -139,9 +139,12 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         raise InputError(f"{path}: not a CSV file: its first line, the column names, does not end")
     if not header.strip():
         raise InputError(f"{path}: is empty; a log starts with a line of column names")
-    numeric = list(map(_kind, _fields(header)))
-    # What writes numbers has its column names in the last remark; a few columns of words have names there too.
-    if remark and (all(numeric) or len(numeric) == len(_fields(remark)) < 2 * sum(map(bool, numeric))):
+    fields = [field.strip() for field in _fields(header)]
+    numbers = [field for field in fields if _kind(field)]
+    # What writes numbers has its column names in the last remark; a few columns of words have names there too. Words
+    # and whole numbers may be the names themselves.
+    some_words = len(fields) == len(_fields(remark)) < 2 * len(numbers) and not all(map(str.isdecimal, numbers))
+    if remark and (len(numbers) == len(fields) or some_words):
         header, lines, line = remark, chain([header], lines), line - 1
     names = [name.strip() for name in _fields(header)]
     numbers = [name for name in names if name and _kind(name) == "number"]

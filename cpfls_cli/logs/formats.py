@@ -367,8 +367,8 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
         # Where some numbers are whole, rows differ in their commas.
         if b"." not in text and len({line.count(b",") for line in text.rpartition(b"\n")[0].splitlines()}) > 1:
             return (
-                "a table whose commas part its columns and stand in its numbers",
-                f"write points in them, {NAME_COLUMNS}",
+                "a table whose rows differ in their commas, as where they stand in its numbers too",
+                f"write points in numbers, {NAME_COLUMNS}",
             )
         bare = "take the brackets around each line away, " if text.startswith(b"(") else ""
         return "a table of numbers without names", f"{bare}{NAME_COLUMNS}, and let its name end in .csv"

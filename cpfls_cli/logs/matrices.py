@@ -31,6 +31,7 @@ from cpfls_cli.units import known_unit
 from cpfls_cli.words import some
 
 _MOST_COLUMNS, _FEWEST_CLOCKS = 64, 2
+_FITS = 0.5  # Share of its time that doubtful stamps have in common with the log's fastest.
 _PROBE = """
 import sys, h5py
 states = 0
@@ -119,24 +120,61 @@ def _on_own_clocks(columns: Mapping[str, Array], units: Mapping[str, str]) -> Lo
         if len(values) > 1:
             groups.setdefault(name.rpartition("/")[0], {})[name] = values
     lengths = [{*map(len, own.values())} for own in groups.values()]
-    if "" in groups or any(len(own) > 1 for own in lengths) or len(set[int]().union(*lengths)) < _FEWEST_CLOCKS:
+    if any(len(own) > 1 for own in lengths) or len(set[int]().union(*lengths)) < _FEWEST_CLOCKS:
         return None
+    # What is no name of a topic.
+    if any(not own or "." in own or own.endswith("[0]") for own in groups):
+        return None
+    tables: dict[str, LogTable] = {}
+    for group, fields in groups.items():
+        with contextlib.suppress(InputError):
+            tables[group] = LogTable({"": fields}, units)
+    said = _in_unit_of_fastest(tables)
     topics: dict[str, dict[str, Array]] = {}
     stated: dict[str, str] = {}
-    left = []
-    for group, fields in groups.items():
-        try:
-            log = LogTable({"": fields}, units)
-        except InputError:
-            left.append(group)
-            continue
-        named = {name.removeprefix(f"{group}/"): name for name in fields if name != log.time_column}
-        topics[group] = {STAMP: log.clock(""), **{own: fields[name] for own, name in named.items()}}
+    for group, log in tables.items():
+        clock = log.clock("")
+        # A second clock under the name of the stamps would take their place.
+        others = (name for name in groups[group] if name not in (log.time_column, f"{group}/{STAMP}"))
+        named = {name.removeprefix(f"{group}/"): name for name in others}
+        read = {STAMP: clock, **{own: groups[group][name] for own, name in named.items()}}
+        topics[group] = {own: values[np.isfinite(clock)] for own, values in read.items()}
         stated |= {f"{group}.{own}": units[name] for own, name in named.items() if name in units}
     if len(topics) < _FEWEST_CLOCKS or 2 * sum(map(len, topics.values())) < sum(map(len, groups.values())):
         return None
-    words = f"without stamps that rise from row to row, and left out: {some(left, MOST_LISTED)}"
-    return LogContents(topics, stated, warnings=(words,) if left else ())
+    left = [group for group in groups if group not in topics]
+    words = f"of few rows, or without stamps that rise from row to row, and left out: {some(left, MOST_LISTED)}"
+    return LogContents(topics, stated, warnings=(*said, *[words] * bool(left)))
+
+
+def _in_unit_of_fastest(tables: dict[str, LogTable]) -> list[str]:
+    """Read stamps in the unit of the fastest ones where they cover its time better so; give the doubts of what is kept.
+
+    Of slow rows a second between two looks like a millisecond. Left out are stamps that are only taken for such and do
+    not fit, and rows without any, of which nobody knows when the first came.
+    """
+    for group in [group for group, log in tables.items() if log.time_column not in log.names]:
+        del tables[group]
+    said: list[str] = []
+    for group, log in [*tables.items()]:
+        fastest = max(tables.values(), key=lambda log: len(log.clock("")))
+        shared: dict[str, float] = {}
+        for unit in (log.time_unit, *[fastest.time_unit] * (log.time_column not in log.units)):
+            clock = log.clock("") * (known_unit(unit).factor / known_unit(log.time_unit).factor)
+            shared[unit] = _shared(clock, fastest.clock(""))
+        unit = max(shared, key=shared.__getitem__)
+        if log.time_doubt and shared[unit] < _FITS:
+            del tables[group]
+        elif log.time_doubt and unit == log.time_unit:
+            said.append(log.time_doubt)
+        log.time_unit = unit
+    return said
+
+
+def _shared(clock: Array, other: Array) -> float:
+    """Share that two clocks have in common of the time from the first stamp of both to the last."""
+    firsts, lasts = (np.nanmin(clock), np.nanmin(other)), (np.nanmax(clock), np.nanmax(other))
+    return max(float(min(lasts) - max(firsts)), 0.0) / float(max(lasts) - min(firsts))
 
 
 def _of_one_length(columns: dict[str, Array]) -> dict[str, Array]:

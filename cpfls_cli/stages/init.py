@@ -170,13 +170,15 @@ class Proposed:
 def _unused(recognition: Recognition) -> Iterator[str]:
     """List unused columns, those of each topic by themselves, which differ in a number alone as one; whole topics."""
     columns = (column for guess in recognition.signals for column in guess.columns.columns)
-    taken = {column.partition(".")[0] for column in columns if "." in column}
+    taken = {re.split(r"[.[]", column)[0] for column in columns if "." in column}
     topics: dict[str, dict[str, list[str]]] = {}
     whole: dict[str, None] = {}
     for name in recognition.unused:
         topic, dot, _ = name.partition(".")
-        if dot and taken and topic not in taken:
-            whole[topic.partition("[")[0]] = None
+        # An instance of a topic is not all of it.
+        kind = topic.partition("[")[0]
+        if dot and taken and kind not in taken:
+            whole[kind] = None
             continue
         same = topics.setdefault(topic if dot else "", {})
         same.setdefault(re.sub(r"\d+(?=\]?$)", "*", name), []).append(name)

@@ -120,7 +120,8 @@ class _Sets:
                 self.fits[names], self.predictable[names] = fit, predictable_residual(fit, self.given)
         return [names for names in tried if names in self.fits]
 
-    def _fit(self, names: _Names) -> NamedFit | None:
+    def _fit(self, names: _Names, *, together: bool = False) -> NamedFit | None:
+        """Fit a set; None where instruments do not identify it. The errors are conditional where sets are compared."""
         hypothesis, _, floor, settings = self.found
         flights = hypothesis.flights
         chosen = [each for each in hypothesis.chosen if not each.effect.is_lag]
@@ -128,7 +129,7 @@ class _Sets:
             (scored,) = rank_effects(flights, chosen, [effect], settings, None, floor=floor).ranking
             chosen = list(refined(flights, scored.chosen, floor).chosen)
         before = fitted(flights, chosen, floor, settings)
-        after = by_instruments(before, self.given)
+        after = by_instruments(before, self.given, together=together)
         return None if any(each.is_lag for each in unidentified(before, after)) else after
 
     def is_predictable(self, names: _Names) -> bool:
@@ -160,9 +161,7 @@ class _Sets:
 
     def numbers(self, names: _Names) -> dict[str, tuple[Estimate, ...]]:
         """Give the numbers of each effect of a set."""
-        fit = self.fits[names]
-        pairs = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
-        return {candidate.effect.name: numbers for candidate, numbers in pairs if candidate.effect.name in names}
+        return _numbers(self.fits[names], names)
 
     def traded(self, names: _Names) -> NamedFit:
         """Give the fit of a set; the interval of one lag or delay holds that which it has jointly with the other.
@@ -170,7 +169,8 @@ class _Sets:
         That is where the other is more than its standard error, which is neither named nor excluded. Of a filter no
         number is a time that a lag could trade for.
         """
-        fit, pairs = self.fits[names], [each for each in self.fits if set(names) < set(each)]
+        pairs = [each for each in self.fits if set(names) < set(each)]
+        fit = self._fit(names, together=True) or self.fits[names]
         joint = [self.numbers(each) for each in pairs if len(names) == 1 and self.count(each) == 2]
         own = [
             each[names[0]][0]
@@ -180,7 +180,7 @@ class _Sets:
         ]
         if not own:
             return fit
-        ((number,),) = self.numbers(names).values()
+        ((number,),) = _numbers(fit, names).values()
         low = max(number.plausible[0], min(each.low for each in own))
         wider = replace(number, low=min(number.low, low), high=max(number.high, *(each.high for each in own)))
         each_with = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
@@ -213,3 +213,8 @@ class _Sets:
         period = self.given.flown[0].motion.period
         error = np.hypot((number.high - number.value) / ERRORS, period / np.sqrt(12))
         return float(erfc(number.value / error / np.sqrt(2)))
+
+
+def _numbers(fit: NamedFit, names: _Names) -> dict[str, tuple[Estimate, ...]]:
+    pairs = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
+    return {candidate.effect.name: numbers for candidate, numbers in pairs if candidate.effect.name in names}

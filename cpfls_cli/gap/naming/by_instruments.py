@@ -33,7 +33,9 @@ class _Source(NamedTuple):
     numbers: BoolArray  # Shape (number,): those that are free and that it identifies, and no source before it does.
 
 
-def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None = None) -> NamedFit:
+def by_instruments(
+    found: NamedFit, given: Instruments, held: BoolArray | None = None, *, together: bool = True
+) -> NamedFit:
     """Fit a hypothesis anew by instruments.
 
     With the regressors X, the residual r and the prediction Z of X by instruments, the numbers change by d with
@@ -44,13 +46,20 @@ def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None =
     as in the search.
 
     `held`, shape (number,): numbers that stay.
+    `together`: whether the error of a number holds those of the numbers that another source identifies, or the fit
+    where nothing does, and one is not identified where it is not jointly with these; else each is conditional on them.
 
     Reference: Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak
-    instruments).
+    instruments); Newey and McFadden 1994, section 6 (errors of estimates in several steps).
     """
     stated = at = _of_config(found)
     held = np.zeros(len(found.values), dtype=bool) if held is None else held
-    sources = _sources(at, given, held)
+
+    def sources_at(there: NamedFit) -> list[_Source]:
+        every = _sources(there, given, held)
+        return _strong_together(every, _is_lag(there)) if every and together else every
+
+    sources = sources_at(at)
     if not sources:
         return found
     moved, far = np.zeros((2, len(found.values)), dtype=bool)
@@ -58,7 +67,9 @@ def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None =
     before, bends = None, np.zeros_like(moved)
     for own, curved in places_of(found.hypothesis):
         bends[own] = bends[curved] = bool(found.values[curved].size)
-    fit_error = np.where(stated.values == found.values, found.estimates.left_out - found.values, 0.0)
+    fit_error = None
+    if together:
+        fit_error = np.where(stated.values == found.values, found.estimates.left_out - found.values, 0.0)
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
         values, left_out = _stepped(at, sources, fit_error)
@@ -74,10 +85,10 @@ def by_instruments(found: NamedFit, given: Instruments, held: BoolArray | None =
         far = np.where(now & bends, step > error, far)
         hypothesis = at.hypothesis.with_shapes(shapes) if len(shapes) else at.hypothesis
         at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
-        if np.all(10 * step <= error) or not (sources := _sources(at, given, held)):
+        if np.all(10 * step <= error) or not (sources := sources_at(at)):
             break
     if (lost := far & ~now & ~held).any():
-        return by_instruments(found, given, held | lost)
+        return by_instruments(found, given, held | lost, together=together)
     return at._replace(estimates=_with_unidentified(stated, at.estimates, moved))
 
 
@@ -93,32 +104,26 @@ def _of_config(found: NamedFit) -> NamedFit:
     return found._replace(estimates=replace(found.estimates, linear=linear, parameters=stated))
 
 
-def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array) -> tuple[Array, Array]:
+def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array | None) -> tuple[Array, Array]:
     """Move numbers to where instruments and residual do not correlate; and with each block left out.
 
-    The equations of all sources are solved together, so that the error of a number that one source identifies is in
-    those that another one identifies. Shapes that follow from coefficients follow them.
+    Shapes that follow from coefficients follow them.
 
-    Reference: Newey and McFadden 1994, section 6 (errors of estimates in two steps).
+    `fit_error`, shape (block, number): what the fit changes by without each of its blocks; None for errors of each
+    source by itself.
     """
     values, prior = found.values, known_before(found.hypothesis)
-    change = np.zeros(len(values))
+    change, apart = np.zeros(len(values)), np.zeros((len(sources[0].products), len(values)))
     # Source by source a step does not overshoot as one of all together does.
     for products, numbers in sources:
         ztx, score = products[:, :-1, :-1][:, numbers], products[:, :-1, -1][:, numbers]
         # Without what those before it explain.
         normal = Normal(ztx[:, :, numbers], score - ztx @ change)
-        change[numbers] = one_step(normal, Prior.about_zero(prior[numbers]), values[numbers])[0] - values[numbers]
-    moving, equations = _together(sources)
-    normal = Normal(equations[:, moving[:, None], moving], equations[:, moving, -1])
-    step, left_out = one_step(normal, Prior.about_zero(prior[moving]), values[moving])
-    # Without a block, of a source or of the fit, whose numbers stay: all others answer what is left out.
-    apart = np.zeros((len(left_out), len(values)))
-    apart[:, moving] = left_out - step
-    stay, total = fit_error.copy(), equations.sum(axis=0)[moving]
-    stay[:, moving] = 0.0
-    stay[:, moving] = -np.linalg.solve(total[:, moving] + np.diag(prior[moving]), total[:, :-1] @ stay.T).T
-    without = change + np.vstack([apart, stay])
+        step, left_out = one_step(normal, Prior.about_zero(prior[numbers]), values[numbers])
+        change[numbers], apart[:, numbers] = step - values[numbers], left_out - step
+    if fit_error is not None:
+        apart = _apart(sources, values, prior, fit_error)
+    without = change + apart
     # The only number of an effect may be 0: then there is none.
     shapes = [
         (0.0 if len(each.effect.shapes) == 1 else shape.grid[0], shape.grid[-1])
@@ -132,12 +137,29 @@ def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array) -> t
     return rows[0], rows[1:]
 
 
+def _apart(sources: Sequence[_Source], values: Array, prior: Array, fit_error: Array) -> Array:
+    """Say what numbers change by without each block of the sources, then of the fit, whose numbers stay: all follow."""
+    moving, equations = _together(sources)
+    normal = Normal(equations[:, moving[:, None], moving], equations[:, moving, -1])
+    step, left_out = one_step(normal, Prior.about_zero(prior[moving]), values[moving])
+    apart, stay, total = np.zeros((len(left_out), len(values))), fit_error.copy(), equations.sum(axis=0)[moving]
+    apart[:, moving], stay[:, moving] = left_out - step, 0.0
+    stay[:, moving] = -np.linalg.solve(total[:, moving] + np.diag(prior[moving]), total[:, :-1] @ stay.T).T
+    return np.vstack([apart, stay])
+
+
 def _together(sources: Sequence[_Source]) -> tuple[IntArray, Array]:
     """List the numbers that sources identify, and stack the equations of each by its own source."""
     equations = np.zeros_like(sources[0].products[:, :-1])
     for products, numbers in sources:
         equations[:, numbers] = products[:, :-1][:, numbers]
     return np.flatnonzero(np.any([numbers for _, numbers in sources], axis=0)), equations
+
+
+def _is_lag(found: NamedFit) -> BoolArray:
+    """Mark the shapes of lags among all numbers, shape (number,)."""
+    lags = [each.effect.is_lag for each in found.hypothesis.chosen for _ in each.effect.shapes]
+    return np.append(np.zeros(len(found.estimates.linear), dtype=bool), np.array(lags, dtype=bool))
 
 
 def with_lean(found: NamedFit, across: Array) -> NamedFit:
@@ -246,11 +268,10 @@ def _sources(found: NamedFit, given: Instruments, held: BoolArray | None = None)
     free = ~fit_within_bounds(hypothesis, weight, of_vehicle=True)[1] & hypothesis.base.any(axis=(0, 1))
     vehicle, of_vehicle = hypothesis.places[0]
     free[of_vehicle] &= np.isin([each.name for each in vehicle.effect.coefficients], list(NUMBERS))
-    lags = np.array([each.effect.is_lag for each in hypothesis.chosen for _ in each.effect.shapes], dtype=bool)
     own = np.isnan(hypothesis.following(found.estimates.linear))
     if held is not None:
         free, own = free & ~held[: len(free)], own & ~held[len(free) :]
-    open_, early = np.append(free, own), np.append(np.ones_like(free), ~lags)
+    open_, early = np.append(free, own), ~_is_lag(found)
     windows = _windows_of_runs(found, given)
     blocks = np.unique(np.concatenate([run.block for run in chain(*windows)]))
     for place, runs in enumerate(windows):
@@ -267,11 +288,14 @@ def _sources(found: NamedFit, given: Instruments, held: BoolArray | None = None)
             numbers = _strong(flown, numbers)
             sources.append(_Source(products, numbers))
             open_ = open_ & ~numbers
-    return _strong_together(sources) if sources else sources
+    return sources
 
 
-def _strong_together(sources: list[_Source]) -> list[_Source]:
-    """Keep of later sources the numbers that are identified where those of the others are free too."""
+def _strong_together(sources: list[_Source], lags: BoolArray) -> list[_Source]:
+    """Keep of later sources the numbers that are identified where those of the others are free too; and lags.
+
+    A fit of these would be the loop's.
+    """
     # Each source has blocks of its own; of those of the others it has nothing, which is no scatter.
     flown = np.array([each.products.any(axis=(1, 2)) for each in sources])
     known, source = flown.any(axis=0), flown.argmax(axis=0)
@@ -279,7 +303,7 @@ def _strong_together(sources: list[_Source]) -> list[_Source]:
         moving, equations = _together(sources)
         normal = Normal(equations[:, moving[:, None], moving][known], equations[:, moving, -1][known])
         strength = conditional_strength(normal, Prior.none(len(moving)), source[known])
-        unclear = np.flatnonzero((strength <= STRONG) & ~sources[0].numbers[moving])
+        unclear = np.flatnonzero((strength <= STRONG) & ~(sources[0].numbers | lags)[moving])
         if not len(unclear):
             return sources
         weakest = moving[unclear[np.argmin(strength[unclear])]]

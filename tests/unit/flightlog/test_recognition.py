@@ -18,6 +18,8 @@ from tests.builders.unknown_logs import FLIP, NED, flat_log, flight, named, quat
 GYRO = ("gyro_x", "gyro_y", "gyro_z")
 ACC = ("acc_x", "acc_y", "acc_z")
 PLACE, SPEED = ("x", "y", "z"), ("vx", "vy", "vz")
+LONG = flight(seconds=80.0, rate_hz=400.0, noise=0.1)
+HALVED = np.r_[0:16000:2, 16000:32000]
 
 
 @pytest.fixture(scope="module")
@@ -460,6 +462,29 @@ def test_rows_without_stamps_come_as_often_as_the_attitude_turns_as_the_gyroscop
     with pytest.raises(InputError, match="no column of time stamps is recognised"):
         # As a matrix of another length.
         seen(flat_log(own, t=None, rate=named(own.rate[::2], *GYRO)))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        # Counts of 16 bits would come 16 times as often in deg/s, and thousandths of rad/s 17 times.
+        {"rate": named(np.round(16.4 * 180 / np.pi * LONG.rate), *GYRO)},
+        {"rate": named(np.round(1000 * LONG.rate), *GYRO)},
+        # Taken for radians, of rows that come 7 times in a second.
+        {"attitude": named(2 * LONG.angles, "roll", "pitch", "yaw"), "rate": named(2 * np.pi / 180 * LONG.rate, *GYRO)},
+        # Of rows that come half as often in the first half.
+        {
+            **dict.fromkeys(("force", "position", "velocity", "speed")),
+            "attitude": named(LONG.angles[HALVED], "roll", "pitch", "yaw"),
+            "rate": named(LONG.rate[HALVED], *GYRO),
+        },
+        # Of other rows than the rest.
+        {"attitude": named(LONG.angles[::2], "roll", "pitch", "yaw"), "rate": named(LONG.rate[::2], *GYRO)},
+    ],
+)
+def test_rows_without_stamps_are_not_timed_by_a_gyroscope_whose_unit_or_rows_are_in_doubt(changed):
+    with pytest.raises(InputError, match="no column of time stamps is recognised"):
+        seen(flat_log(LONG, t=None, **changed))
 
 
 def test_time_on_the_ground_and_idling_is_cut(own):

@@ -164,6 +164,7 @@ def test_rows_that_come_evenly_need_no_stamps():
     )
     assert on_one_clock(flat, {}, settings)[0]["row / 50"].tolist() == [0.0, 0.02, 0.04]
     assert on_one_clock(flat, {}, replace(settings, time_unit="ms"))[0]["row / 50"].tolist() == [0.0, 20.0, 40.0]
+    assert on_one_clock(flat, {}, replace(settings, time_column="row/50"))[0]["row/50"].tolist() == [0.0, 0.02, 0.04]
     assert "row / 0" not in on_one_clock(flat, {}, replace(settings, time_column="row / 0"))[0]
 
 

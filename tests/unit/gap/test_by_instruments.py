@@ -31,6 +31,7 @@ from tests.builders.gap_flights import candidate, fly, weak
 
 BLOCKS, WINDOWS = 20, 12
 OWN, OTHER = np.array([True, False]), np.array([False, True])
+LAGS = np.zeros(2, dtype=bool)
 
 
 def crossed(values, rng):
@@ -217,16 +218,24 @@ def test_a_number_that_trades_with_those_of_another_source_is_not_identified():
     """A drag by the past and a wind by setpoints, which show but their product."""
     rng = np.random.default_rng(3)
     first, second = by_each([0.0, 0.0], rng)
-    assert [each.numbers.tolist() for each in _strong_together([first, second])] == [[True, False], [False, True]]
+    assert [each.numbers.tolist() for each in _strong_together([first, second], LAGS)] == [[True, False], [False, True]]
     # What the second knows of its number is what the first knows of its own.
     second.products[BLOCKS:, 1, :2] = first.products[:BLOCKS, 0, :2] + 0.01 * rng.standard_normal((BLOCKS, 2))
-    assert [each.numbers.tolist() for each in _strong_together([first, second])] == [[True, False], [False, False]]
+    assert [each.numbers.tolist() for each in _strong_together([first, second], LAGS)] == [
+        [True, False],
+        [False, False],
+    ]
+    # Of a lag a fit is the loop's.
+    assert [each.numbers.tolist() for each in _strong_together([first, second], OTHER)] == [
+        [True, False],
+        [False, True],
+    ]
 
 
 def test_blocks_of_one_source_are_no_scatter_of_another():
     """Many blocks of the first made a number weak that the second identifies, however well."""
     sources = by_each([0.0, 0.0], np.random.default_rng(3), (2 * BLOCKS, BLOCKS // 2))
-    assert [each.numbers.tolist() for each in _strong_together(sources)] == [[True, False], [False, True]]
+    assert [each.numbers.tolist() for each in _strong_together(sources, LAGS)] == [[True, False], [False, True]]
 
 
 def test_small_effects_by_samples_leave_the_errors_of_all_others_as_they_were(monkeypatch):

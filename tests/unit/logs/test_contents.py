@@ -37,6 +37,7 @@ from cpfls_cli.logs.formats import (
 from tests.builders import blackbox_logs, ulogs
 from tests.builders.dataflash_logs import dataflash
 from tests.builders.ros_bags import BEGIN_NS, imu, write_bag
+from tests.builders.unknown_logs import flight, named
 
 
 def listed(contents):
@@ -340,6 +341,9 @@ def test_names_in_a_remark_are_those_of_rows_with_some_words(tmp_path: Path) -> 
     # A remark of another length names nothing.
     own = contents(_written(tmp_path / "log.csv", "# a flight\ntime,x\n1,2\n"))
     assert list(own.topics[""]) == ["time", "x"]
+    # Columns may be numbered below it.
+    own = contents(_written(tmp_path / "log.csv", "# indoor, quad, monday\ntime,0,1\n1,2,3\n"))
+    assert list(own.topics[""]) == ["time", "0", "1"]
 
 
 def test_names_with_spaces_are_of_commas(tmp_path: Path) -> None:
@@ -598,7 +602,7 @@ def test_structures_with_stamps_of_their_own_are_topics(tmp_path):
     }
     scipy.io.savemat(tmp_path / "log.mat", data)
     contents = log_contents(tmp_path / "log.mat")
-    assert contents.warnings == ("without stamps that rise from row to row, and left out: imu",)
+    assert contents.warnings == ("of few rows, or without stamps that rise from row to row, and left out: imu",)
     assert {topic: list(fields) for topic, fields in contents.topics.items()} == {
         "att": ["timestamp", "roll"],
         "out": ["timestamp", "c1"],
@@ -606,9 +610,44 @@ def test_structures_with_stamps_of_their_own_are_topics(tmp_path):
     np.testing.assert_allclose(contents.topics["out"]["timestamp"], 5 + slow)
     again = log_contents(tmp_path / "log.mat", {"att.roll", "out.c1"})
     np.testing.assert_array_equal(again.topics["att"]["roll"], np.sin(fast))
+    # Names that no topic has are those of columns.
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file.update({f"{group}.0/{name}": own for group in ("att", "out") for name, own in data[group].items()})
+    assert set(log_contents(tmp_path / "log.h5").topics) == {""}
     # Groups of one length are on one clock, whose name says so.
     scipy.io.savemat(tmp_path / "log.mat", {"att": data["att"], "more": {"time": fast, "x": fast}})
     assert set(log_contents(tmp_path / "log.mat").topics) == {""}
+
+
+def test_stamps_of_structures_are_on_one_clock(tmp_path):
+    own = flight(seconds=20.0)
+    fast, x = 5000 + 0.01 * np.arange(6000.0), np.sin(np.arange(6000.0))
+    gap = np.where(np.arange(3000) == 7, np.nan, fast[::2])
+    data = {
+        # Another clock under the name of the stamps of topics.
+        "att": {"time": fast, "roll": x, "timestamp": 1e15 + 1e6 * fast},
+        "imu": {"time": 1e3 * fast, "accX": x},
+        # Seconds, whose steps are those of milliseconds.
+        "bat": {"time": fast[::100], "v": x[::100]},
+        "gps": {"time": fast[::200], "h": x[::200]},
+        "baro": {"time": gap, "p": x[::2]},
+        # Whose first row is at no known time.
+        "own": named(np.hstack([own.rate, own.angles]), "gyro_x", "gyro_y", "gyro_z", "roll", "pitch", "yaw"),
+        "seq": {"number": 0.5 * np.arange(6000.0), "c1": x},
+    }
+    scipy.io.savemat(tmp_path / "log.mat", data)
+    contents = log_contents(tmp_path / "log.mat")
+    assert contents.warnings[0].endswith("left out: own, seq")
+    assert {topic: len(fields["timestamp"]) for topic, fields in contents.topics.items()} == {
+        "att": 6000,
+        "imu": 6000,
+        "bat": 60,
+        "gps": 30,
+        "baro": 2999,
+    }
+    for fields in contents.topics.values():
+        np.testing.assert_allclose(fields["timestamp"][[0, -1]], [5000, 5059.5], atol=1.6)
+    assert list(contents.topics["att"]) == ["timestamp", "roll"]
 
 
 def structure(time, values, label="", block="model/To Workspace"):
@@ -874,7 +913,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.yaml", b"time: 1.5\r\nroll: 0.1\r\n---\r\ntime: 1.6\r\n", "YAML, as `ros2 topic echo`", "ros2 bag record"),
         ("a.data", b"0.5 12 IMU_GYRO 0.1 0.2 0.3\n", "a log of Paparazzi", "write its numbers as CSV"),
         ("a.txt", b"0.5 12 -0.1 1e-3 0.3\n0.6 12 0 0 0\n", "a table of numbers without names", "names each column"),
-        ("a.txt", b"0,11,88,0,058,0\n0,02,11,9,0,058,0\n", "a table whose commas part its columns", "write points in"),
+        ("a.txt", b"0,11,88,0,058,0\n0,02,11,9,0,058,0\n", "a table whose rows differ in their commas", "write points"),
         ("a.log", b"1,2,3,4,\r\n", "a table of numbers without names", "let its name end in .csv"),
         ("a.dat", 999 * b"0.25 ", "a table of numbers without names", "let its name end in .csv"),
         ("a.dat", b"12.1 -0.5\n12.2 0.25\n", "a table of numbers without names", "names each column"),

@@ -19,6 +19,7 @@ from cpfls_cli.result import Estimate
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.stages.diagnose import learned_from, next_command
 from cpfls_cli.stages.extend import named_effects
+from cpfls_cli.stages.init import _unused
 from cpfls_cli.stages.look import FIGURES
 from cpfls_cli.stages.reduce import _naming
 from cpfls_cli.stages.vehicle import next_commands
@@ -188,3 +189,10 @@ def test_a_flight_held_out_that_was_imported_from_a_log_learned_from_is_said_to_
     held = [("two.h5", ("6" * 64, "9" * 64))]
     (said,) = learned_from(run, made.diagnosis(), {}, learned, held, model="disagreement.h5").seen
     assert said.startswith("two.h5: the model of disagreement.h5 has learned from it")
+
+
+def test_a_topic_is_unused_where_no_instance_of_it_is_used():
+    guess = SimpleNamespace(columns=SimpleNamespace(columns=("imu[1].x",)))
+    names = ("imu.x", "imu.y", "imu[1].y", "mag.x", "mag[1].x")
+    unused = [*_unused(SimpleNamespace(signals=(guess,), unused=names))]
+    assert unused == ["imu.x, imu.y", "imu[1].y", "anything of mag"]
