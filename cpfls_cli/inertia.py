@@ -52,6 +52,13 @@ def six_parameters(inertia: Sequence[float] | Array) -> Array:
     return parameters
 
 
+def rescaled(inertia: Sequence[float], factors: Array) -> tuple[float, ...]:
+    """Multiply the moments of an inertia by factors, its other entries so that it stays positive definite."""
+    roots = np.sqrt(factors)
+    products = [roots[row] * roots[column] for row, column in INERTIA_ENTRIES]
+    return tuple(float(own * factor) for own, factor in zip(inertia, products, strict=False))
+
+
 _ROUNDING = 1e-9
 """Share of a moment of inertia that is rounding."""
 
