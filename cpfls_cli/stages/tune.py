@@ -400,7 +400,7 @@ def _missing(run: Run, record: Vehicle) -> str:
 
 
 def _ratio_by_bounds(record: Vehicle) -> tuple[float, float] | None:
-    """Give the bounds on Izz over the drag factor, in what was found, where a body by bounds leaves one of them open."""
+    """Give the bounds on Izz over the drag factor, in what was found, where a body by bounds leaves one open."""
     low, high = float(record.loop.low[2]), float(record.loop.high[2])
     open_ = {FOUND_AS[INERTIA[2]], FOUND_AS[DRAG]} & {*record.not_determined}
     return (low, high) if record.by_bounds and open_ and np.isfinite(low * high) else None
