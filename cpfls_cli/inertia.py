@@ -52,11 +52,12 @@ def six_parameters(inertia: Sequence[float] | Array) -> Array:
     return parameters
 
 
-def rescaled(inertia: Sequence[float], factors: Array) -> tuple[float, ...]:
+def rescaled(inertia: Sequence[float], factors: Array) -> tuple[float, float, float, float, float, float]:
     """Multiply the moments of an inertia by factors, its other entries so that it stays positive definite."""
     roots = np.sqrt(factors)
-    products = [roots[row] * roots[column] for row, column in INERTIA_ENTRIES]
-    return tuple(float(own * factor) for own, factor in zip(inertia, products, strict=False))
+    rows, columns = np.array(INERTIA_ENTRIES).T
+    xx, yy, zz, xy, xz, yz = (six_parameters(inertia) * roots[rows] * roots[columns]).tolist()
+    return xx, yy, zz, xy, xz, yz
 
 
 _ROUNDING = 1e-9
