@@ -52,6 +52,14 @@ def six_parameters(inertia: Sequence[float] | Array) -> Array:
     return parameters
 
 
+def rescaled(inertia: Sequence[float], factors: Array) -> tuple[float, float, float, float, float, float]:
+    """Multiply the moments of an inertia by factors, its other entries so that it stays positive definite."""
+    roots = np.sqrt(factors)
+    rows, columns = np.array(INERTIA_ENTRIES).T
+    xx, yy, zz, xy, xz, yz = (six_parameters(inertia) * roots[rows] * roots[columns]).tolist()
+    return xx, yy, zz, xy, xz, yz
+
+
 _ROUNDING = 1e-9
 """Share of a moment of inertia that is rounding."""
 

@@ -158,6 +158,8 @@ def parameters_of(vehicle: Vehicle) -> Iterator[Parameter]:
             stated = held if key in STATED and held else None
             adds = key in (LAG, DELAY, *CENTRE, *INERTIA[3:])
             why = "not needed: no lower error with it" if adds else "as stated: no lower error with another"
+            if vehicle.by_bounds and (vehicle.forecast is not None or key in STATED):
+                why = "not tried: the body is held by bounds"
             yield Parameter(key, held, unit, None, None, stated, False, why)
 
 
@@ -181,7 +183,8 @@ def _reason(vehicle: Vehicle, number: FoundNumber) -> str:
     if others:
         return f"only its ratio to {' and '.join(others)} is known: they trade against each other"
     if vehicle.by_bounds and name in OF_TURNING:
-        return f"bounds from {number.low:.3g} to {number.high:.3g} leave it open"
+        ends = f"bounds from {number.low:.3g} to {number.high:.3g} leave it open"
+        return ends if name in vehicle.bounded else "the flights set no bounds to it: taken as open by a factor of ten"
     return "the flights say too little, the interval is too wide"
 
 
@@ -396,6 +399,14 @@ class Vehicle(VehicleFit, AnyModel):
         drag, moment = FOUND_AS[DRAG], FOUND_AS[INERTIA[2]]
         ratios = {frozenset((trade.first, trade.second)) for trade in self.trades}
         return moment not in self.not_determined or frozenset((drag, moment)) in ratios
+
+    @property
+    def bounded(self) -> tuple[str, ...]:
+        """Numbers of a body by bounds that have bounds: about yaw the one that was found, for two have only a ratio."""
+        yaw = [name for name in (FOUND_AS[INERTIA[2]], FOUND_AS[DRAG]) if name in self.found]
+        names = (FOUND_AS[INERTIA[0]], FOUND_AS[INERTIA[1]], *(yaw if len(yaw) == 1 else ()))
+        known = self.by_bounds & np.isfinite(self.loop.low * self.loop.high)
+        return tuple(name for name, own in zip(names, known.tolist(), strict=False) if own and name in self.found)
 
     @cached_property
     def found(self) -> Mapping[str, FoundNumber]:

@@ -17,7 +17,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import BLOCK_S, FEWEST_BLOCKS, contiguous, half_width, jackknife_error
 from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
-from cpfls_cli.inertia import EXPLAINED
+from cpfls_cli.inertia import EXPLAINED, rescaled
 from cpfls_cli.playback.balances import BANDS, band_windows
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.model import VehicleModel
@@ -40,6 +40,8 @@ _LEAVES_LESS = 0.5
 """Of what a model leaves unexplained: one without its effects that leaves less shows that it is wrong."""
 _FORMULAS = 1.15
 """Factor by which lag and thrust of a formula move both bounds: a sagging battery or a filter did by up to 1.12."""
+_PASSES = 2
+"""By which a guess that is off a hundredfold has come to the middle of the bounds."""
 _MOST_NOISE = 0.1
 """Of the power of a band that may be noise of the sensors: with more, the residual is the noise's error."""
 
@@ -122,8 +124,8 @@ def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Seque
     """Bound as `loop_bounds` does, and judge flights by what explains them best: a model, or rotors that only lag.
 
     A model that was found and is wrong explains little of flights that show the vehicle well. The bounds are then those
-    of the rotors, in the stated moments of inertia, about yaw in their ratio to the drag factor; not finite where any
-    body would do.
+    of the rotors, in the stated moments of inertia, about yaw in their ratio to the drag factor; an end is not finite
+    where any body would do.
     """
     found = loop_bounds(model, flights)
     if not found.shows_loop:
@@ -137,8 +139,7 @@ def loop_and_plain(model: VehicleModel, vehicle: VehicleSettings, flights: Seque
     far = (left > 1 - EXPLAINED) & less(1 - best.explained[:2], _LEAVES_LESS * left)
     if best.shows_loop and not far.any():
         return better
-    bounded = (best.low > 1 / ANY) & (best.high < ANY)
-    low, high = np.where(bounded, [best.low / _FORMULAS, best.high * _FORMULAS], np.nan)
+    low, high = _of_any_guess(vehicle, _LAGS[at], flights, best)
     lags = np.array([_LAGS[max(at - 1, 0)], _LAGS[at], (*_LAGS, 2 * _LAGS[-1])[at + 1]])
     return better._replace(missed=found.explained, low=low, high=high, lags_s=lags)
 
@@ -162,6 +163,22 @@ def shows_loop_anyhow(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight
 def _plain_bounds(vehicle: VehicleSettings, flights: Sequence[PlaybackFlight]) -> Iterator[LoopBounds]:
     for lag in _LAGS:
         yield loop_bounds(VehicleModel(vehicle=vehicle, response=RotorResponse(lag_s=lag)), flights)
+
+
+def _of_any_guess(
+    vehicle: VehicleSettings, lag_s: float, flights: Sequence[PlaybackFlight], bounds: LoopBounds
+) -> tuple[Array, Array]:
+    """Bound around the middle of bounds once more: a body that is far off, or out of proportion, hides those there are.
+
+    In the stated moments of inertia, with what lag and thrust of a formula add; an end that any body has is not finite.
+    """
+    middle = np.ones(3)
+    for _ in range(_PASSES):
+        middle = middle * np.nan_to_num(np.sqrt(bounds.low * bounds.high), nan=1.0)
+        moved = replace(vehicle, inertia_kg_m2=rescaled(vehicle.inertia_kg_m2, middle))
+        bounds = loop_bounds(VehicleModel(vehicle=moved, response=RotorResponse(lag_s=lag_s)), flights)
+    low = np.where(bounds.low > 1 / ANY, middle * bounds.low / _FORMULAS, np.nan)
+    return low, np.where(bounds.high < ANY, middle * bounds.high * _FORMULAS, np.nan)
 
 
 class BalancedTorque(NamedTuple):

@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import half_width, jackknife_error
 from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
-from cpfls_cli.inertia import FLAT, INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others
+from cpfls_cli.inertia import FLAT, INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others, rescaled
 from cpfls_cli.playback.constants import Constants, UsedInstruments, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.evaluation import OF_A_WEIGHT, Group, JointNumbers
@@ -164,6 +164,7 @@ def find_vehicle(
     loop = loop_and_plain(fitted.model, begun, own)
     constants = _identified(begun, own, given, settings, loop, fitted.model)
     held, forecast = Held(begun, (), (), loop), None
+    apart = loop.misses and not loop.misses_alone and constants is None
     if loop.misses and constants is None:
         held = held_by_bounds(begun, loop, tuple(found_numbers(fitted, uncertainty(fitted, windows))))
         if loop.misses_alone:
@@ -172,7 +173,7 @@ def find_vehicle(
     tried = choice.tried
     if constants is not None:
         solved, spread, forecast = constants.fitted, constants.spread, fitted.model
-    elif loop.misses and not loop.misses_alone:
+    elif apart:
         solved, along = fitted_rotors(held.vehicle, loop.lags_s[1], own, settings)
         spread, forecast = uncertainty(solved, along), fitted.model
         tried = (*tried, choice.judge("held", solved, own, settings))
@@ -202,7 +203,8 @@ def find_vehicle(
         complete=choice.complete,
         blocks=spread.blocks,
         guessed=tuple(sorted(set(vehicle.unknown) - set(begun.unknown) - {number.name for number in sensed})),
-        differences=tuple(differences(fitted, uncertainty(fitted, windows))) if groups else (),
+        # A body by bounds that is not the fit's is not what the fit's other configurations differ from.
+        differences=tuple(differences(fitted, uncertainty(fitted, windows))) if groups and not apart else (),
         loop=held.loop,
         instruments=None if constants is None else constants.used,
         forecast=None if forecast is None else replace(forecast, vehicle=replace(forecast.vehicle, unknown=())),
@@ -261,28 +263,29 @@ def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[
     carries = open_thrust and LAW not in found
     thrust = found["thrust_factor"].value / rotor.thrust_factor_n_s2 if carries else 1.0
     low, high = np.array([loop.low, loop.high]) * [thrust, thrust, 1.0]
-    bounded, middle = np.isfinite(low), np.nan_to_num(np.sqrt(low * high), nan=1.0)
-    of_body = bounded & [True, True, not open_drag]
-    outside = of_body & ((low > 1) | (high < 1))
-    inertia = np.array(vehicle.inertia_kg_m2, dtype=float)
-    if open_body or outside.any():
-        inertia[:3] *= np.where(of_body, middle, 1.0)
-    if open_body and not of_body[2]:
-        inertia[2] = FLAT * inertia[:2].sum()
-    moved = inertia[:3] / vehicle.inertia_kg_m2[:3]
+    bounded, middle = np.isfinite(low * high), np.nan_to_num(np.sqrt(low * high), nan=1.0)
+    of_body, moved = bounded & [True, True, not open_drag], np.ones(3)
+    stays = not open_body and not (((low > 1) | (high < 1)) & [True, True, not open_drag]).any()
+    if not stays:
+        moved = np.where(of_body, middle, 1.0)
+        if not of_body[2]:
+            moved[2] = FLAT * (moved * vehicle.inertia_kg_m2[:3])[:2].sum() / vehicle.inertia_kg_m2[2]
+    inertia = rescaled(vehicle.inertia_kg_m2, moved)
     drag = float(moved[2] / middle[2]) if open_drag and bounded[2] else 1.0
     ratio = [*moved[:2], moved[2] / drag]
-    loop, traded = loop._replace(low=low / ratio, high=high / ratio), False
+    # One end alone says no more than that what is stated is off.
+    low, high = np.where(bounded, [low / ratio, high / ratio], np.nan)
+    loop, traded = loop._replace(low=low, high=high), False
     numbers = []
     if open_thrust:
         number = _held_at("thrust_factor", "N s^2", rotor.thrust_factor_n_s2)
         numbers.append(found["thrust_factor"] if carries else number)
     if open_drag:
-        exact = bool(bounded[2]) and not (open_body or outside.any())
+        exact = bool(bounded[2]) and stays
         numbers.append(_held_at("drag_factor", "N m s^2", drag * rotor.drag_factor_n_m_s2, exact=exact))
-    if open_body or outside.any():
+    if not stays:
         stated = [np.nan] * 3 if open_body else vehicle.inertia_kg_m2[:3]
-        rows = zip(INERTIA_PARAMETERS, inertia.tolist(), stated, of_body.tolist(), strict=False)
+        rows = zip(INERTIA_PARAMETERS, inertia, stated, of_body.tolist(), strict=False)
         numbers += [_held_at(f"inertia.{name}", "kg m^2", value, own, exact=exact) for name, value, own, exact in rows]
         # Of two numbers that are open by a factor of ten, by how much their ratio is.
         known = np.log(ANY) / np.hypot(np.log(ANY), np.log(high[2] / low[2]) / 2)
@@ -290,7 +293,7 @@ def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[
     if loop.lags_s[1] and not loop.misses_alone:
         shorter, lag, longer = loop.lags_s.tolist()
         numbers.append(FoundNumber(LAG, "s", lag, shorter, longer, np.nan, False, False))
-    body = replace(with_factors(vehicle, thrust, drag), inertia_kg_m2=tuple(inertia.tolist()), unknown=())
+    body = replace(with_factors(vehicle, thrust, drag), inertia_kg_m2=inertia, unknown=())
     trades = (Trade("drag_factor", "inertia.Izz", float(known)),) if traded else ()
     return Held(body, tuple(numbers), trades, loop)
 

@@ -399,10 +399,18 @@ def _missing(run: Run, record: Vehicle) -> str:
     return missing_flight(run, record)
 
 
+def _ratio_by_bounds(record: Vehicle) -> tuple[float, float] | None:
+    """Give the bounds on Izz over the drag factor, in what was found, where a body by bounds leaves one open."""
+    low, high = float(record.loop.low[2]), float(record.loop.high[2])
+    open_ = {FOUND_AS[INERTIA[2]], FOUND_AS[DRAG]} & {*record.not_determined}
+    return (low, high) if record.by_bounds and open_ and np.isfinite(low * high) else None
+
+
 def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tuple[Spread, ...], list[str]]:
     """Give what flights leave open of each axis, and say what is assumed where they do not identify it."""
     known = record.parameters
     intervals, stated, assumed = {}, list[str](), list[str]()
+    of_yaw = _ratio_by_bounds(record)
     for key in (*INERTIA[:3], THRUST, DRAG, LAG, DELAY):
         each = known[key]
         # A lag or a delay that flights leave open is open here too: nothing else is known of it.
@@ -410,9 +418,9 @@ def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tu
         if used and each.value and each.low is not None and each.high is not None:
             # An end at or below zero says no more than that the number is small.
             intervals[key] = (max(each.low / each.value, 0.1), max(each.high / each.value, 0.1))
-        elif record.by_bounds and key == INERTIA[2] and np.isfinite(record.loop.low[2]):
+        elif key == INERTIA[2] and of_yaw:
             # About yaw the bounds are those of the ratio that control meets.
-            intervals[key] = float(record.loop.low[2]), float(record.loop.high[2])
+            intervals[key] = of_yaw
         elif key in INERTIA[:3] and FOUND_AS[key] in record.not_determined:
             intervals[key] = _ASSUMED_GAIN
             stated.append(each.name)

@@ -90,7 +90,7 @@ _TRIED = {
     "added": "named effects added",
     "everything": "all blocks",
     "nothing": "stated vehicle",
-    "free": "chosen with any body",
+    "free": "chosen with a free body",
     "held": "body by bounds, rotors that only lag",
 }
 _MARKERS = {"chosen": "s", "best": "^", "added": "v", "everything": "D", "nothing": "x", "free": "P", "held": "P"}
@@ -154,11 +154,8 @@ def known_bands(bounds: LoopBounds, axis: int) -> tuple[Band, Band | None] | Non
 
 
 def bounded(r: Vehicle) -> list[Parameter]:
-    """List the moments of inertia that were found between bounds; about yaw a drag factor that is open has them."""
-    known = np.isfinite(r.loop.low) & [True, True, FOUND_AS[DRAG] not in r.found]
-    return [
-        r.parameters[key] for key, own in zip(INERTIA, known.tolist(), strict=False) if own and FOUND_AS[key] in r.found
-    ]
+    """List the moments of inertia that were found between bounds."""
+    return [r.parameters[key] for key in INERTIA[:3] if FOUND_AS[key] in r.bounded]
 
 
 def shares_in_words(shares: Sequence[Share], first: int) -> str:

@@ -13,6 +13,7 @@ from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.vibration import Change
 from cpfls_cli.playback.vehicle import Trade
 from cpfls_cli.stage import loaded
+from cpfls_cli.stages.tune import _spreads
 from cpfls_cli.tuning.gains import Gains
 from tests.builders.autopilots import STUDY, found_vehicle
 from tests.builders.changed_flights import save
@@ -124,6 +125,17 @@ def test_gains_of_a_body_by_bounds_keep_their_margins_between_them(cpfls, refuse
         assert axis.bandwidth_hz < other.bandwidth_hz
     message = refuse("tune", *gains_of(1.1), "-o", tmp_path / "gains.h5", "--force")
     assert "constants not determined; not identified: Ixx, Iyy" in " ".join(message)
+
+
+@pytest.mark.parametrize("determined", [True, False])
+def test_bounds_about_yaw_count_once_for_a_drag_factor_that_has_them(determined):
+    plain = found_vehicle(instrumented=False)
+    loop = plain.loop._replace(low=np.full(3, 0.8), high=np.full(3, 1.25), missed=np.full(3, 0.02))
+    drag = number_of("drag_factor", 1.0, 0.8, 1.25, determined=determined)
+    own = replace(plain, numbers=(drag,), correlation=np.eye(1), loop=loop)
+    roll, _, yaw = _spreads(own, own.model, 0.03)[0]
+    assert roll.gain == (1.0, 1.0)
+    assert yaw.gain == pytest.approx((0.8, 1.25))
 
 
 @pytest.mark.usefixtures("sketched")

@@ -95,7 +95,7 @@ def test_a_model_that_explains_nothing_is_not_taken_for_the_loop(flights, bounds
     np.testing.assert_array_equal(found.missed, loop_bounds(wrong, still).explained)
     # Whatever the config guesses, its rotors alone enclose the body, and the yaw of one whose drag factor is known.
     truth = np.array(SMALL.vehicle.inertia_kg_m2[:3])
-    for stated in (3 * truth, truth):
+    for stated in (3 * truth, truth, 30 * truth, truth / 30, truth * [3, 1, 1]):
         found = loop_and_plain(wrong, replace(SMALL.vehicle, inertia_kg_m2=tuple(stated)), still)
         low, high = found.low * stated, found.high * stated
         assert ((low < truth) & (truth < high) & (high < 1.6 * low)).all()

@@ -243,7 +243,7 @@ def test_a_body_that_is_held_between_bounds_is_known_as_far_as_they_are_narrow()
     assert "Ixx and Iyy are known by bounds alone" in title(own)
     (said,) = [line for line in against(own) if line.startswith("What fits")]
     assert "its torque explains 1 % of roll and 2 % of pitch acceleration" in said
-    assert "but a lag 85 % of the roll acceleration from 2.5 to 6.7 Hz (91 % from 0.63 to 1.7 Hz)" in said
+    assert "such rotors 85 % of the roll acceleration from 2.5 to 6.7 Hz (91 % from 0.63 to 1.7 Hz)" in said
     assert "(Ixx from 1.3 × 10⁻⁵ to 2.3 × 10⁻⁵ and Iyy from 1.4 × 10⁻⁵ to 2.5 × 10⁻⁵ kg m²)" in said
     assert {own.parameters[key].identified for key in ("inertia_kg_m2.0", "inertia_kg_m2.1")} == {"by bounds"}
     assert "the loop," not in " ".join(against(own))
@@ -251,6 +251,19 @@ def test_a_body_that_is_held_between_bounds_is_known_as_far_as_they_are_narrow()
     assert wide.verdict == Trust.NOT_DETERMINED
     assert "bounds leave Ixx and Iyy open" in title(wide)
     assert wide.parameters["inertia_kg_m2.0"].reason == "bounds from 1.3e-05 to 2.7e-05 leave it open"
+
+
+def test_of_a_body_by_bounds_what_has_none_is_not_said_to_have_them():
+    """Neither a ratio that is open as well, nor what was not tried with such a body."""
+    names = ("inertia.Ixx", "inertia.Iyy", "inertia.Izz", "drag_factor")
+    numbers = tuple(number_of(name, 2e-5, 1e-5, 4e-5, determined=False) for name in names)
+    own = replace(bounded(numbers=numbers, correlation=np.eye(4)), forecast=whole())
+    assert own.bounded == names[:2]
+    for key in ("inertia_kg_m2.2", "rotors.drag_factor_n_m_s2"):
+        assert own.parameters[key].reason == "the flights set no bounds to it: taken as open by a factor of ten"
+    said = " ".join(texts(own))
+    assert "About yaw the flights leave drag factor, Izz and their ratio open." in said
+    assert "freeing it does not lower the error" not in said
 
 
 def test_where_flights_show_the_loop_too_no_forecast_judges_a_body_by_bounds():

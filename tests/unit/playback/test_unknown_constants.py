@@ -10,7 +10,14 @@ from cpfls_cli.playback.fit import Fitted
 from cpfls_cli.playback.loop import LoopBounds, _explained, _factors
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.vehicle import FoundNumber, bodily, carrying_weight, find_vehicle, widened_by_loop
+from cpfls_cli.playback.vehicle import (
+    FoundNumber,
+    bodily,
+    carrying_weight,
+    find_vehicle,
+    held_by_bounds,
+    widened_by_loop,
+)
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
 TRUE = truth()
@@ -182,6 +189,29 @@ def test_of_a_vehicle_whose_body_is_held_only_narrow_bounds_and_what_carries_the
     assert [name for name, number in found.items() if number.determined] == ["thrust_factor", "inertia.Ixx"]
     assert (found["inertia.Ixx"].low, found["inertia.Ixx"].high) == pytest.approx((0.0375, 0.065))
     assert (found["lag.time_constant_s"].low, found["lag.time_constant_s"].high) == (0.02, 0.1)
+
+
+@pytest.mark.parametrize("unknown", [(), ("drag_factor",)])
+def test_a_body_that_is_moved_to_the_middle_of_bounds_stays_a_body(unknown):
+    """A stated one, with its products; about yaw without bounds that of a flat one."""
+    stated = replace(STATED, inertia_kg_m2=(0.03, 0.04, 0.09, 0.02, 0.0, 0.0), unknown=unknown)
+    bounds = LOOP._replace(low=np.array([0.1, 0.1, np.nan]), high=np.array([0.3, 0.3, np.nan]), missed=np.zeros(3))
+    held = held_by_bounds(stated, bounds, ())
+    moments = held.vehicle.inertia_kg_m2
+    assert moments[:2] == pytest.approx((0.03 * np.sqrt(0.03), 0.04 * np.sqrt(0.03)))
+    assert moments[3] == pytest.approx(0.02 * np.sqrt(0.03))
+    assert moments[2] < moments[0] + moments[1]
+    found = {number.name: number for number in widened_by_loop(held.numbers, held.loop)}
+    assert [name for name, number in found.items() if number.determined] == []
+    assert (found["inertia.Ixx"].low, found["inertia.Ixx"].high) == pytest.approx((0.003, 0.009))
+
+
+def test_a_stated_body_beyond_the_only_end_there_is_does_not_stay():
+    bounds = LOOP._replace(low=np.full(3, np.nan), high=np.array([0.4, np.nan, 7.0]), missed=np.zeros(3))
+    held = held_by_bounds(replace(STATED, unknown=()), bounds, ())
+    assert [number.name for number in held.numbers] == ["inertia.Ixx", "inertia.Iyy", "inertia.Izz"]
+    assert not np.isfinite([held.loop.low, held.loop.high]).any()
+    assert not any(number.determined for number in widened_by_loop(held.numbers, held.loop))
 
 
 def replace_explained(bounds, share):
