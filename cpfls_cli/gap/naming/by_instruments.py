@@ -47,7 +47,8 @@ def by_instruments(
 
     `held`, shape (number,): numbers that stay.
     `together`: whether the error of a number holds those of the numbers that another source identifies, or the fit
-    where nothing does, and one is not identified where it is not jointly with these; else each is conditional on them.
+    where nothing does, and one that is not identified jointly with these keeps its fit, where all intervals hold the
+    conditional ones too; else each is conditional on them.
 
     Reference: Söderström and Stoica 2002 (instrumental variables in closed loop); Staiger and Stock 1997 (weak
     instruments); Newey and McFadden 1994, section 6 (errors of estimates in several steps).
@@ -55,11 +56,11 @@ def by_instruments(
     stated = at = _of_config(found)
     held = np.zeros(len(found.values), dtype=bool) if held is None else held
 
-    def sources_at(there: NamedFit) -> list[_Source]:
-        every = _sources(there, given, held)
-        return _strong_together(every, _is_lag(there)) if every and together else every
+    def jointly(every: list[_Source]) -> list[_Source]:
+        return _strong_together(every, _is_lag(at)) if every and together else every
 
-    sources = sources_at(at)
+    conditional = _sources(at, given, held)
+    sources = jointly(conditional)
     if not sources:
         return found
     moved, far = np.zeros((2, len(found.values)), dtype=bool)
@@ -72,11 +73,9 @@ def by_instruments(
         fit_error = np.where(stated.values == found.values, found.estimates.left_out - found.values, 0.0)
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
-        values, left_out = _stepped(at, sources, fit_error)
+        values, left_out = _stepped(at, sources)
         # What follows from others is identified where they are.
-        now = np.any(
-            [*(own for _, own in sources), (left_out[: len(sources[0].products)] != values).any(axis=0)], axis=0
-        )
+        now = np.any([*(numbers for _, numbers in sources), (left_out != values).any(axis=0)], axis=0)
         if before is not None:
             # A number that no source identifies where it has come to is as uncertain as when one did.
             left_out[:, ~now] = before[:, ~now]
@@ -84,12 +83,31 @@ def by_instruments(
         step, error, shapes = np.abs(values - at.values), jackknife_error(left_out), values[len(at.estimates.linear) :]
         far = np.where(now & bends, step > error, far)
         hypothesis = at.hypothesis.with_shapes(shapes) if len(shapes) else at.hypothesis
-        at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
-        if np.all(10 * step <= error) or not (sources := sources_at(at)):
+        if fit_error is not None:
+            _, left_out = _stepped(at, sources, fit_error)
+            left_out[:, moved & ~now] = values[moved & ~now]
+            left_out[: len(before), moved & ~now] = before[:, moved & ~now]
+        numbers = estimates_of(hypothesis, values, left_out, len(before))
+        at = at._replace(hypothesis=hypothesis, estimates=numbers)
+        if np.all(10 * step <= error) or not (sources := jointly(_sources(at, given, held))):
             break
     if (lost := far & ~now & ~held).any():
         return by_instruments(found, given, held | lost, together=together)
-    return at._replace(estimates=_with_unidentified(stated, at.estimates, moved))
+    dropped = np.any([each.numbers for each in conditional], axis=0) & ~moved
+    numbers = _with_unidentified(stated, at.estimates, moved)
+    if dropped.any():
+        numbers = _holding(numbers, by_instruments(found, given, held, together=False).estimates)
+    return at._replace(estimates=numbers)
+
+
+def _holding(numbers: Estimates, others: Estimates) -> Estimates:
+    """Widen the intervals of numbers of effects by those of another fit of them."""
+    effects = []
+    for own, there in zip(numbers.effects, others.effects, strict=True):
+        other = {number.name: number for number in there}
+        both = [(number, other.get(number.name, number)) for number in own]
+        effects.append(tuple(replace(n, low=min(n.low, o.low), high=max(n.high, o.high)) for n, o in both))
+    return replace(numbers, effects=tuple(effects))
 
 
 def _of_config(found: NamedFit) -> NamedFit:
@@ -104,7 +122,7 @@ def _of_config(found: NamedFit) -> NamedFit:
     return found._replace(estimates=replace(found.estimates, linear=linear, parameters=stated))
 
 
-def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array | None) -> tuple[Array, Array]:
+def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array | None = None) -> tuple[Array, Array]:
     """Move numbers to where instruments and residual do not correlate; and with each block left out.
 
     Shapes that follow from coefficients follow them.
@@ -246,7 +264,7 @@ def _chance(ztx: Array, own: BoolArray, others: BoolArray, values: Array) -> flo
 def unidentified(before: NamedFit, after: NamedFit) -> list[Effect]:
     """List effects that instruments identify weakly, so that their numbers stayed as they were."""
     numbers = zip(after.hypothesis.chosen, before.estimates.effects, after.estimates.effects, strict=True)
-    return [each.effect for each, was, now in numbers if was is now]
+    return [each.effect for each, was, now in numbers if [own.value for own in was] == [own.value for own in now]]
 
 
 def predictable_residual(found: NamedFit, given: Instruments) -> Array:

@@ -204,19 +204,22 @@ def places_of(hypothesis: System) -> list[tuple[slice, slice]]:
     return places
 
 
-def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimates:
+def estimates_of(hypothesis: System, values: Array, left_out: Array, blocks: int | None = None) -> Estimates:
     """Give numbers from coefficients and shapes, with those of fits that each left one block out.
 
-    `values`, shape (number,): coefficients of the base, then shapes; `left_out`: shape (block, number).
+    `values`, shape (number,): coefficients of the base, then shapes; `left_out`: shape (block, number); `blocks`: how
+    many an error is of, None for all of these.
     """
+    blocks = len(left_out) if blocks is None else blocks
     rows, vehicle = np.vstack([values, left_out]), hypothesis.vehicle
     (of_vehicle, own), *_ = hypothesis.places
-    parameters = _with_intervals(of_vehicle.effect, vehicle, rows[:, own], rows[:, :0])
+    parameters = _with_intervals(of_vehicle.effect, vehicle, rows[:, own], rows[:, :0], blocks)
     places = list(zip(hypothesis.chosen, places_of(hypothesis), strict=True))
     return Estimates(
         values[: hypothesis.base.shape[2]],
         tuple(
-            _with_intervals(each.effect, vehicle, rows[:, linear], rows[:, shapes]) for each, (linear, shapes) in places
+            _with_intervals(each.effect, vehicle, rows[:, linear], rows[:, shapes], blocks)
+            for each, (linear, shapes) in places
         ),
         parameters,
         tuple(values[linear] for _, (linear, _) in places),
@@ -224,7 +227,9 @@ def estimates_of(hypothesis: System, values: Array, left_out: Array) -> Estimate
     )
 
 
-def _with_intervals(effect: Effect, vehicle: VehicleSettings, linear: Array, shapes: Array) -> tuple[Estimate, ...]:
+def _with_intervals(
+    effect: Effect, vehicle: VehicleSettings, linear: Array, shapes: Array, blocks: int
+) -> tuple[Estimate, ...]:
     """Give numbers of an effect with 95 % confidence intervals: by the jackknife, and what no flight identifies.
 
     The first row is of all blocks, the others each of all but one.
@@ -235,7 +240,7 @@ def _with_intervals(effect: Effect, vehicle: VehicleSettings, linear: Array, sha
     value, *without = np.concatenate([linear, shapes], axis=1)
     half = np.full(len(value), np.inf)
     if len(without) > 1:
-        half = np.hypot(half_width(serial_error(np.array(without)), len(without)), _KNOWN_TO * value)
+        half = np.hypot(half_width(serial_error(np.array(without)), blocks), _KNOWN_TO * value)
     return tuple(
         _within(Estimate(one.name, one.unit, float(v), float(v - h), float(v + h), one.bounds(vehicle)))
         for one, v, h in zip(known, value, half, strict=True)

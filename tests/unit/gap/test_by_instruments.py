@@ -13,6 +13,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_instruments, by_samples
 from cpfls_cli.gap.naming.by_instruments import (
     _chance,
+    _holding,
     _Source,
     _sources,
     _stepped,
@@ -230,6 +231,17 @@ def test_a_number_that_trades_with_those_of_another_source_is_not_identified():
         [True, False],
         [False, True],
     ]
+
+
+def test_intervals_hold_those_of_another_fit():
+    def fit(drag, wind, of_vehicle):
+        numbers = tuple(Estimate(name, "1", *each, (0.0, 9.0)) for name, each in (("k_d", drag), ("W_x", wind)))
+        return Estimates(np.zeros(0), (numbers,), (Estimate("thrust_scale", "1", *of_vehicle, (-0.9, 3.0)),), ())
+
+    found = fit((1.0, 0.9, 1.1), (2.0, 1.9, 2.1), (0.1, 0.0, 0.2))
+    numbers = _holding(found, fit((1.3, 1.2, 1.4), (1.7, 1.6, 2.0), (0.5, 0.4, 0.6)))
+    assert [(n.value, n.low, n.high) for n in numbers.effects[0]] == [(1.0, 0.9, 1.4), (2.0, 1.6, 2.1)]
+    assert numbers.parameters == found.parameters
 
 
 def test_blocks_of_one_source_are_no_scatter_of_another():
