@@ -47,7 +47,7 @@ def learned(
     found = find_vehicle(vehicle, training, used, progress)
     tried = {each.name: each for each in found.structures}
     print(f"\nfound in {perf_counter() - start:.0f} s, {found.evaluated} structures judged on flights kept aside:")
-    for name in BASELINES:
+    for name in filter(tried.__contains__, BASELINES):
         row = tried[name]
         size = f"{row.error:.4f} ({row.worse:+.4f} +- {row.uncertain:.4f})"
         print(f"  {name}: error {size}, {row.numbers} parameters: {' '.join(row.blocks)}")

@@ -12,6 +12,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.evolution.archive import comparable
 from cpfls_cli.playback.evaluation import Group, JointNumbers
 from cpfls_cli.playback.fit import (
@@ -380,7 +381,6 @@ def choose(
 _HELD = ("thrust_factor", "drag_factor", "thrust_law", INERTIA, PRODUCTS)
 """Blocks that make up for a body that is off, if they can."""
 
-_TRIM = "torque_bias"
 _OF_A_LOOP = ("slow_actuation", *LEARNED)
 """Blocks that explain what an autopilot does against gusts."""
 
@@ -565,16 +565,20 @@ def _front(judged: Sequence[Judged]) -> tuple[Judged, ...]:
 
 
 def fitted_to_all(
-    judged: Judged,
+    structure: Structure,
     vehicle: VehicleSettings,
     flights: Sequence[PlaybackFlight],
     settings: PlaybackSettings,
+    start: Fitted,
     groups: tuple[Group, ...] = (),
 ) -> tuple[Fitted, list[FitWindows]]:
-    """Fit a structure to all training flights, those of other configurations as well, with windows close together."""
+    """Fit a structure to all training flights, those of other configurations as well, with windows close together.
+
+    `start` is the same structure fitted to some of them.
+    """
     windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
-    known = judged.fit.free.named(judged.fit.values)
-    return fit(judged.structure.free(vehicle, groups), windows, known, _STEPS, _TOLERANCE), windows
+    known = start.free.named(start.values)
+    return fit(structure.free(vehicle, groups), windows, known, _STEPS, _TOLERANCE), windows
 
 
 def fitted_rotors(
@@ -582,5 +586,5 @@ def fitted_rotors(
 ) -> tuple[Fitted, list[FitWindows]]:
     """Fit the torque that is always there, which trims a vehicle, to a body that is held with rotors that only lag."""
     windows = windows_of(flights, settings.horizon_s, settings.window_interval_s)
-    blocks = tuple(block for block in (_TRIM,) if block not in settings.leave_out)
+    blocks = tuple(name for name, each in CATALOGUE.items() if each.trims and name not in settings.leave_out)
     return fit(JointNumbers(FreeNumbers(body, blocks, lag_s=lag_s)), windows, {}, _STEPS, _TOLERANCE), windows

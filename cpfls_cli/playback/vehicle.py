@@ -160,7 +160,7 @@ def find_vehicle(
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     choice, given = choose(begun, own, settings, progress, kept), instruments(own)
-    fitted, windows = fitted_to_all(choice.chosen, begun, flights, settings, groups)
+    fitted, windows = fitted_to_all(choice.chosen.structure, begun, flights, settings, choice.chosen.fit, groups)
     loop = loop_and_plain(fitted.model, begun, own)
     constants = _identified(begun, own, given, settings, loop, fitted.model)
     held, forecast = Held(begun, (), (), loop), None
@@ -169,7 +169,9 @@ def find_vehicle(
         held = held_by_bounds(begun, loop, tuple(found_numbers(fitted, uncertainty(fitted, windows))))
         if loop.misses_alone:
             choice = choose_again(held.vehicle, choice, own, settings, progress)
-            fitted, windows = fitted_to_all(choice.chosen, held.vehicle, flights, settings, groups)
+            fitted, windows = fitted_to_all(
+                choice.chosen.structure, held.vehicle, flights, settings, choice.chosen.fit, groups
+            )
     tried = choice.tried
     if constants is not None:
         solved, spread, forecast = constants.fitted, constants.spread, fitted.model

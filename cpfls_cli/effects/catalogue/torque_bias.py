@@ -28,5 +28,6 @@ EFFECT = Effect(
         "euler_axis_torque": "tilt: the wrong convention vanishes in level flight",
     },
     source="SkyFlow (thrust axis misalignment)",
+    trims=True,
     acts=_acts,
 )
