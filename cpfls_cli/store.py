@@ -208,7 +208,7 @@ def _write_values(group: h5py.Group, name: str, value: Any, own: Described, abou
     array = array.astype(np.uint8) if array.dtype == bool else array
     if rows or (array.ndim and array.nbytes >= _PACKED_BYTES):
         shape, chunk = (rows or len(array), *array.shape[1:]), (min(rows, PART), *array.shape[1:]) if rows else True
-        # A higher level saves 1 to 2 % of measured signals, and takes a twentieth of the time of a closed-loop flight.
+        # The default level makes measured signals 1 to 2 % smaller, and a closed-loop flight takes 3 % longer.
         packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
         dataset = group.create_dataset(name, shape, array.dtype, chunks=chunk, **packed).id
     else:
