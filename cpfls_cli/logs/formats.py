@@ -364,10 +364,10 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
         return "telemetry of MAVLink", _CONVERT_TLOG
     text = first.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
     if suffix != ".csv" and _NUMBERS.match(text):
-        # Where some numbers are whole, rows differ in their commas.
+        # Where some numbers are whole, rows have fewer commas.
         if b"." not in text and len({line.count(b",") for line in text.rpartition(b"\n")[0].splitlines()}) > 1:
             return (
-                "a table whose rows differ in their commas, as where they stand in its numbers too",
+                "a table whose rows have different numbers of commas, as with commas for decimal points",
                 f"write points in numbers, {NAME_COLUMNS}",
             )
         bare = "take the brackets around each line away, " if text.startswith(b"(") else ""

@@ -68,9 +68,6 @@ def by_instruments(
     before, bends = None, np.zeros_like(moved)
     for own, curved in places_of(found.hypothesis):
         bends[own] = bends[curved] = bool(found.values[curved].size)
-    fit_error = None
-    if together:
-        fit_error = np.where(stated.values == found.values, found.estimates.left_out - found.values, 0.0)
     # Shapes, and how long a residual lasts, are followed where they go; a few steps are enough.
     for _ in range(PER_WINDOW):
         values, left_out = _stepped(at, sources)
@@ -83,16 +80,18 @@ def by_instruments(
         step, error, shapes = np.abs(values - at.values), jackknife_error(left_out), values[len(at.estimates.linear) :]
         far = np.where(now & bends, step > error, far)
         hypothesis = at.hypothesis.with_shapes(shapes) if len(shapes) else at.hypothesis
-        if fit_error is not None:
-            _, left_out = _stepped(at, sources, fit_error)
-            left_out[:, moved & ~now] = values[moved & ~now]
-            left_out[: len(before), moved & ~now] = before[:, moved & ~now]
-        numbers = estimates_of(hypothesis, values, left_out, len(before))
-        at = at._replace(hypothesis=hypothesis, estimates=numbers)
+        last = at, sources
+        at = at._replace(hypothesis=hypothesis, estimates=estimates_of(hypothesis, values, left_out))
         if np.all(10 * step <= error) or not (sources := jointly(_sources(at, given, held))):
             break
     if (lost := far & ~now & ~held).any():
         return by_instruments(found, given, held | lost, together=together)
+    if together:
+        fit_error = np.where(stated.values == found.values, found.estimates.left_out - found.values, 0.0)
+        _, joint = _stepped(*last, fit_error)
+        joint[:, moved & ~now] = values[moved & ~now]
+        joint[: len(left_out), moved & ~now] = left_out[:, moved & ~now]
+        at = at._replace(estimates=estimates_of(at.hypothesis, values, joint, len(left_out)))
     dropped = np.any([each.numbers for each in conditional], axis=0) & ~moved
     numbers = _with_unidentified(stated, at.estimates, moved)
     if dropped.any():

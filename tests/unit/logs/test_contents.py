@@ -913,7 +913,12 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.yaml", b"time: 1.5\r\nroll: 0.1\r\n---\r\ntime: 1.6\r\n", "YAML, as `ros2 topic echo`", "ros2 bag record"),
         ("a.data", b"0.5 12 IMU_GYRO 0.1 0.2 0.3\n", "a log of Paparazzi", "write its numbers as CSV"),
         ("a.txt", b"0.5 12 -0.1 1e-3 0.3\n0.6 12 0 0 0\n", "a table of numbers without names", "names each column"),
-        ("a.txt", b"0,11,88,0,058,0\n0,02,11,9,0,058,0\n", "a table whose rows differ in their commas", "write points"),
+        (
+            "a.txt",
+            b"0,11,88,0,058,0\n0,02,11,9,0,058,0\n",
+            "a table whose rows have different numbers of commas",
+            "write points",
+        ),
         ("a.log", b"1,2,3,4,\r\n", "a table of numbers without names", "let its name end in .csv"),
         ("a.dat", 999 * b"0.25 ", "a table of numbers without names", "let its name end in .csv"),
         ("a.dat", b"12.1 -0.5\n12.2 0.25\n", "a table of numbers without names", "names each column"),
