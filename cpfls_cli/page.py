@@ -66,6 +66,7 @@ from cpfls_cli.report.content import (
     with_interval,
 )
 from cpfls_cli.result import column
+from cpfls_cli.rounding import apart
 from cpfls_cli.version import __version__
 from cpfls_cli.words import joined
 
@@ -264,7 +265,7 @@ def environment(folder: Path, added: Mapping[str, Any]) -> Environment:
     )
     made.filters.update(_FILTERS)
     made.globals.update(
-        np=np, listing=listing, said=said, table=table, zip=zip, column=column, quoted=shlex.quote, **added
+        np=np, apart=apart, listing=listing, said=said, table=table, zip=zip, column=column, quoted=shlex.quote, **added
     )
     functions = {name: each for name, each in added.items() if callable(each)}
     made.filters.update(functions)

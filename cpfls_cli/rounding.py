@@ -18,6 +18,8 @@ ROUNDING = 1e-8
 """Share of two numbers by which they may differ and are equal. Machines agree within 5e-10 of a condition number of
 6e8, of all that is computed here what loses most digits; and nobody reads more than five."""
 
+_MOST_DIGITS = 8  # More of them only rounding decides.
+
 Item = TypeVar("Item")
 
 
@@ -52,6 +54,13 @@ def _margin(left: Array | float, right: Array | float, scale: Array | float) -> 
     size = np.maximum(np.maximum(np.abs(left), np.abs(right)), scale)
     # What is infinite is not rounded.
     return ROUNDING * np.where(np.isfinite(size), size, 0.0)
+
+
+def apart(first: float, second: float, digits: int = 3) -> tuple[str, str]:
+    """Write two numbers that a sentence compares, with as many more digits as show that they differ."""
+    written = (f"{first:.{digits}g}", f"{second:.{digits}g}")
+    same = written[0] == written[1] and digits < _MOST_DIGITS
+    return apart(first, second, digits + 1) if same else written
 
 
 def levelled(values: Array) -> Array:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from textwrap import wrap
 from typing import Any
+
+_UNIT = re.compile(r"_(?:1_s|s|hz|m)$")
+_SYMBOL = re.compile(r"[A-Za-z]{1,2}_.+|(?:theta|delta)_[xyz]")
 
 
 def joined(words: Iterable[str], last: str = "and") -> str:
@@ -28,6 +32,12 @@ def few(names: Sequence[str], most: int = 6) -> str:
 def capitalised(words: str) -> str:
     """Begin with a capital."""
     return words[0].upper() + words[1:]
+
+
+def spoken(name: str) -> str:
+    """Say the name of a number as people do, without underscores and unit; a symbol, such as d_x or theta_x, stays."""
+    words = _UNIT.sub("", name)
+    return name if _SYMBOL.fullmatch(name) else words.replace("_", " ")
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str, *, most: int = 1, cutoff: float = 0.4) -> str:

@@ -16,7 +16,7 @@ from cpfls_cli.effects.signals import HELD_OUT, TRAINING, RecordedFlight, Signal
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, LeftOut, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import Comparison
-from cpfls_cli.gap.naming.results import BODY, Conclusion, Estimate, GapChange, GapSize, NamedEffect
+from cpfls_cli.gap.naming.results import BODY, NAMES_EFFECTS, Conclusion, Estimate, GapChange, GapSize, NamedEffect
 from cpfls_cli.gap.residual.repeated import Repeatability
 from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.gap.settings import CLEAR
@@ -82,6 +82,7 @@ class Diagnosis(Conclusion, _OfGap):
     """Flights that its base learned from."""
     corrected: Corrected | None = part(None)
     """The simulator's file that its vehicle is from, with what was found put into it."""
+    refused: str = about("why no model with the effects is written; empty where one is", default="", brief=False)
 
     @classmethod
     def of(
@@ -127,6 +128,11 @@ class Diagnosis(Conclusion, _OfGap):
         )
         halved = len(files) == 1 and not any(role.startswith("held-out") for role in inputs)
         return tuple(map(LearnedFlight.in_file, files, training, [sum(everything)] if halved else training))
+
+    @property
+    def kept(self) -> str:
+        """Why no model holds the effects that are named; empty where one does, and where none is named."""
+        return self.refused.removeprefix("not extended: ") if self.verdict in NAMES_EFFECTS else ""
 
     @property
     def where(self) -> dict[str, Any] | None:

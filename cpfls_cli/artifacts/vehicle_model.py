@@ -14,12 +14,15 @@ from cpfls_cli.effects.registry import CENTRE_OF_MASS
 from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.inertia import INERTIA_PARAMETERS, MEASURED, beyond_any_body, more_than_others, six_parameters, symmetric
 from cpfls_cli.playback.errors import FADING, AlongFlights
+from cpfls_cli.playback.parameters import LAW
 from cpfls_cli.playback.vehicle import FoundNumber, VehicleFit
 from cpfls_cli.response import spectra
 from cpfls_cli.response.flown import VehicleResponse
 from cpfls_cli.response.spectra import NOT_ACCEPTABLE, NOT_JUDGED, ROTATION, response_word
 from cpfls_cli.result import About, about, part, result
+from cpfls_cli.rounding import apart
 from cpfls_cli.validation.trust import GOOD, Trust, capped, trust_by_playback
+from cpfls_cli.words import spoken
 
 _DIGITS = 6
 THRUST, DRAG = "rotors.thrust_factor_n_s2", "rotors.drag_factor_n_m_s2"
@@ -49,6 +52,7 @@ _NAMES = {
 
 _FOUND_NAMES = {found: _NAMES[key] for key, found in FOUND_AS.items()}
 _FOUND_NAMES |= {
+    LAW: "linear part of the thrust",
     "slow_actuation.roll_pitch": "share of the slow pole in roll and pitch",
     "slow_actuation.yaw": "share of the slow pole in yaw",
     "slow_actuation.slow_s": "time constant of the slow pole",
@@ -71,6 +75,7 @@ GUESSES = {"thrust_factor": (THRUST,), "drag_factor": (DRAG,), "inertia": INERTI
 def name_of(found: str) -> str:
     """Say what people call a number of a fit."""
     block, _, number = found.partition(".")
+    number = number if is_learned(found) else spoken(number)
     return _FOUND_NAMES.get(found, f"{block.replace('_', ' ')} {number}".strip())
 
 
@@ -196,7 +201,8 @@ def too_heavy(vehicle: Vehicle) -> str:
     if not limits:
         return ""
     beyond = " and ".join(
-        f"{name_of(name)} {moments[name]:.3g} where at most {limit:.3g} is possible" for name, limit in limits.items()
+        f"{name_of(name)} {' where at most '.join(apart(moments[name], limit))} is possible"
+        for name, limit in limits.items()
     )
     return (
         f"too heavy for {stated.mass_kg:.3g} kg between these rotors ({beyond}, kg m^2): numbers that predict, not the "

@@ -415,11 +415,12 @@ def _doubts(
             " and without it"
         )
     for effect in (each.effect for each in judged):
+        title = CATALOGUE[effect.name].title
         if effect.p_value > settings.significance:
-            yield f"{effect.name} is not significant jointly with the others, p = {effect.p_value:.2g}"
+            yield f"{title} is not significant jointly with the others, p = {effect.p_value:.2g}"
         if not effect.identified:
             yield (
-                f"instruments do not identify the numbers of {effect.name}: they come from a fit to all motion, in"
+                f"instruments do not identify the numbers of {title}: they come from a fit to all motion, in"
                 " which the loop answers gusts, and may be off by more than their intervals"
             )
 

@@ -12,7 +12,7 @@ from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.report.canvas import BASELINE, GREY, Axes, Drawn, Figure, legend_over, logarithmic, style_of
 from cpfls_cli.report.content import UNKNOWN, number, printed, whole_percent, with_interval
-from cpfls_cli.words import by_name
+from cpfls_cli.words import by_name, spoken
 
 if TYPE_CHECKING:
     from cpfls_cli.gap.naming.results import Estimate, GapChange, NamedEffect
@@ -161,7 +161,7 @@ def _coefficient(coefficient: Estimate) -> str:
     powers = {text.partition("e")[2] for text in words}
     power = f"e{powers.pop()}" if len(powers) == 1 and "" not in powers else ""
     value, low, high = (printed(text.removesuffix(power)) for text in words)
-    return f"{coefficient.name} = {value} [{low}, {high}]{printed(power)}{' ' if unit else ''}{unit}"
+    return f"{spoken(coefficient.name)} = {value} [{low}, {high}]{printed(power)}{' ' if unit else ''}{unit}"
 
 
 def _relative(effect: str, number: Estimate) -> str:

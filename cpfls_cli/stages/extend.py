@@ -22,7 +22,7 @@ from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon, left_o
 from cpfls_cli.gap.extended import extend as refitted
 from cpfls_cli.gap.extended import plain
 from cpfls_cli.gap.naming.causes import all_numbers
-from cpfls_cli.gap.naming.results import GapChange, GapVerdict, NamedEffect
+from cpfls_cli.gap.naming.results import NAMES_EFFECTS, GapChange, GapVerdict, NamedEffect
 from cpfls_cli.gap.whole_vehicle import (
     above_thrust,
     on_top_of,
@@ -40,7 +40,6 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import with_numbers
 
-_EXTENDS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
 WORDS: Mapping[str, Any] = {**GAP_WORDS, **MODEL_WORDS, **PLAYBACK_WORDS}
 FIGURES = {
     "gap-sizes": sizes_drawn(lambda r: r.gap),
@@ -76,7 +75,7 @@ def named_effects(diagnosis: Diagnosis) -> Sequence[NamedEffect]:
     """Take the effects that a diagnosis names; one that names none, or what is not known here, is refused."""
     for each in diagnosis.effects or diagnosis.closest:
         effect(each.name)
-    if diagnosis.verdict not in _EXTENDS or not diagnosis.effects:
+    if diagnosis.verdict not in NAMES_EFFECTS or not diagnosis.effects:
         unexplained = diagnosis.verdict == GapVerdict.UNEXPLAINED
         closest = " (those that it calls closest are not it)" if unexplained else ""
         raise ComputationError(

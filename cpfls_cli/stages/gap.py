@@ -70,13 +70,11 @@ class Gap:
     disagreement: Disagreement = part(brief=False)
     diagnosis: Diagnosis = part(brief=False)
     extended: Extended | None = part(brief=False)
-    refused: str
-    """Why the model is not extended."""
 
     @property
     def extension(self) -> dict[str, Any]:
         """Whether the model with the effects is written, and why not."""
-        return {"written": self.extended is not None, "reason": self.refused}
+        return {"written": self.extended is not None, "reason": self.diagnosis.refused}
 
     def __getattr__(self, name: str) -> Any:
         """Give what its diagnosis holds."""
@@ -141,17 +139,17 @@ def gap(
     if of_file is not None:
         found = _with_file(run, found, of_file, split)
     run.progress(0.85, 1, "extend")
-    extension, refused = None, ""
+    extension = None
     try:
         extension = extended(study, split.training, split.held_out, found, base)
     except ComputationError as error:
-        refused = str(error)
+        found = replace(found, refused=str(error))
     if extension is not None:
         all_learned = joined_flights(found.learned_from({**trained_on, **unseen}), learned)
         extension = replace(extension, learned_from=all_learned)
         run.take_also(as_inputs("flight", all_learned), "extended")
     run.progress(0.97, 1, "report")
-    answer = Gap(disagreement=disagreement, diagnosis=found, extended=extension, refused=refused)
+    answer = Gap(disagreement=disagreement, diagnosis=found, extended=extension)
     run.next.append(_next(run, answer, [*flights, *held_out], model))
     return answer
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpfls_cli.rounding import ROUNDING, ascending, at_most, largest, less, levelled, smallest, tied
+from cpfls_cli.rounding import ROUNDING, apart, ascending, at_most, largest, less, levelled, smallest, tied
 
 pytestmark = pytest.mark.decides
 
@@ -51,3 +51,11 @@ def test_the_order_of_ties_is_that_of_the_items(values, seed):
 
 def test_nothing_has_no_order():
     assert ascending([], float) == []
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "written"),
+    [(0.266, 0.033, ("0.266", "0.033")), (0.26634, 0.26571, ("0.2663", "0.2657")), (1.0, 1.0 + 1e-12, ("1", "1"))],
+)
+def test_numbers_that_a_sentence_compares_differ_as_they_are_written(first, second, written):
+    assert apart(first, second) == written

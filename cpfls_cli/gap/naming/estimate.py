@@ -16,6 +16,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import half_width, serial_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, system, window_noise
 from cpfls_cli.gap.balance.refine import equations, fit, fit_within_bounds, refitted, shape_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
@@ -24,6 +25,7 @@ from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.rounding import tied
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.words import spoken
 
 _KNOWN_TO = 0.005
 """Share of a number that no flight identifies: mass and arms that it is measured against are hardly known better, and
@@ -290,7 +292,7 @@ class Refusal(NamedTuple):
     @property
     def sentence(self) -> str:
         """The whole sentence."""
-        return f"{self.name} explains part of the gap, but is not named: {self.reason}"
+        return f"{CATALOGUE[self.name].title} explains part of the gap, but is not named: {self.reason}"
 
 
 def earned(
@@ -324,7 +326,8 @@ def on_bound(found: NamedFit) -> Refusal | None:
             if number.name in shapes
         ]
         if len(shapes) > 1 and all(at_ends):
-            return Refusal(effect.name, f"{' and '.join(shapes)} may all be at the bounds of what is possible", True)
+            all_of_them = " and ".join(map(spoken, shapes))
+            return Refusal(effect.name, f"{all_of_them} may all be at the bounds of what is possible", True)
     for index, (effect, _) in enumerate(chosen):
         on_bounds = _on_bounds(sized(effect, effects[index]))
         bounds = {number.name: f"{bound:.3g} {number.unit}" for number, bound in on_bounds.items()}
@@ -335,7 +338,7 @@ def on_bound(found: NamedFit) -> Refusal | None:
         beyond = [number.name for number in free.effects[index] if number.name in bounds and number.impossible]
         says = "would surely be beyond" if beyond else "sits on the bound of"
         name = next(iter(beyond or bounds))
-        return Refusal(effect.name, f"its {name} {says} what is possible, {bounds[name]}", True)
+        return Refusal(effect.name, f"its {spoken(name)} {says} what is possible, {bounds[name]}", True)
     return None
 
 
@@ -343,8 +346,7 @@ def ends_on_bound(found: NamedFit) -> Refusal | None:
     """Find an effect, lags apart, that instruments have moved onto a bound of its size."""
     for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
         for number, bound in () if effect.is_lag else _on_bounds(sized(effect, numbers)).items():
-            reason = (
-                f"by instruments its {number.name} sits on the bound of what is possible, {bound:.3g} {number.unit}"
-            )
+            most = f"{bound:.3g} {number.unit}"
+            reason = f"by instruments its {spoken(number.name)} sits on the bound of what is possible, {most}"
             return Refusal(effect.name, reason)
     return None

@@ -30,7 +30,8 @@ from cpfls_cli.gap.naming.open_questions import bends_of, unexplained_channels
 from cpfls_cli.gap.naming.ranking import RankedStep, block_index, rank_effects
 from cpfls_cli.gap.naming.results import GapSize
 from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, NOISE, OFF, VISIBLE
-from cpfls_cli.rounding import ascending, largest, levelled, smallest
+from cpfls_cli.rounding import apart, ascending, largest, levelled, smallest
+from cpfls_cli.words import spoken
 
 
 @dataclass(frozen=True)
@@ -207,10 +208,11 @@ class Judge:
         worst = largest(harm, lambda name: float(harm[name].max()))
         if harm[worst].any():
             channel = int(np.argmax(harm[worst]))
+            without, with_it = apart(compared[worst].left[channel], after[channel], 2)
             return Refusal(
                 worst,
                 f"on the held-out flights it makes the {CHANNELS[channel]} worse, "
-                f"{compared[worst].left[channel]:.2g} floors without it and {after[channel]:.2g} with it",
+                f"{without} floors without it and {with_it} with it",
                 harms=True,
             )
         least = smallest(compared, lambda each: compared[each].visibly)
@@ -278,7 +280,7 @@ def _bent(judgement: Judgement, compared: Mapping[str, Without]) -> Refusal | No
         best = step.ranking[0]
         # One that is refused for another reason is compared with nothing.
         if best.gain > scored.gain > -np.inf and not unbeaten(best, [scored], step.above_floor):
-            return Refusal(name, f"{best.candidate.effect.name} explains surely more in its place")
+            return Refusal(name, f"{best.candidate.effect.title} explains surely more in its place")
     return None
 
 
@@ -316,7 +318,7 @@ def differences(first: Judgement, last: Judgement, start: RankedStep, judge: Jud
     # Numbers of the vehicle that took up what only one of the roles has are wrong for the other.
     left = smallest((held.before, held.parameters), lambda each: float(np.nanmax(held.size(each).floors)))
     seen, unseen = size_in_floors(learned, np.ones(6)), held.size(left).floors
-    names = [each.effect.name for each in first.found.hypothesis.chosen]
+    names = [each.effect.title for each in first.found.hypothesis.chosen]
     there, here = (int(np.nan_to_num(each, nan=-1.0).argmax()) for each in (seen, unseen))
     in_training = _squares(learned, start.hypothesis.known, start.block)
     in_held = _squares(left / held.noise, held.known, block_index(system(judge.repaired), first.found.settings))
@@ -374,7 +376,7 @@ def _other_numbers(first: Judgement, judge: Judge) -> tuple[str, ...]:
         return ()
     pairs = (zip(there, here, strict=False) for there, here in zip(trained.effects, own.effects, strict=True))
     return tuple(
-        f"{number.name} is {number.value:.3g} [{number.low:.3g}, {number.high:.3g}] {number.unit} in the"
+        f"{spoken(number.name)} is {number.value:.3g} [{number.low:.3g}, {number.high:.3g}] {number.unit} in the"
         f" training flights and {other.value:.3g} [{other.low:.3g}, {other.high:.3g}] in the held-out ones"
         for number, other in chain.from_iterable(pairs)
         if number.name == other.name and (number.high < other.low or other.high < number.low)

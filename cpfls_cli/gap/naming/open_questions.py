@@ -106,7 +106,7 @@ def with_unnamed(
         step = rank_effects(flights, chosen, bends, settings, rng)
         least = COUNTS * rank_effects(flights, (), (), settings, None, floor=step.floor).above_floor
         large = (each for each in step.ranking if each.gain > max(least, step.least_gain()))
-        counting = tuple(each.candidate.effect.name for each in large if step.p_value(each.gain) <= RARE)
+        counting = tuple(each.candidate.effect.title for each in large if step.p_value(each.gain) <= RARE)
         chosen = _beyond_chance(step, bends, settings, rng)
     if len(chosen) == len(named):
         return found.estimates, (), counting
@@ -116,7 +116,7 @@ def with_unnamed(
         there = {number.name: number for number in others}
         pairs = [(number, there.get(number.name, number)) for number in numbers]
         held.append(tuple(replace(n, low=min(n.low, o.low), high=max(n.high, o.high)) for n, o in pairs))
-    unnamed = tuple(each.effect.name for each in chosen[len(named) :])
+    unnamed = tuple(each.effect.title for each in chosen[len(named) :])
     return replace(found.estimates, effects=tuple(held)), unnamed, counting
 
 
@@ -157,7 +157,8 @@ def _bend(effect: Effect, over: str, by: Callable[[Signals], Array]) -> Effect:
 
     either = tuple(replace(each, low=-each.high) for each in effect.coefficients)
     name, needs = f"a bend of {effect.name} over {over}", effect.needs | ({over} & {"height"})
-    return replace(effect, name=name, columns=columns, coefficients=either, needs=needs)
+    title = f"a bend of {effect.title} over {over}"
+    return replace(effect, name=name, title=title, columns=columns, coefficients=either, needs=needs)
 
 
 def _beyond_chance(

@@ -32,6 +32,10 @@ class GapVerdict(StrEnum):
     NOT_EXCITED = "NOT_EXCITED"
 
 
+NAMES_EFFECTS = (GapVerdict.NAMED, GapVerdict.PARTIAL, GapVerdict.AMBIGUOUS)
+"""Verdicts whose effects a model can be given."""
+
+
 @dataclass(frozen=True)
 class Estimate:
     """An estimated number with its 95 % confidence interval, and the range that is possible on the vehicle."""

@@ -66,7 +66,7 @@ def test_springs_of_no_frequency_of_their_own_are_no_name():
     known = flights((own, [0.1, 0.1, 0.0]))
     found, refusals = earned(known, [own], best_floor(system(known, [own])), SETTINGS)
     assert kept(found) == []
-    assert "frequency_hz and damping may all be at the bounds" in refusals[0].sentence
+    assert "frequency and damping may all be at the bounds" in refusals[0].sentence
 
 
 def test_what_is_impossible_takes_nothing_from_what_is_possible(monkeypatch):
@@ -197,7 +197,7 @@ def test_what_a_bend_of_another_explains_better_is_no_name(companion, there):
         assert refusal is None
     else:
         assert refusal.name == name
-        assert "a bend of parasitic_drag over speed" in refusal.sentence
+        assert "a bend of parasitic drag of the fuselage over speed" in refusal.sentence
 
 
 def test_what_is_there_stands_and_what_is_not_needed_goes():
@@ -216,9 +216,8 @@ def test_numbers_that_took_up_what_the_others_lack_hide_no_difference():
     start = rank_effects(training, (), [CATALOGUE["com_offset"]], SETTINGS, None)
     worse = last._replace(held_out=replace(last.held_out, parameters=2 * last.held_out.parameters))
     assert kept(last.found) == []
-    assert (
-        "of what would be rotor_drag, and the held-out flights have none" in differences(first, worse, start, there)[0]
-    )
+    (said,) = differences(first, worse, start, there)
+    assert "of what would be rotor drag (H-force), and the held-out flights have none" in said
 
 
 @pytest.mark.parametrize(("quiet", "loud", "says"), [(1.0, 1.0, True), (0.0, 2.0, False)], ids=["even", "in parts"])

@@ -209,6 +209,13 @@ def test_a_model_whose_own_file_says_do_not_use_is_not_to_be_taken():
     )
 
 
+@pytest.mark.parametrize("verdict", ["NAMED", "PARTIAL", "AMBIGUOUS"])
+def test_nobody_is_sent_to_a_model_that_is_not_written(verdict):
+    said = next_steps(diagnosis(verdict, refused="not extended: the gap does not shrink"))
+    assert "extended.h5" not in said
+    assert "eave the model as it is: the gap does not shrink" in said
+
+
 def test_rivals_take_away_from_how_sure_it_is_and_come_with_the_flight_that_separates():
     sure, below = (screen(diagnosis("PARTIAL", alternatives=(made.RIVAL,)))[place] for place in (1, 4))
     assert sure["How sure"] == (

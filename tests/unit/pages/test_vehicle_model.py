@@ -16,7 +16,7 @@ from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.vehicle import Trade
-from cpfls_cli.report.content import Plot, Table, Text, unfolded
+from cpfls_cli.report.content import Heading, Plot, Table, Text, unfolded
 from cpfls_cli.result import plain
 from cpfls_cli.stages.vehicle import remainder_curves, vehicle
 from cpfls_cli.validation.trust import Trust, capped
@@ -322,10 +322,10 @@ def test_constants_that_repeats_identify_are_judged_by_what_is_repeatable_and_no
     own = instrumented(vehicle_of(whole(), loop=LOOP))
     assert own.held_out is None
     assert (own.forecast_verdict, own.verdict) == (Trust.NOT_JUDGED, Trust.SIMULATION)
-    first, cost, *_ = evidence(own)
-    assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in first
-    assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in first
-    assert cost.startswith("Mismatch J of its frequency responses (0 is none, up to 100 is acceptable): roll 12")
+    (said,) = evidence(own)
+    assert "3 runs that repeat each other (correlation 0.90 to 0.97)" in said
+    assert "From 1.0 to 6.0 Hz they explain 98 % (± 1 %) of the roll" in said
+    assert "Mismatch J of its frequency responses (0 is none, up to 100 is acceptable): roll 12" in said
     assert any("`cpfls replay` plays" in line for line in texts(own))
     assert not any("loop, not the vehicle" in line for line in texts(own))
 
@@ -449,10 +449,9 @@ def test_a_table_has_a_column_of_what_is_stated_where_it_has_any():
 def test_a_thrust_factor_comes_with_the_law_that_it_is_of():
     numbers = (number_of("thrust_factor"), number_of("thrust_law.linear", -0.45, -0.8, -0.1))
     said = blocks_of(vehicle_of(whole(), numbers=numbers))
-    law = "Thrust is the thrust factor times w (w − 0.450 w_h), with w_h the speed in hover."
-    first = next(at for at, block in enumerate(said) if isinstance(block, Table))
-    assert said[first + 1].text == law
-    assert sum(isinstance(block, Text) and block.text == law for block in said) == 1
+    law = "; thrust is the thrust factor times w (w − 0.450 w_h), with w_h the speed in hover"
+    (head,) = [block.text for block in said if isinstance(block, Heading) and law in block.text]
+    assert head.startswith("Constants with 95 % intervals")
 
 
 def test_flights_that_bound_no_body_name_no_bounds():
@@ -480,3 +479,11 @@ def test_velocity_is_asked_for_only_where_flights_lack_it(lacks):
     (said,) = [text for text in texts(own) if text.startswith("To know thrust factor")]
     first = "log velocity (or position), and " if lacks else ""
     assert said == f"To know thrust factor: {first}climb and descend more: the known mass then identifies thrust."
+
+
+def test_constants_without_a_number_are_one_row():
+    names = ("Ixx", "Iyy", "Izz")
+    numbers = tuple(number_of(f"inertia.{name}", determined=False, possible=name == "Izz") for name in names)
+    own = vehicle_of(whole(), numbers=numbers)
+    rows = [row for row in rows_of(own, "Constant") if "I" in row[0]]
+    assert [row[0] for row in rows] == ["Ixx, Iyy, kg m^2", "Izz, kg m^2"]
