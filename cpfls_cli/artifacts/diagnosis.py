@@ -80,6 +80,8 @@ class Diagnosis(Conclusion, _OfGap):
     recorded: Mapping[str, RecordedFlight] = part(brief=False)
     learned: tuple[LearnedFlight, ...] = part((), brief=False)
     """Flights that its base learned from."""
+    files: tuple[LearnedFlight, ...] = part((), brief=False)
+    """Files of the flights that it learned from itself."""
     corrected: Corrected | None = part(None)
     """The simulator's file that its vehicle is from, with what was found put into it."""
     refused: str = about("why no model with the effects is written; empty where one is", default="", brief=False)
@@ -127,7 +129,9 @@ class Diagnosis(Conclusion, _OfGap):
             [len(each.time) for each in in_roles(self.recorded, *roles)] for roles in ([TRAINING], [])
         )
         halved = len(files) == 1 and not any(role.startswith("held-out") for role in inputs)
-        return tuple(map(LearnedFlight.in_file, files, training, [sum(everything)] if halved else training))
+        known = {own.sha256: own for own in self.files}
+        learned = map(LearnedFlight.in_file, files, training, [sum(everything)] if halved else training)
+        return tuple(known.get(own.sha256, own)._replace(samples=own.samples, of=own.of) for own in learned)
 
     @property
     def kept(self) -> str:
@@ -251,6 +255,8 @@ class Disagreement(Comparison):
     recorded: Mapping[str, RecordedFlight] = part(brief=False)
     learned: tuple[LearnedFlight, ...] = part((), brief=False)
     """Flights that its base learned from."""
+    files: tuple[LearnedFlight, ...] = part((), brief=False)
+    """Files of its own flights."""
 
     @property
     def flights(self) -> list[str]:

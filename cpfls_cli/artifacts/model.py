@@ -29,11 +29,22 @@ class LearnedFlight(NamedTuple):
     samples: Annotated[int | None, About("leading samples of it that were learned from")] = None
     of: Annotated[int | None, About("samples of it that were used: learned from or held out")] = None
     log: Annotated[str, About("hash of the log that it was imported from; empty where it is one")] = ""
+    begins: Annotated[float, About("begin of it, from the first stamp of that log", unit="s")] = 0.0
+    ends: Annotated[float, About("end of it, likewise", unit="s")] = 0.0
 
     @classmethod
-    def in_file(cls, file: InputFile, samples: int | None = None, of: int | None = None, log: str = "") -> Self:
+    def in_file(cls, file: InputFile, samples: int | None = None, of: int | None = None) -> Self:
         """Name a file."""
-        return cls(file.name, file.sha256, file.format, samples, of, log)
+        return cls(file.name, file.sha256, file.format, samples, of)
+
+    def shared_with(self, other: LearnedFlight) -> tuple[float, float] | None:
+        """Give the stretch, s, that is also in another flight: of the log that both are from, or of all time."""
+        if self.sha256 in (other.sha256, other.log) or self.log == other.sha256:
+            return -np.inf, np.inf
+        if not self.log or self.log != other.log:
+            return None
+        begin, end = max(self.begins, other.begins), min(self.ends, other.ends)
+        return (begin, end) if begin < end else None
 
     @property
     def file(self) -> InputFile:

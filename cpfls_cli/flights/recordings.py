@@ -528,23 +528,6 @@ def seen_twice(given: Iterable[InputFile]) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-def refuse_seen(given: Iterable[tuple[str, Sequence[str]]], held_out: Iterable[tuple[str, Sequence[str]]]) -> None:
-    """Refuse to judge on a flight that is learned from: the same file, or one of them the log that the other is from.
-
-    Of each flight the file name, and the SHA-256 of the file and of the log that it was imported from: two stretches
-    of one log are two flights.
-    """
-    learned = list(given)
-    for name, (own, *log) in held_out:
-        same = next((other for other, hashes in learned if own in hashes or hashes[0] in log), None)
-        if same is not None:
-            also = "" if same == name else f" (as {same})"
-            raise InputError(
-                f"{name}: is both learned from{also} and held out, so nothing would be judged; leave it out of "
-                "one of them, or hold out another flight"
-            )
-
-
 def _thirds(flight: Signals, settings: GapSettings) -> FlightSplit:
     # A flight whose windows are refused as a whole is refused for another reason than its length.
     common_windows([flight], settings)

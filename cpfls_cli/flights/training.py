@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, count, product
@@ -12,6 +12,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.artifacts.gate import InputFile, format_name, read_origin
+from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.config.load import parse_config
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import ENOUGH
@@ -20,7 +21,7 @@ from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.files import read_content
 from cpfls_cli.flightlog.results import MOTION, Flight
 from cpfls_cli.flightlog.settings import SETPOINTS
-from cpfls_cli.flights.recordings import ReadFlight, check_flight, read_flight, read_whole, units_of
+from cpfls_cli.flights.recordings import ReadFlight, check_flight, read_flight, units_of
 from cpfls_cli.identification.data import (
     CHUNK,
     TRAINING,
@@ -311,37 +312,37 @@ def numbered_roles(role: str, flights: Sequence[Path]) -> dict[str, Path]:
     return {f"{role}-{number}": path for number, path in enumerate(flights, start=1)}
 
 
-def hashes_of(path: Path, file: InputFile) -> tuple[str, ...]:
-    """Give the hashes that a flight is known by: that of its file, and that of the log that it was imported from."""
-    log = _log_of(path)
-    return (file.sha256, log) if log else (file.sha256,)
-
-
-def _log_of(path: Path) -> str:
-    """Give the hash of the log that a flight was imported from; empty where it is one, or is from none."""
+def known_flight(path: Path, file: InputFile) -> LearnedFlight:
+    """Name a flight by its file, the log that it was imported from, and the stretch of that."""
     log = None if is_log(path) else read_origin(path).inputs.get("log")
-    return "" if log is None else log.sha256
+    known = LearnedFlight.in_file(file)
+    if log is None:
+        return known
+    ((begin, end),) = next(read_rows(path, ("span_s",), 0, 2, 2))
+    return known._replace(log=log.sha256, begins=float(begin), ends=float(end))
 
 
-def refuse_overlap(learned: Sequence[Path], held_out: Sequence[Path]) -> None:
-    """Refuse to judge on a stretch of a log that overlaps another one, which is learned from."""
-    for path, other in product(held_out, learned):
-        if not (log := _log_of(path)) or log != _log_of(other):
+def known_by(paths: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> list[LearnedFlight]:
+    """Name flights once each."""
+    return list(dict.fromkeys(known_flight(path, inputs[role]) for role, path in paths.items()))
+
+
+def refuse_seen(learned: Iterable[LearnedFlight], held_out: Iterable[LearnedFlight]) -> None:
+    """Refuse to judge on a flight that is learned from, as a whole or in a part of the log that it is from."""
+    for flight, other in product(held_out, learned):
+        shared = flight.shared_with(other)
+        if shared is None:
             continue
-        begins, ends = zip(*map(_stretch, (path, other)), strict=True)
-        begin, end = max(begins), min(ends)
-        if begin < end:
+        if np.isfinite(shared).all() and shared != (flight.begins, flight.ends):
             raise InputError(
-                f"{path}: holds {begin:.1f} to {end:.1f} s of the log that {other.name} is from too, which is learned "
-                "from; part the two by import.crop_s, or hold out another flight"
+                f"{flight.name}: holds {shared[0]:.1f} to {shared[1]:.1f} s of the log that {other.name} is from too, "
+                "which is learned from; part the two by import.crop_s, or hold out another flight"
             )
-
-
-def _stretch(path: Path) -> tuple[float, float]:
-    """Give the ends of an imported flight on the clock of its log, s; NaN where that has none."""
-    flight, _ = read_whole(path)
-    begin, end = flight.begins + flight.signals["time"][[0, -1]]
-    return float(begin), float(end)
+        also = "" if other.name == flight.name else f" (as {other.name})"
+        raise InputError(
+            f"{flight.name}: is both learned from{also} and held out, so nothing would be judged; leave it out of "
+            "one of them, or hold out another flight"
+        )
 
 
 def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[dict[str, Path], list[str]]:
@@ -349,7 +350,8 @@ def once(given: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> tuple[di
     known: dict[str, str] = {}
     kept, warnings = {}, []
     for role, path in given.items():
-        hashes = hashes_of(path, inputs[role])
+        own = known_flight(path, inputs[role])
+        hashes = [each for each in (own.sha256, own.log) if each]
         same = next((known[each] for each in hashes if each in known), None)
         if same is None:
             kept[role] = path
@@ -372,16 +374,11 @@ def log_formats(paths: Sequence[Path]) -> set[str]:
     return known | {"" if log is None else log.format.lower() for log in made}
 
 
-def known_by(paths: Mapping[str, Path], inputs: Mapping[str, InputFile]) -> list[tuple[str, tuple[str, ...]]]:
-    """List flights once each: file name, and the hashes that it is known by."""
-    return list(dict.fromkeys((inputs[role].name, hashes_of(path, inputs[role])) for role, path in paths.items()))
-
-
-def choosing_source(flights: Sequence[Path], inputs: Mapping[str, InputFile]) -> TorqueSource | None:
+def choosing_source(flights: Sequence[Path], known: Mapping[str, LearnedFlight]) -> TorqueSource | None:
     """Open the flights to choose on, None where there are none; a model was fitted to what is another input too."""
     for role, path in numbered_roles("choose-on", flights).items():
-        others = {other: file for other, file in inputs.items() if other != role}
-        same = next((other for other, file in others.items() if file.sha256 == inputs[role].sha256), None)
+        others = {other: file for other, file in known.items() if other != role}
+        same = next((other for other, file in others.items() if known[role].shared_with(file)), None)
         if same is not None:
             raise InputError(f"--choose-on {path}: {_USED[same.partition('-')[0]]}; choose on another flight")
     return joined([flight_source(path) for path in flights]) if flights else None
@@ -396,7 +393,7 @@ _USED = {
 
 
 def held_out_parts(
-    study: Study, rests: Mapping[str, TorqueSource], inputs: Mapping[str, InputFile], validate: Sequence[Path]
+    study: Study, rests: Mapping[str, TorqueSource], known: Mapping[str, LearnedFlight], validate: Sequence[Path]
 ) -> dict[str, TorqueSource]:
     """Gather what is judged but not learned from, under names of their own: rests of flights that train, and others."""
     if study.identification.training_share < 1 and not rests:
@@ -405,10 +402,8 @@ def held_out_parts(
             "held out; lower it, or lower identification.training_share"
         )
     parts = dict(rests)
-    learned = {file.sha256 for role, file in inputs.items() if role.startswith("flight")}
-    for role, path in numbered_roles("validate", validate).items():
-        if inputs[role].sha256 in learned:
-            raise InputError(f"--validate {path}: is the training flight; validate on another one")
+    refuse_seen(*([own for role, own in known.items() if role.startswith(kind)] for kind in ("flight", "validate")))
+    for path in validate:
         names = chain([path.name], (f"{path.name} ({number})" for number in count(2)))
         parts[next(name for name in names if name not in {TRAINING, *parts})] = flight_source(path)
     return parts

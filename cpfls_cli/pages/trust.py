@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator, Sequence
+from math import isfinite
 from typing import NamedTuple
 
 from cpfls_cli.artifacts.model import AnyModel, LearnedFlight
@@ -41,9 +42,6 @@ _WORDS: dict[str, Words] = {
 }
 
 _TONES: tuple[Tone, ...] = ("plain", "good", "note", "warning")
-
-KnownBy = Iterable[tuple[str, Sequence[str]]]
-"""Flights by file name, each with the hashes of its file and of its log."""
 
 
 def trust_words(trust: str) -> Words:
@@ -83,19 +81,16 @@ def _with_part(flight: LearnedFlight) -> str:
     return f"{flight.name} (sha256 {flight.sha256[:12]}{part})"
 
 
-def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: KnownBy) -> Iterator[str]:
-    """Warn of flights that judge a model and that it has learned from.
-
-    Parameters
-    ----------
-    judged : iterable of (str, sequence of str)
-        Of each flight its file name, and the SHA-256 of the file and of the log that it was imported from.
-    """
-    for name, hashes in judged:
-        flight = next((each for each in learned if each.sha256 in hashes or each.log == hashes[0]), None)
+def seen_warnings(model: str, learned: Sequence[LearnedFlight], judged: Iterable[LearnedFlight]) -> Iterator[str]:
+    """Warn of flights that judge a model and that it has learned from, or from a part of them."""
+    for own in judged:
+        flight = next((each for each in learned if each.shared_with(own)), None)
         if flight is not None:
             what, it = ("it", "it") if flight.whole else (_part(flight), "that")
-            yield f"{name}: {model} has learned from {what}, so {it} says nothing about unseen flights"
+            begin, end = flight.shared_with(own) or (0.0, 0.0)
+            if isfinite(begin) and (begin, end) != (own.begins, own.ends):
+                what, it = f"{begin:.1f} to {end:.1f} s of its log", "that"
+            yield f"{own.name}: {model} has learned from {what}, so {it} says nothing about unseen flights"
 
 
 def _part(flight: LearnedFlight) -> str:

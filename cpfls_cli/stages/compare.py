@@ -31,7 +31,7 @@ from cpfls_cli.gap.residual.views import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn
-from cpfls_cli.pages.trust import KnownBy, seen_warnings
+from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import Axes, Drawn, Figure, in_columns, line, plain_ticks, stacked
 from cpfls_cli.report.content import Command, plain
@@ -201,9 +201,10 @@ def compare(run: Run, flights: FlightsArgument, model: ModelOption = None) -> Di
     given = replace(read, flights=tuple(of_vehicle(read.flights, base)))
     if run.dry_run:
         return None
-    given = with_seen(given, model, learned, known_by(roles, inputs))
+    files = known_by(roles, inputs)
+    given = with_seen(given, model, learned, files)
     found = compared(run.study, given, base, progress_of(run.progress))
-    found = learned_from(run, found, learned)
+    found = learned_from(run, replace(found, files=tuple(files)), learned)
     run.next.append(_next(run, found, flights, model))
     return found
 
@@ -232,7 +233,9 @@ def to_gap(job: Job, flights: Sequence[Path], model: Path | None) -> Command:
     return go_on(job, "gap", *flights, *given, output=job.sibling("gap"))
 
 
-def with_seen(given: FlightSet, model: Path | None, learned: Sequence[LearnedFlight], judged: KnownBy) -> FlightSet:
+def with_seen(
+    given: FlightSet, model: Path | None, learned: Sequence[LearnedFlight], judged: Sequence[LearnedFlight]
+) -> FlightSet:
     """Say of flights which of them the model that is held against them learned from."""
     seen = () if model is None else seen_warnings(model.name, learned, judged)
     return replace(given, warnings=(*seen, *given.warnings))

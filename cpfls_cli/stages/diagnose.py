@@ -20,9 +20,9 @@ from cpfls_cli.config.unknown import is_of_guesses
 from cpfls_cli.consistency.channels import BODY_AXES
 from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
-from cpfls_cli.flights.recordings import FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
+from cpfls_cli.flights.recordings import FlightSplit, read_flights, seen_twice, split_flights
 from cpfls_cli.flights.same_vehicle import read_result_of_vehicle
-from cpfls_cli.flights.training import known_by, numbered_roles
+from cpfls_cli.flights.training import known_by, numbered_roles, refuse_seen
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, before_after
 from cpfls_cli.gap.diagnose import diagnose as diagnose_flights
 from cpfls_cli.gap.naming.causes import of_thrust
@@ -43,7 +43,7 @@ from cpfls_cli.pages.gap import (
 )
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn
 from cpfls_cli.pages.playback import SIGNALS, axis_words, draw_errors, errors_height
-from cpfls_cli.pages.trust import KnownBy, seen_warnings
+from cpfls_cli.pages.trust import seen_warnings
 from cpfls_cli.playback.errors import AFTER, CONTROL_HORIZON
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.canvas import GREY, Axes, Drawn, Figure, legend_over, plain_ticks, stacked
@@ -206,14 +206,14 @@ def diagnose(run: Run, disagreement: DisagreementArgument, held_out: HeldOutOpti
     flights = {role: file for role, file in origin.inputs.items() if role.startswith("flight")}
     learned = compared.learned
     unseen = known_by(numbered_roles("held-out", held_out), inputs)
-    refuse_seen([(file.name, (file.sha256,)) for file in flights.values()], unseen)
+    refuse_seen(compared.files, unseen)
     held, study = read_flights(held_out, run.study), run.study
     given = [each.flight(study.vehicle, study.gap.ground_height_m) for each in compared.recorded.values()]
     split = split_flights(given, held.flights, study.gap)
     if run.dry_run:
         return None
     found = diagnosed(study, split, (*compared.warnings, *held.warnings), compared.base, progress_of(run.progress))
-    found = learned_from(run, found, flights, learned, unseen, model=disagreement.name)
+    found = learned_from(run, replace(found, files=compared.files), flights, learned, unseen, model=disagreement.name)
     to_extend = go_on(run, "extend", run.output, output=run.sibling("extended.h5"))
     to_report = ("cpfls", "report", run.config, disagreement, run.output, "-o", run.sibling("report.html"))
     run.next.append(next_command(run, found, to_extend, to_report, run.output))
@@ -244,7 +244,7 @@ def learned_from(
     found: Diagnosis,
     flights: dict[str, InputFile],
     learned: Sequence[LearnedFlight],
-    held_out: KnownBy,
+    held_out: Sequence[LearnedFlight],
     *,
     model: str,
     of: str = "",

@@ -17,8 +17,8 @@ from cpfls_cli.artifacts.model import as_inputs, joined_flights
 from cpfls_cli.config.load import parse_config, stored_study, validate
 from cpfls_cli.errors import ComputationError, InputError, visible
 from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_base
-from cpfls_cli.flights.recordings import FlightSet, FlightSplit, read_flights, refuse_seen, seen_twice, split_flights
-from cpfls_cli.flights.training import hashes_of, known_by, numbered_roles, refuse_overlap
+from cpfls_cli.flights.recordings import FlightSet, FlightSplit, read_flights, seen_twice, split_flights
+from cpfls_cli.flights.training import known_by, known_flight, numbered_roles, refuse_seen
 from cpfls_cli.gap.before_after import PlaybackChange, errors_by_horizon
 from cpfls_cli.gap.whole_vehicle import has_effects, of_vehicle, with_known_wrench
 from cpfls_cli.playback.model import VehicleModel
@@ -126,13 +126,15 @@ def gap(
     base = read_base(model if of_file is None else None, run.study)
     given, split = _flights(run, flights, held_out, base, [*(inputs[role] for role in trained), *unseen.values()])
     learned = learned_by(model)
-    given = with_seen(given, model, learned, known_by(trained, inputs))
+    files = tuple(known_by(trained, inputs))
+    given = with_seen(given, model, learned, files)
     if run.dry_run:
         return None
     study = run.study
     disagreement = compared(study, given, base, progress_of(run.progress, 0.0, 0.15), split.whole)
-    disagreement = learned_from(run, disagreement, learned, "disagreement")
+    disagreement = learned_from(run, replace(disagreement, files=files), learned, "disagreement")
     found = of_diagnosis.diagnosed(study, split, disagreement.warnings, base, progress_of(run.progress, 0.15, 0.85))
+    found = replace(found, files=files)
     trained_on = {role: inputs[role] for role in trained}
     held = known_by(kept_aside, unseen)
     found = of_diagnosis.learned_from(run, found, trained_on, learned, held, model="disagreement.h5", of="diagnosis")
@@ -228,10 +230,8 @@ def _flights(
     flown = tuple(of_vehicle(read.flights, base)) if has_effects(base) else tuple(balanced)
     split = split_flights(balanced[: len(flights)], balanced[len(flights) :], run.study.gap)
     # Those held out are behind those learned from, whoever chose them.
-    known = [(file.name, hashes_of(path, file)) for path, file in zip([*flights, *held_out], files, strict=True)]
+    known = list(map(known_flight, [*flights, *held_out], files))
     refuse_seen(known[: len(split.training)], known[len(split.training) :])
-    paths = [*flights, *held_out]
-    refuse_overlap(paths[: len(split.training)], paths[len(split.training) :])
     return FlightSet(flown[: len(flights)], (*seen_twice(files), *read.warnings)), split
 
 

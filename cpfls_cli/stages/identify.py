@@ -23,7 +23,6 @@ from cpfls_cli.arguments import (
 )
 from cpfls_cli.artifacts.gate import read_origin
 from cpfls_cli.artifacts.identified import IdentifiedModel, identified_model
-from cpfls_cli.artifacts.model import LearnedFlight
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.errors import ComputationError, ConfigError
@@ -33,8 +32,8 @@ from cpfls_cli.flights.training import (
     check_file,
     choosing_source,
     flight_roles,
-    hashes_of,
     held_out_parts,
+    known_flight,
     numbered_roles,
     read_training,
 )
@@ -82,10 +81,11 @@ def identify(
     roles |= numbered_roles("choose-on", choosing) | numbered_roles("validate", others)
     inputs, search = begin_search(run, roles, resume=resume, workers=workers, scheduler=scheduler)
     run.files.update(inputs)
-    data, kept = read_training(flights, selection, run.study, inputs), choosing_source(choosing, inputs)
+    known = {role: known_flight(path, inputs[role]) for role, path in roles.items()}
+    data, kept = read_training(flights, selection, run.study, inputs), choosing_source(choosing, known)
     with settings_of("identification", run.study):
         require_flights(run.study.identification.choice, given=kept is not None)
-    held_out = held_out_parts(run.study, data.rests, inputs, others)
+    held_out = held_out_parts(run.study, data.rests, known, others)
     every = [*flights, *choosing, *others]
     # A simulated flight cannot contradict itself.
     recorded = (path for path in every if "log" in read_origin(path).inputs)
@@ -106,11 +106,8 @@ def identify(
     found = _with_length(found, flights, data)
     evidence, signal = _evidence(run, found, data, held_out, wrong, watch.signal)
     model = VehicleModel(vehicle=run.study.vehicle, fuzzy=found.model)
-    parts = zip(flight_roles(flights).items(), data.parts, strict=True)
-    learned = tuple(
-        LearnedFlight.in_file(inputs[role], *samples, *hashes_of(path, inputs[role])[1:])
-        for (role, path), samples in parts
-    )
+    parts = zip(flight_roles(flights), data.parts, strict=True)
+    learned = tuple(known[role]._replace(samples=samples, of=of) for role, (samples, of) in parts)
     hashes = tuple(file.sha256 for role, file in inputs.items() if role.startswith("choose-on"))
     made = identified_model(found, run.study.identification.base, data.indices, evidence, model, learned, hashes)
     unjudged = signal is not None and evidence is None and run.study.identification.validation.enabled

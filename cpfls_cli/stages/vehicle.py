@@ -48,8 +48,8 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, shown_slowly
 from cpfls_cli.flights.playback import flights_to_play, played
-from cpfls_cli.flights.recordings import refuse_seen, seen_twice
-from cpfls_cli.flights.training import hashes_of, known_by, numbered_roles, refuse_overlap
+from cpfls_cli.flights.recordings import seen_twice
+from cpfls_cli.flights.training import known_by, known_flight, numbered_roles, refuse_seen
 from cpfls_cli.pages.gap_words import BY_HAND, WHAT_TO_FLY, flown_by_hand
 from cpfls_cli.pages.model import WORDS as MODEL_WORDS
 from cpfls_cli.pages.model import said_by
@@ -299,9 +299,8 @@ def vehicle(
     learned, unseen = numbered_roles("flight", flights), numbered_roles("held-out", others)
     begun = origin_before(run.study, run.take(learned | unseen), "vehicle-checkpoint")
     checkpoint, kept = VehicleCheckpoint.begun(run, begun, resume=resume)
-    known = [hashes_of(path, run.files[role]) for role, path in learned.items()]
-    refuse_seen(zip([path.name for path in flights], known, strict=True), known_by(unseen, run.files))
-    refuse_overlap(flights, others)
+    known = [known_flight(path, run.files[role]) for role, path in learned.items()]
+    refuse_seen(known, known_by(unseen, run.files))
     twice = seen_twice(run.files[role] for role in learned)
     if write_config is not None:
         refuse_own(write_config, run.output)
@@ -328,10 +327,7 @@ def vehicle(
     warnings = [*first, *limit, *twice, *(warning for flight in read for warning in flight.warnings)]
     sizes = [sum(map(len, flight.parts)) for flight in training]
     # All samples that were used were learned from.
-    own = [
-        LearnedFlight.in_file(run.files[role], size, size, *hashes[1:])
-        for role, size, hashes in zip(learned, sizes, known, strict=True)
-    ]
+    own = [flight._replace(samples=size, of=size) for flight, size in zip(known, sizes, strict=True)]
     made = _judged(run, found, read, own, warnings)
     if made.complete:
         # Of a search that goes on, the numbers are not those that are found; nothing is then in the way of --resume.

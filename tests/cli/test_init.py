@@ -80,7 +80,7 @@ def test_a_stretch_of_a_log_is_not_judged_by_one_that_overlaps_it(cpfls, refuse,
         cpfls.done("import", study, log, "--set", f"import.crop_s={ends}", "-o", made)
     words, output = ("--accept-guesses",) if command == "gap" else (), tmp_path / "out.h5"
     (line,) = refuse(command, study, first, "--held-out", second, "-o", output, "--dry-run", *words)
-    assert line.startswith(f"{second}: holds 8.5 to 9.0 s of the log that first.h5 is from too, which is learned from")
+    assert line.startswith("second.h5: holds 8.5 to 9.0 s of the log that first.h5 is from too, which is learned from")
     cpfls.done("vehicle", study, first, "--held-out", third, "-o", output, "--dry-run")
 
 
@@ -543,3 +543,18 @@ def test_a_log_of_a_moment_says_how_short_it_is(refuse, tmp_path):
     assert refuse("init", short, "-o", tmp_path / "study.yaml") == [
         f"{short}: holds only 0.39 s; a flight to learn from has at least ten"
     ]
+
+
+def test_a_flight_imported_twice_under_two_names_does_not_judge_what_was_learned_from_it(
+    cpfls, refuse, usual, tmp_path
+):
+    log, study, _ = usual
+    first, second, compared = (tmp_path / f"{name}.h5" for name in ("first", "second", "compared"))
+    for made, name in ((first, "import.lowpass_hz=20"), (second, "import.lowpass_hz=30")):
+        cpfls.done("import", study, log, "--set", name, "-o", made)
+    cpfls.done("compare", study, first, "--accept-guesses", "-o", compared)
+    output, said = tmp_path / "out.h5", "second.h5: is both learned from (as first.h5) and held out"
+    for words in (("vehicle", study, first), ("gap", study, first), ("diagnose", study, compared)):
+        guesses = () if words[0] == "vehicle" else ("--accept-guesses",)
+        (line,) = refuse(*words, "--held-out", second, "-o", output, "--dry-run", *guesses)
+        assert line.startswith(said), words

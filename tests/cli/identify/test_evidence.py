@@ -254,6 +254,17 @@ def test_two_seconds_are_too_short_and_it_says_how_long_would_do_and_two_minutes
     assert notes(120.0) == []
 
 
+def test_a_flight_imported_again_under_another_name_does_not_judge(cpfls, refuse, notes, tmp_path):
+    notes(2.0)
+    config, flight, again = (tmp_path / name for name in ("study.yaml", "flight.h5", "again.h5"))
+    cpfls.done("import", config, tmp_path / "log.csv", "--set", "import.lowpass_hz=9", "-o", again)
+    output = ("-o", tmp_path / "out.h5")
+    (message,) = refuse("identify", config, flight, "--validate", again, *output)
+    assert "again.h5: is both learned from (as flight.h5) and held out" in message
+    (message,) = refuse("identify", config, flight, "--choose-on", again, *HELD_OUT, *output)
+    assert f"--choose-on {again}: is a training flight" in message
+
+
 def test_noise_is_no_swing():
     time = np.arange(0.0, 20.0, 0.01)
     noise = 0.05 * np.random.default_rng(1).standard_normal((2000, 3))

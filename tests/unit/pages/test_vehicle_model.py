@@ -9,7 +9,8 @@ from cpfls_cli import page
 from cpfls_cli.artifacts.model import LearnedFlight, joined_flights
 from cpfls_cli.artifacts.vehicle_model import ResponseMismatch, vehicle_section
 from cpfls_cli.effects.scales import hover_speed
-from cpfls_cli.flights.recordings import refuse_seen
+from cpfls_cli.errors import InputError
+from cpfls_cli.flights.training import refuse_seen
 from cpfls_cli.pages.gap_words import BY_HAND, WHAT_TO_FLY
 from cpfls_cli.pages.model import against, slow_words
 from cpfls_cli.pages.trust import seen_warnings
@@ -420,12 +421,21 @@ def test_a_sentence_lists_no_more_numbers_than_anybody_reads():
 
 
 def test_the_log_that_a_flight_was_imported_from_is_one_that_was_learned_from():
-    learned = (LearnedFlight("one.h5", "5" * 64, "cpfls/flight", log="9" * 64),)
-    (said,) = seen_warnings("vehicle.h5", learned, [("one.ulg", ("9" * 64,)), ("other.ulg", ("8" * 64,))])
+    own = LearnedFlight("one.h5", "5" * 64, "cpfls/flight", log="9" * 64, begins=1.0, ends=9.0)
+    logs = [LearnedFlight(f"{name}.ulg", sha256 * 64, "ulg") for name, sha256 in (("one", "9"), ("other", "8"))]
+    (said,) = seen_warnings("vehicle.h5", [own], logs)
     assert said.startswith("one.ulg: vehicle.h5 has learned from it")
-    # Another stretch of that log is another flight.
-    assert not [*seen_warnings("vehicle.h5", learned, [("two.h5", ("6" * 64, "9" * 64))])]
-    refuse_seen([("one.h5", ("5" * 64, "9" * 64))], [("two.h5", ("6" * 64, "9" * 64))])
+    # Another stretch of that log is another flight; the same one under another name is not.
+    later = own._replace(name="two.h5", sha256="6" * 64, begins=9.0, ends=12.0)
+    assert not [*seen_warnings("vehicle.h5", [own], [later])]
+    refuse_seen([own], [later])
+    (said,) = seen_warnings("vehicle.h5", [own], [later._replace(begins=8.0)])
+    assert said.startswith("two.h5: vehicle.h5 has learned from 8.0 to 9.0 s of its log")
+    again = own._replace(name="two.h5", sha256="6" * 64)
+    (said,) = seen_warnings("vehicle.h5", [own], [again])
+    assert said.startswith("two.h5: vehicle.h5 has learned from it")
+    with pytest.raises(InputError, match=r"two\.h5: is both learned from \(as one\.h5\) and held out"):
+        refuse_seen([own], [again])
 
 
 def test_the_log_of_a_flight_is_kept_where_a_gap_was_found_in_it_too():

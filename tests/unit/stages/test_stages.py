@@ -186,7 +186,7 @@ def test_a_model_that_is_not_to_be_taken_is_not_gone_on_with(rates, goes_on):
 def test_a_flight_held_out_that_was_imported_from_a_log_learned_from_is_said_to_be():
     run = SimpleNamespace(take_also=lambda *_: None)
     learned = (LearnedFlight("one.ulg", "9" * 64, "ulg"),)
-    held = [("two.h5", ("6" * 64, "9" * 64))]
+    held = [LearnedFlight("two.h5", "6" * 64, "cpfls/flight", log="9" * 64)]
     (said,) = learned_from(run, made.diagnosis(), {}, learned, held, model="disagreement.h5").seen
     assert said.startswith("two.h5: the model of disagreement.h5 has learned from it")
 
