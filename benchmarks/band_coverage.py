@@ -26,8 +26,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.dynamics import InertiaFunctions, inertia_matrix, newton_euler_torque
 from cpfls_cli.identification.data import TorqueData, axis_scale
 from cpfls_cli.identification.evaluator import decode, uniform_chromosome
+from cpfls_cli.identification.findings import fit_baselines
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.inertia import INERTIA_ENTRIES, symmetric
 from cpfls_cli.regressor.regressor import Motion

@@ -23,7 +23,7 @@ from benchmarks.shared.measure import program, progress, table
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.closed_loop import freed_torque
 from cpfls_cli.identification.data import TorqueSource, axis_scale, joined
-from cpfls_cli.identification.judge import fit_baselines
+from cpfls_cli.identification.findings import fit_baselines
 from tests.builders.gusty_flights import GUSTS, LARGE, SMALL, STORM, Flight, Truth, gusty_flights, torque_samples
 
 RUNS, PATHS, SECONDS = 4, 6, 40.0

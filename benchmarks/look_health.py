@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.shared.measure import program, table
+from cpfls_cli.look.answers import gusts_of
 from cpfls_cli.look.balance import balance_of
-from cpfls_cli.look.gusts import gusts_of
 from cpfls_cli.look.hover import hover_of
 from tests.builders.look_flights import CROSS, correlated, hovering, still_flight
 from tests.unit.look import test_gusts as gusty

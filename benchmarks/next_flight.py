@@ -24,13 +24,11 @@ from cpfls_cli.errors import CpflsError, SettingError
 from cpfls_cli.gap.balance.weak_flight import Preparation
 from cpfls_cli.gap.diagnose import DiagnosisRun, diagnose
 from cpfls_cli.gap.naming.ranking import best_floor
-from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, planned_signals
-from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, usual
+from cpfls_cli.gap.next_flight.rivals import Question, SizedEffect, formulas_off, open_questions, physical_values, usual
 from cpfls_cli.gap.next_flight.room import HarmonicPath, Room, room_of
-from cpfls_cli.gap.next_flight.search import goal, next_flight
-from cpfls_cli.gap.next_flight.separation import Question, SizedEffect, formulas_off
+from cpfls_cli.gap.next_flight.search import Logging, expected_floor, goal, next_flight, planned_signals
 from cpfls_cli.gap.settings import GapSettings
-from cpfls_cli.simulation.measured import measure
+from cpfls_cli.simulation.inverse import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.settings import NextFlightSettings, TrajectorySettings
 from cpfls_cli.weak_form.windows import common_windows

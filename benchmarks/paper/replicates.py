@@ -10,8 +10,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.identification.data import TorqueSource
+from cpfls_cli.identification.findings import Score, score_of
 from cpfls_cli.identification.identify import FoundModel
-from cpfls_cli.identification.judge import Score, score_of
 from cpfls_cli.report.source import Source
 from cpfls_cli.result import about, part, result
 from cpfls_cli.rounding import levelled

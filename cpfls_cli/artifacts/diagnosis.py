@@ -17,8 +17,8 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, LeftOut, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import Comparison
 from cpfls_cli.gap.naming.results import BODY, NAMES_EFFECTS, Conclusion, Estimate, GapChange, GapSize, NamedEffect
+from cpfls_cli.gap.residual.dependence import GapStretch
 from cpfls_cli.gap.residual.repeated import Repeatability
-from cpfls_cli.gap.residual.views import GapStretch
 from cpfls_cli.gap.settings import CLEAR
 from cpfls_cli.inertia import more_than_others, six_parameters
 from cpfls_cli.playback.disturbance import FoundGusts

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from cpfls_cli.consistency.channels import channel_warnings, filter_warnings
-from cpfls_cli.consistency.findings import AuditFinding, Finding, contradictions, doubts
+from cpfls_cli.consistency.findings import AuditFinding, ChannelRepair, Finding, contradictions, doubts, shifted
 from cpfls_cli.consistency.gyroscope import GyroFit
 from cpfls_cli.consistency.majority import taken_off
 from cpfls_cli.consistency.motion import against_lean
-from cpfls_cli.consistency.repairs import ChannelRepair, shifted
 from cpfls_cli.consistency.rotors import (
     IDLE,
     beyond_propellers,

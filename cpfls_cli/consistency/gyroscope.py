@@ -16,8 +16,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.repair import align_quaternion_signs
 from cpfls_cli.lag import fit_delay
 from cpfls_cli.rotations import attitude_rate, body_rate
-from cpfls_cli.weak_form.resampling import blocks_of, folds
-from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.weak_form.windows import Windows, blocks_of, folds
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import mean_error
 from cpfls_cli.consistency.channels import AXES
-from cpfls_cli.consistency.findings import Finding, off_clock
+from cpfls_cli.consistency.findings import ChannelRepair, Finding, is_derived, off_clock
 from cpfls_cli.consistency.motion import (
     ANOTHER_NORTH,
     CHANNELS,
@@ -24,7 +24,6 @@ from cpfls_cli.consistency.motion import (
     checked,
     offsets,
 )
-from cpfls_cli.consistency.repairs import ChannelRepair, is_derived
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import fit_axes
 from cpfls_cli.rounding import largest, less

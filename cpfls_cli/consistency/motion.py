@@ -9,15 +9,13 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import BLOCK_S, ENOUGH_BLOCKS, block_length, contiguous, half_width, jackknife_error, serial_error
 from cpfls_cli.consistency.channels import AXES, SAME, TWICE, axes_apart
-from cpfls_cli.consistency.findings import Finding, off_clock
-from cpfls_cli.consistency.repairs import UP
+from cpfls_cli.consistency.findings import UP, Finding, off_clock
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.flightlog.agreement import Ground, first_derivative, fit_lean, second_derivative
 from cpfls_cli.rotations import cross
 from cpfls_cli.rounding import largest, less
 from cpfls_cli.units import STANDARD_GRAVITY
-from cpfls_cli.weak_form.resampling import blocks_of, folds
-from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.weak_form.windows import Windows, blocks_of, folds
 from cpfls_cli.words import joined
 
 # Filters and drag make a fifth; a third of gravity is neither a bias nor a tilt of a sensor.

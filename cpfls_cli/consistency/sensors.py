@@ -11,10 +11,18 @@ from scipy.special import stdtr
 from cpfls_cli.arrays import Array
 from cpfls_cli.blocks import blocks_of_time, half_width, mean_error
 from cpfls_cli.consistency.channels import BODY_AXES, TURNING_RAD_S, gyroscope_apart, least_noise
-from cpfls_cli.consistency.findings import AuditFinding, FaultNumber, Finding, in_ms, off_clock
+from cpfls_cli.consistency.findings import (
+    UP,
+    AuditFinding,
+    ChannelRepair,
+    FaultNumber,
+    Finding,
+    in_ms,
+    off_clock,
+    shifted,
+)
 from cpfls_cli.consistency.gyroscope import DelayScan, GyroFit, fit_gyro, kinematics, scan
 from cpfls_cli.consistency.majority import Settled, set_apart, settled
-from cpfls_cli.consistency.repairs import UP, ChannelRepair, shifted
 from cpfls_cli.consistency.rotors import thrust_is_known, weighed
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.hooks import FaultFit, SensorTest

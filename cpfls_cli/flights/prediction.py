@@ -32,7 +32,7 @@ from cpfls_cli.flights.training import check_file, require_signals, torque_sourc
 from cpfls_cli.gap.balance.weak_flight import rotation_balance, translation_balance
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.judge import Score, ScoreSums
+from cpfls_cli.identification.findings import Score, ScoreSums
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.regressor.regressor import InertiaValues, Motion
 from cpfls_cli.rotations import attitude_rate, body_torque, generalised_torque

@@ -14,8 +14,8 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS, Preparation, dense, weak
 from cpfls_cli.gap.extended import ExtendedModel, plain
 from cpfls_cli.gap.naming.held_out import HeldOut
 from cpfls_cli.gap.naming.results import BODY
+from cpfls_cli.gap.residual.dependence import GapStretch, stretches
 from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
-from cpfls_cli.gap.residual.views import GapStretch, stretches
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.gap.whole_vehicle import on_top_of, whole_vehicle
 from cpfls_cli.playback.errors import AFTER, BEFORE, MODEL, NOTHING_MOVES, STATED, AlongFlights

@@ -16,9 +16,17 @@ from cpfls_cli.gap.before_after import errors_by_horizon, played_pairs
 from cpfls_cli.gap.naming.open_questions import not_excited
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import BODY, GapSize, NotExcited
-from cpfls_cli.gap.residual.dependence import Dependence, joined_states, rank_dependence, state_signals
+from cpfls_cli.gap.residual.dependence import (
+    Dependence,
+    GapStretch,
+    HeatMap,
+    heat_map,
+    joined_states,
+    rank_dependence,
+    state_signals,
+    stretches,
+)
 from cpfls_cli.gap.residual.repeated import Repeatability, RepeatedRuns
-from cpfls_cli.gap.residual.views import GapStretch, HeatMap, heat_map, stretches
 from cpfls_cli.gap.settings import CLEAR, GapSettings
 from cpfls_cli.gap.whole_vehicle import with_effects
 from cpfls_cli.playback.errors import STATED, AlongFlights

@@ -10,11 +10,10 @@ from scipy import linalg
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.fuzzy.basis import breakpoints
-from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.identification.samples import Products, Samples
 from cpfls_cli.identification.settings import LocalSearchSettings
 from cpfls_cli.identification.solver import Fit, Ridge, Solver
-from cpfls_cli.least_squares import NormalEquations, quick_solution
+from cpfls_cli.least_squares import NormalEquations, damped_step, quick_solution
 from cpfls_cli.regressor.structure import ModelStructure
 
 LARGEST_GENE = 2**16 - 1

@@ -15,8 +15,16 @@ from cpfls_cli.evolution.engine import History
 from cpfls_cli.identification.closed_loop import FreedTorque, freed_torque, loop_along, source_of
 from cpfls_cli.identification.data import TRAINING, TorqueSource, axis_scale
 from cpfls_cli.identification.evaluator import Evaluator, decode, uniform_chromosome
-from cpfls_cli.identification.findings import AXES, FitDiagnostics, axis_evidence, findings, rule_excitation
-from cpfls_cli.identification.judge import Baseline, fit_baselines, score_of
+from cpfls_cli.identification.findings import (
+    AXES,
+    Baseline,
+    FitDiagnostics,
+    axis_evidence,
+    findings,
+    fit_baselines,
+    rule_excitation,
+    score_of,
+)
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.search import UNWATCHED, Front, SearchResult, SearchRun, StopReason, is_end, search
 from cpfls_cli.identification.settings import IdentificationSettings

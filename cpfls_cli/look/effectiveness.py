@@ -29,10 +29,19 @@ from cpfls_cli.estimation.spectra import (
     window_starts,
     without_slow,
 )
-from cpfls_cli.look.flight import AXES, LogFlight
+from cpfls_cli.look.flight import (
+    AXES,
+    NO_COMMAND,
+    NO_MODEL,
+    NOT_MOVED,
+    TOO_SLOW,
+    TOO_WIDE,
+    LogFlight,
+    exogenous,
+    needed_s,
+    too_little,
+)
 from cpfls_cli.look.law import flown_law, gyroscope_filters
-from cpfls_cli.look.reasons import NO_COMMAND, NO_MODEL, NOT_MOVED, TOO_SLOW, TOO_WIDE, needed_s, too_little
-from cpfls_cli.look.setpoints import exogenous
 from cpfls_cli.result import Estimate, about, part, result
 
 STRONG = 25.0

@@ -20,10 +20,8 @@ from cpfls_cli.estimation.spectra import (
     window_starts,
 )
 from cpfls_cli.look.effectiveness import AxisPlant, PlantModel
-from cpfls_cli.look.flight import AXES, LogFlight
+from cpfls_cli.look.flight import AXES, NO_SETPOINT, TOO_SLOW, Exogenous, LogFlight, exogenous, too_little
 from cpfls_cli.look.law import flown_law, gyroscope_filters
-from cpfls_cli.look.reasons import NO_SETPOINT, TOO_SLOW, too_little
-from cpfls_cli.look.setpoints import Exogenous, exogenous
 from cpfls_cli.result import Estimate, about, part, result
 
 CLEAR = 0.2

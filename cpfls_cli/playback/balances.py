@@ -13,7 +13,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import block_length
-from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
+from cpfls_cli.estimation.estimate import first_stage_fit_by_run
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.evaluation import DRAG_OVER_THRUST, TIMES, ParameterPoint, acting_numbers, inertia_entries
 from cpfls_cli.playback.flight import PlaybackFlight
@@ -35,8 +35,7 @@ from cpfls_cli.vehicle.values import (
     transposed,
     value_of,
 )
-from cpfls_cli.weak_form.resampling import marked_rows
-from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, windows
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, marked_rows, windows
 
 _MASS = "mass"
 _BODY = (*INERTIA_PARAMETERS, _MASS)

@@ -17,8 +17,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
-from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step, solve
-from cpfls_cli.estimation.first_stage import FOLDS
+from cpfls_cli.estimation.estimate import FOLDS, Normal, Prior, conditional_strength, one_step, solve
 from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.inertia import EXPLAINED, FLAT, KNOWN, VISIBLE
 from cpfls_cli.playback.balances import BANDS, OVERLAP, Balances, PastBalances, Sums, fitting_bands

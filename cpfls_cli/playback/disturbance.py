@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import BLOCK_S, ENOUGH_BLOCKS, block_length, contiguous, half_width, jackknife_error, mean_error
-from cpfls_cli.estimation.first_stage import FOLDS, fits_of_others
-from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
+from cpfls_cli.estimation.estimate import FOLDS, fits_of_others
+from cpfls_cli.estimation.spectra import GaussMarkov, most_likely
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.gusts import GUST_AXES, GustAxis, Gusts

@@ -14,7 +14,7 @@ from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, jackknife_covariance
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.estimation.estimate import Prior
-from cpfls_cli.gauss_newton import damped_step
+from cpfls_cli.least_squares import damped_step
 from cpfls_cli.playback.evaluation import JointNumbers, ParameterPoint
 from cpfls_cli.playback.flight import MeasuredMotion, PlaybackFlight, motion_at
 from cpfls_cli.playback.model import VehicleModel

@@ -20,10 +20,9 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import BLOCK_S
-from cpfls_cli.estimation.first_stage import FOLDS, OF_MANY, RIDGE, first_stage_fit_by_run, fits_of_others
+from cpfls_cli.estimation.estimate import FOLDS, OF_MANY, RIDGE, first_stage_fit_by_run, fits_of_others
 from cpfls_cli.rounding import levelled
-from cpfls_cli.weak_form.resampling import blocks_of
-from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows
+from cpfls_cli.weak_form.windows import FEWEST_SAMPLES, Windows, blocks_of
 
 PER_WINDOW = FEWEST_SAMPLES
 """Windows that begin within one where what they see is followed in time: as many as samples follow its curve."""

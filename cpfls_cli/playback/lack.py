@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from cpfls_cli.arrays import Array
-from cpfls_cli.estimation.whittle import GaussMarkov, most_likely
+from cpfls_cli.estimation.spectra import GaussMarkov, most_likely
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about

@@ -652,8 +652,10 @@ class _Tangents:
             self._fill(some.start, middle, through, end)
             np.add(np.matmul(through, middle, out=moved), end, out=moved)
             rows[:, 0] = moved[0, ..., STATES:]
+            before = np.empty_like(moved[0, ..., STATES:], order="C")
             for step in range(1, len(moved)):
-                np.add(moved[step, ..., :STATES] @ rows[:, step - 1], moved[step, ..., STATES:], out=rows[:, step])
+                np.matmul(moved[step, ..., :STATES], rows[:, step - 1], out=before)
+                np.add(before, moved[step, ..., STATES:], out=rows[:, step])
             rows *= shares[..., None]
         rows[self._gone[:, some].T] = 0.0
         return rows

@@ -15,10 +15,10 @@ from cpfls_cli.reduction.criteria import (
     TIE_TOLERANCE,
     Criterion,
     TriangularFactor,
+    exchange_samples,
     first_best,
     make_criterion,
 )
-from cpfls_cli.reduction.exchange import exchange_samples
 from cpfls_cli.reduction.settings import CriterionName, ReductionSettings
 from cpfls_cli.reduction.survey import RowSpace, Survey, space_of
 from cpfls_cli.result import about, result

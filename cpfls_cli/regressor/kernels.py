@@ -102,7 +102,7 @@ class Chunk(NamedTuple):
         Rate, acceleration, and the columns that no partition changes by axis: the torque first, then those of the rigid
         body where it is free.
     inputs : array, shape (lines, samples)
-        See `cpfls_cli.regressor.table.mapped_inputs`; of the structure, so it is put in last.
+        See `cpfls_cli.identification.samples.mapped_inputs`; of the structure, so it is put in last.
     """
 
     motion: Array

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from cpfls_cli.arrays import Array, BoolArray, ComplexArray, IntArray, Numbers, runs, stretches
-from cpfls_cli.estimation.first_stage import fits_of_others
+from cpfls_cli.estimation.estimate import fits_of_others
 from cpfls_cli.estimation.spectra import coherence
 from cpfls_cli.result import about, part, result
 from cpfls_cli.rounding import at_most

@@ -22,18 +22,28 @@ from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import Preparation, WeakFlight
 from cpfls_cli.gap.naming.ranking import best_floor, block_index
 from cpfls_cli.gap.naming.results import Alternative, GapVerdict
-from cpfls_cli.gap.next_flight.logged import (
+from cpfls_cli.gap.next_flight.rivals import (
+    Answer,
+    Question,
+    formulas_off,
+    open_questions,
+    physical_values,
+    questions_between,
+    require_visible,
+)
+from cpfls_cli.gap.next_flight.room import Room, room_of
+from cpfls_cli.gap.next_flight.search import (
+    Goal,
     Logging,
+    NextFlight,
     expected_floor,
     flown_signals,
+    goal,
     logged_signals,
     needed_signals,
+    next_flight,
     planned_signals,
 )
-from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, questions_between, require_visible
-from cpfls_cli.gap.next_flight.room import Room, room_of
-from cpfls_cli.gap.next_flight.search import Goal, NextFlight, goal, next_flight
-from cpfls_cli.gap.next_flight.separation import Answer, Question, formulas_off
 from cpfls_cli.gap.residual.air import air, known_motion
 from cpfls_cli.pages.gap import unit_words
 from cpfls_cli.report.content import number

@@ -24,12 +24,12 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.flights.training import numbered_roles, once
 from cpfls_cli.logs.formats import formats_in_words
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, legend_over
-from cpfls_cli.report.change_words import WORDS
 from cpfls_cli.report.source import unique_labels
 from cpfls_cli.result import column
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages._flight_numbers import (
     FOLDER,
+    WORDS,
     contradictions_of,
     exit_code,
     first_of_each,

@@ -27,7 +27,7 @@ from cpfls_cli.flights.recordings import FlightSet, read_flights
 from cpfls_cli.flights.training import known_by, numbered_roles
 from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.compare import compare as compare_flights
-from cpfls_cli.gap.residual.views import HeatMap
+from cpfls_cli.gap.residual.dependence import HeatMap
 from cpfls_cli.gap.whole_vehicle import of_vehicle
 from cpfls_cli.pages.gap import channel_unit, channel_words
 from cpfls_cli.pages.gap_words import GAP_WORDS, playback_drawn, repeatability_drawn

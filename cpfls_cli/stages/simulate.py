@@ -23,8 +23,8 @@ from cpfls_cli.flightlog.results import MOTION, Flight
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.report.content import Outcome
+from cpfls_cli.simulation.inverse import measure
 from cpfls_cli.simulation.inverse import simulate as fly_exactly
-from cpfls_cli.simulation.measured import measure
 from cpfls_cli.simulation.model import Simulated, played_gusts, simulated_effects, with_effects
 from cpfls_cli.stage import Run, stage, stage_named
 from cpfls_cli.stages._flight import FIGURES, STILL_AIR, WORDS, infeasible_sentence

@@ -28,17 +28,18 @@ from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.flights.training import numbered_roles, once
 from cpfls_cli.logs.formats import formats_in_words, is_log
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, band, in_columns, legend_over
-from cpfls_cli.report.change_words import WORDS, natural_unit
 from cpfls_cli.report.source import unique_labels
 from cpfls_cli.result import column
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages._flight_numbers import (
     FOLDER,
+    WORDS,
     contradictions_of,
     exit_code,
     find_kept,
     first_of_each,
     kept_numbers,
+    natural_unit,
     of_other_autopilots,
     of_other_vehicles,
     stated_by,

@@ -27,10 +27,9 @@ from cpfls_cli.flights.recordings import read_whole
 from cpfls_cli.flights.training import numbered_roles
 from cpfls_cli.logs.formats import about_flight, log_contents, read_log
 from cpfls_cli.look.effectiveness import effectiveness
-from cpfls_cli.look.flight import LogFlight
+from cpfls_cli.look.flight import TOO_SLOW, LogFlight
 from cpfls_cli.look.gains import HOLDS, LogGains, TunedGains, tuned_gains
 from cpfls_cli.look.reading import read_flight
-from cpfls_cli.look.reasons import TOO_SLOW
 from cpfls_cli.look.vibration import Change, vibration_of
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.playback.model import VehicleModel

@@ -6,7 +6,7 @@ from copy import deepcopy
 import numpy as np
 
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.simulation.measured import measure
+from cpfls_cli.simulation.inverse import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.planning import flat_attitude
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings

@@ -13,9 +13,8 @@ from cpfls_cli.gap.balance.weak_flight import CHANNELS
 from cpfls_cli.gap.before_after import FreeRuns, PlaybackChange, ResidualChange, WorstWindows
 from cpfls_cli.gap.compare import ChannelGaps, ResidualWindows
 from cpfls_cli.gap.naming.results import Alternative, ByKind, Estimate, GapChange, NamedEffect, NotExcited
-from cpfls_cli.gap.residual.dependence import Dependence
+from cpfls_cli.gap.residual.dependence import Dependence, GapStretch, HeatMap
 from cpfls_cli.gap.residual.repeated import Repeatability
-from cpfls_cli.gap.residual.views import GapStretch, HeatMap
 from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.report.source import source_of_result

@@ -11,8 +11,7 @@ from cpfls_cli import page
 from cpfls_cli.look.answers import Answer
 from cpfls_cli.look.balance import balance_of
 from cpfls_cli.look.gains import AxisGains, AxisMargins, TunedGains
-from cpfls_cli.look.logged import Logged
-from cpfls_cli.look.look import Look
+from cpfls_cli.look.look import Logged, Look
 from cpfls_cli.look.timeline import Event
 from cpfls_cli.result import Estimate
 from tests.builders import looked_logs

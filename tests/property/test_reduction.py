@@ -4,8 +4,12 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpfls_cli.reduction.criteria import eigenvalues_below, largest_eigenvalue_bound, smallest_eigenvalue_bound
-from cpfls_cli.reduction.exchange import Compound
+from cpfls_cli.reduction.criteria import (
+    Compound,
+    eigenvalues_below,
+    largest_eigenvalue_bound,
+    smallest_eigenvalue_bound,
+)
 from cpfls_cli.reduction.settings import ReductionSettings
 from tests.builders.reductions import reduce
 

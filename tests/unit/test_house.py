@@ -145,8 +145,6 @@ def test_tests_import_from_shared_builders_alone():
 ONE_OF_A_KIND = ("autopilots/catalogue/", "effects/catalogue/", "export/simulators/", "logs/", "simulators/", "stages/")
 SMALL_ALL_THE_SAME = {
     "cli/main.py": "runs before anything heavy is loaded",
-    "gap/next_flight/search.py": "what the room is for",
-    "workers/compatibility.py": "loads without Dask",
 }
 FEW_LINES = 80
 

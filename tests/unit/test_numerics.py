@@ -11,8 +11,8 @@ from cpfls_cli.blocks import contiguous, half_width, jackknife_covariance, jackk
 from cpfls_cli.errors import InputError
 from cpfls_cli.filters import SecondOrder
 from cpfls_cli.flightlog.smoothing import low_pass
-from cpfls_cli.gauss_newton import damped_step
 from cpfls_cli.lag import best_delay, delayed, fit_delay, lagged
+from cpfls_cli.least_squares import damped_step
 from cpfls_cli.units import KNOWN_UNITS, UnitName, to_si
 
 WAVES = np.random.default_rng(1).standard_normal((400, 3)) + np.array([0.0, 5.0, -80.0])

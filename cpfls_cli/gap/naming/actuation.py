@@ -13,8 +13,7 @@ from cpfls_cli.gap.balance.refine import refined
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.by_instruments import by_instruments, predictable_residual, unidentified
 from cpfls_cli.gap.naming.estimate import NamedFit, fitted
-from cpfls_cli.gap.naming.odds import chance_of_ranks, more_residual
-from cpfls_cli.gap.naming.ranking import rank_effects
+from cpfls_cli.gap.naming.ranking import chance_of_ranks, more_residual, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate
 from cpfls_cli.gap.naming.search import alternative
 from cpfls_cli.gap.settings import CHANCE, ERRORS, OFF

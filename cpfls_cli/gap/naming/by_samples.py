@@ -14,7 +14,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import BLOCK_S, contiguous, mean_error
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.estimation.first_stage import RIDGE
+from cpfls_cli.estimation.estimate import RIDGE
 from cpfls_cli.gap.balance.balance_system import System, is_free, residual_along, system
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight, columns_of, nuisance
 from cpfls_cli.gap.naming.by_instruments import by_instruments

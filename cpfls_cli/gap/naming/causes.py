@@ -15,8 +15,7 @@ from cpfls_cli.gap.balance.balance_system import is_free, system
 from cpfls_cli.gap.balance.refine import fit
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, effect_sentence
-from cpfls_cli.gap.naming.odds import likely, odds
-from cpfls_cli.gap.naming.ranking import RankedStep, Scored, rank_effects
+from cpfls_cli.gap.naming.ranking import RankedStep, Scored, likely, odds, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in_place_of
 from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings

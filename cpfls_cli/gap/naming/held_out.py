@@ -25,9 +25,8 @@ from cpfls_cli.gap.balance.balance_system import (
 from cpfls_cli.gap.balance.refine import fit, least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, WeakFlight
 from cpfls_cli.gap.naming.estimate import NamedFit, Refusal, channel_weight, estimates, on_bound, size_in_floors
-from cpfls_cli.gap.naming.odds import unbeaten
 from cpfls_cli.gap.naming.open_questions import bends_of, unexplained_channels
-from cpfls_cli.gap.naming.ranking import RankedStep, block_index, rank_effects
+from cpfls_cli.gap.naming.ranking import RankedStep, block_index, rank_effects, unbeaten
 from cpfls_cli.gap.naming.results import GapSize
 from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, NOISE, OFF, VISIBLE
 from cpfls_cli.rounding import apart, ascending, largest, levelled, smallest

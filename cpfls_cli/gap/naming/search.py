@@ -10,12 +10,24 @@ from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, floors, system
 from cpfls_cli.gap.balance.refine import fit, refined, torque_loss_ratio
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
-from cpfls_cli.gap.naming.odds import chance_of_ranks, free_numbers, more_residual, names_of, simplest, unbeaten
-from cpfls_cli.gap.naming.ranking import RankedStep, Scored, best_floor, block_index, rank_effects, scoring_matrix
+from cpfls_cli.gap.naming.ranking import (
+    RankedStep,
+    Scored,
+    best_floor,
+    block_index,
+    chance_of_ranks,
+    free_numbers,
+    more_residual,
+    names_of,
+    rank_effects,
+    scoring_matrix,
+    simplest,
+    unbeaten,
+)
 from cpfls_cli.gap.naming.results import Alternative
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.rounding import ascending, less
-from cpfls_cli.weak_form.resampling import folds
+from cpfls_cli.weak_form.windows import folds
 
 _BEAM = 3  # Sets that are followed at once: a lag, a delay and a filter each do alone most of what two of them do.
 

@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import jackknife_error
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.estimation.first_stage import first_stage_fit_by_run
+from cpfls_cli.estimation.estimate import first_stage_fit_by_run
 from cpfls_cli.gap.balance.balance_system import System, floors, residual_along
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.residual.dependence import state_signals, without_actuation
@@ -27,8 +27,7 @@ from cpfls_cli.playback.instruments import (
     instruments,
     past_setpoints,
 )
-from cpfls_cli.weak_form.resampling import about_flight_mean
-from cpfls_cli.weak_form.windows import Windows
+from cpfls_cli.weak_form.windows import Windows, about_flight_mean
 
 _PREDICTED = {"repeats": 1 / 2, "setpoints": 1 / 3, "past": MOST_PREDICTED}
 """Largest share of the residual, at 95 %, that instruments predict of the air. Other runs show all that is

@@ -14,7 +14,7 @@ from cpfls_cli import store
 from cpfls_cli.artifacts.diagnosis import Extended
 from cpfls_cli.config.study import Study
 from cpfls_cli.consistency.check import audit
-from cpfls_cli.consistency.repairs import accelerated
+from cpfls_cli.consistency.findings import accelerated
 from cpfls_cli.flights import recordings
 from cpfls_cli.gap.diagnose import diagnose
 from cpfls_cli.gap.settings import GapSettings

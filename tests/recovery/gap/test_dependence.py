@@ -11,8 +11,7 @@ from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.resampling import blocks_of
-from cpfls_cli.weak_form.windows import windows
+from cpfls_cli.weak_form.windows import blocks_of, windows
 
 VEHICLE = VehicleSettings()
 TENSOR = symmetric(VEHICLE.inertia_kg_m2)

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
-from cpfls_cli.gap.residual.narrow_band import narrow_band
+from cpfls_cli.gap.naming.open_questions import narrow_band
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import windows

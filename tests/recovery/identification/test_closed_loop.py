@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cpfls_cli.dynamics import rigid_columns
-from cpfls_cli.estimation.first_stage import first_stage_fit
+from cpfls_cli.estimation.estimate import first_stage_fit
 from cpfls_cli.identification.closed_loop import freed_torque, loop_along
 from cpfls_cli.identification.data import gathered, joined, sample_times
 from cpfls_cli.identification.identify import identify

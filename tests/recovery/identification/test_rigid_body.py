@@ -7,8 +7,8 @@ from cpfls_cli import rotations
 from cpfls_cli.dynamics import newton_euler_torque, rigid_columns
 from cpfls_cli.excitation import optimised_rotation
 from cpfls_cli.identification.data import TorqueData, axis_scale
+from cpfls_cli.identification.findings import fit_baselines
 from cpfls_cli.identification.identify import identify, model_evaluator
-from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.regressor.regressor import Motion, Regressor, data_ranges, uniform_breakpoints

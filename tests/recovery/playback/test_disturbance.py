@@ -14,7 +14,7 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.vehicle import find_vehicle
-from cpfls_cli.simulation.measured import measure
+from cpfls_cli.simulation.inverse import measure
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.planning import plan
 from cpfls_cli.trajectory.settings import TrajectorySettings

@@ -9,8 +9,8 @@ from cpfls_cli.dynamics import InertiaFunctions, visited_cells
 from cpfls_cli.identification import data
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.evaluator import uniform_chromosome
+from cpfls_cli.identification.findings import fit_baselines
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor.regressor import Motion, uniform_breakpoints
 from cpfls_cli.validation.bands import bootstrap, inertia_band, missed_torque

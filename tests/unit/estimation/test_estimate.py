@@ -4,8 +4,17 @@ import numpy as np
 import pytest
 
 from cpfls_cli.blocks import contiguous
-from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, estimate, positive_ratio
-from cpfls_cli.estimation.first_stage import FOLDS, first_stage_fit, first_stage_fit_by_run, fits_of_others
+from cpfls_cli.estimation.estimate import (
+    FOLDS,
+    Normal,
+    Prior,
+    conditional_strength,
+    estimate,
+    first_stage_fit,
+    first_stage_fit_by_run,
+    fits_of_others,
+    positive_ratio,
+)
 from cpfls_cli.estimation.spectra import block_spectra, cut_blocks, eroded, transforms, window_starts, without_slow
 
 

@@ -17,12 +17,12 @@ from cpfls_cli.export.json_form import HOW_TO_EVALUATE_INERTIA
 from cpfls_cli.export.points import parts_along
 from cpfls_cli.export.source import c_source, python_source
 from cpfls_cli.fuzzy.basis import Z_FUNCTION, memberships, z_function
+from cpfls_cli.identification.samples import mapped_inputs, padded_breakpoints, structure_table
 from cpfls_cli.playback.flight import MeasuredMotion
 from cpfls_cli.playback.model import Remainder, VehicleModel, learned_wrench
 from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from cpfls_cli.regressor import kernels
 from cpfls_cli.regressor.regressor import Motion, Regressor
-from cpfls_cli.regressor.table import mapped_inputs, padded_breakpoints, structure_table
 from cpfls_cli.vehicle.motion import Instant, Numbers
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import Each

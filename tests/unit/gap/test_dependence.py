@@ -8,11 +8,9 @@ from scipy.stats import f as f_law
 
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.weak_flight import weak_flight
-from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals
-from cpfls_cli.gap.residual.views import heat_map, stretches
+from cpfls_cli.gap.residual.dependence import heat_map, joined_states, rank_dependence, state_signals, stretches
 from cpfls_cli.vehicle.settings import VehicleSettings
-from cpfls_cli.weak_form.resampling import mirror_shifted
-from cpfls_cli.weak_form.windows import windows
+from cpfls_cli.weak_form.windows import mirror_shifted, windows
 
 FLIGHTS, LENGTH = 3, 120
 FLIGHT_INDEX = np.repeat(np.arange(FLIGHTS), LENGTH)

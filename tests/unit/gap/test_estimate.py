@@ -8,8 +8,7 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import Equations
 from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of
-from cpfls_cli.gap.naming.odds import chance_of_ranks, likely, off_by
-from cpfls_cli.gap.naming.ranking import within_bounds
+from cpfls_cli.gap.naming.ranking import chance_of_ranks, likely, off_by, within_bounds
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak

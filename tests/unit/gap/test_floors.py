@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 from cpfls_cli.gap.balance.balance_system import scatter_size, scatter_variance, system
 from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.estimate import channel_weight
+from cpfls_cli.gap.naming.open_questions import LOWEST, background, grid, narrow_band, noise_like, pooled_power
 from cpfls_cli.gap.residual.air import Air
-from cpfls_cli.gap.residual.narrow_band import LOWEST, background, grid, narrow_band, noise_like, pooled_power
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.gap_flights import candidate, fly, weak
 
@@ -145,7 +145,7 @@ def test_a_force_has_no_energy_of_rotation():
 def test_no_noise_is_drawn_for_what_is_not_significant_any_more(amplitude, all_drawn, monkeypatch):
     drawn = []
     monkeypatch.setattr(
-        "cpfls_cli.gap.residual.narrow_band.noise_like", lambda *given: drawn.append(None) or noise_like(*given)
+        "cpfls_cli.gap.naming.open_questions.noise_like", lambda *given: drawn.append(None) or noise_like(*given)
     )
     residual = [
         np.column_stack([own[0], *np.zeros((5, own.shape[1]))]) for own in red(np.random.default_rng(4), amplitude)

@@ -10,22 +10,24 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.errors import ComputationError, InputError, SettingError
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.weak_flight import columns_of
-from cpfls_cli.gap.naming.odds import likely, odds
-from cpfls_cli.gap.naming.ranking import rank_effects
+from cpfls_cli.gap.naming.ranking import likely, odds, rank_effects
 from cpfls_cli.gap.naming.results import Alternative
-from cpfls_cli.gap.next_flight.logged import Logging, expected_floor, flown_signals, planned_signals
-from cpfls_cli.gap.next_flight.rivals import open_questions, physical_values, questions_between, require_visible, usual
-from cpfls_cli.gap.next_flight.room import HarmonicPath, room_of
-from cpfls_cli.gap.next_flight.search import goal, next_flight
-from cpfls_cli.gap.next_flight.separation import (
+from cpfls_cli.gap.next_flight.rivals import (
     Evidence,
     Question,
     SizedEffect,
     answered,
     formulas_off,
     gathered,
+    open_questions,
+    physical_values,
+    questions_between,
+    require_visible,
     shared_noise,
+    usual,
 )
+from cpfls_cli.gap.next_flight.room import HarmonicPath, room_of
+from cpfls_cli.gap.next_flight.search import Logging, expected_floor, flown_signals, goal, next_flight, planned_signals
 from cpfls_cli.gap.residual.air import Air
 from cpfls_cli.gap.settings import NOISE, RARE, GapSettings
 from cpfls_cli.playback.gusts import Gusts

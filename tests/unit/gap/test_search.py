@@ -14,8 +14,7 @@ from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_samples
 from cpfls_cli.gap.naming.by_samples import _surest, _Test, _Tried
-from cpfls_cli.gap.naming.odds import simplest, unbeaten
-from cpfls_cli.gap.naming.ranking import Scored, rank_effects
+from cpfls_cli.gap.naming.ranking import Scored, rank_effects, simplest, unbeaten
 from cpfls_cli.gap.naming.search import alternatives
 from cpfls_cli.gap.settings import GapSettings
 from tests.builders.gap_flights import candidate, fly, weak

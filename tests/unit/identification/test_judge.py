@@ -6,9 +6,8 @@ import pytest
 from cpfls_cli.dynamics import inertia_matrix, newton_euler_torque, not_positive_definite, why_unphysical
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.identification.data import TorqueData
-from cpfls_cli.identification.findings import axis_evidence
+from cpfls_cli.identification.findings import axis_evidence, constant_inertia_columns, fit_baselines, score_of
 from cpfls_cli.identification.identify import Judged, identify
-from cpfls_cli.identification.judge import constant_inertia_columns, fit_baselines, score_of
 from cpfls_cli.identification.samples import Products
 from cpfls_cli.identification.settings import IdentificationSettings
 from cpfls_cli.identification.solver import SMALLEST_ERROR, contiguous_blocks, ridge_curve

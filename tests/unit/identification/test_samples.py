@@ -13,9 +13,8 @@ from cpfls_cli.dynamics import rigid_columns
 from cpfls_cli.identification import data, samples, solver
 from cpfls_cli.identification.data import Flights, TorqueData, gathered, joined, sample_times
 from cpfls_cli.identification.evaluator import decode
-from cpfls_cli.identification.findings import axis_evidence
+from cpfls_cli.identification.findings import axis_evidence, score_of
 from cpfls_cli.identification.identify import identify, model_evaluator
-from cpfls_cli.identification.judge import score_of
 from cpfls_cli.identification.samples import Ready, Samples
 from cpfls_cli.identification.settings import IdentificationSettings, LocalSearchSettings, RidgeSettings
 from cpfls_cli.identification.solver import contiguous_blocks, with_folds

@@ -8,8 +8,8 @@ import pytest
 from cpfls_cli.flightlog.airframe import usual_airframe
 from cpfls_cli.flightlog.vocabulary import BETAFLIGHT
 from cpfls_cli.look.balance import balance_of
-from cpfls_cli.look.driving import Rotors
 from cpfls_cli.look.flight import Samples
+from cpfls_cli.look.reading import Rotors
 from tests.builders.look_flights import CROSS, SPINS, hovering
 
 CURVE = {"parameters": {"MOT_THST_EXPO": 0.0001, "MOT_SPIN_MIN": 0.0, "MOT_SPIN_MAX": 1.0}, "autopilot": "ardupilot"}

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.look import reasons
+from cpfls_cli.look import flight as reasons
 from cpfls_cli.look.effectiveness import PlantModel, axis_effectiveness, effectiveness
-from cpfls_cli.look.flight import LogFlight, Samples
-from cpfls_cli.look.setpoints import MADE_BY_STICKS, explained
+from cpfls_cli.look.flight import MADE_BY_STICKS, LogFlight, Samples, explained
 from tests.builders.looked_flights import TRUTH, flown, without_sticks
 
 

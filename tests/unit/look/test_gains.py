@@ -9,9 +9,8 @@ from control import FRD, stability_margins
 
 import cpfls_cli.look.gains
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.look.flight import AXES
+from cpfls_cli.look.flight import AXES, TOO_SLOW
 from cpfls_cli.look.gains import LogGains, tuned_gains
-from cpfls_cli.look.reasons import TOO_SLOW
 from cpfls_cli.page import blocks
 from cpfls_cli.report.content import Text
 from cpfls_cli.stage import loaded

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from cpfls_cli.look.answers import gusts_of
 from cpfls_cli.look.effectiveness import PlantModel
-from cpfls_cli.look.gusts import gusts_of
 from tests.builders.look_flights import correlated, still_flight
 
 RATE, B, DELAY = 100.0, 200.0, 0.03

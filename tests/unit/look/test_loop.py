@@ -7,7 +7,7 @@ import pytest
 
 from cpfls_cli.autopilots.law import Controller
 from cpfls_cli.autopilots.registry import AUTOPILOTS
-from cpfls_cli.look import reasons
+from cpfls_cli.look import flight as reasons
 from cpfls_cli.look.effectiveness import PlantModel, axis_effectiveness
 from cpfls_cli.look.loop import PlantAndLaw, _bandwidth, loops_of
 from tests.builders.looked_flights import PARAMETERS, RATE_HZ, TRUTH, flown, without_sticks

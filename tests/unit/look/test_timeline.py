@@ -8,8 +8,7 @@ from cpfls_cli.flightlog.recognition import recognise
 from cpfls_cli.logs.formats import log_contents
 from cpfls_cli.look.columns import LookedLog
 from cpfls_cli.look.flight import Samples
-from cpfls_cli.look.logged import what_is_logged
-from cpfls_cli.look.look import look_at
+from cpfls_cli.look.look import look_at, what_is_logged
 from cpfls_cli.look.reading import read_flight
 from cpfls_cli.look.timeline import _at_limit, _misread, timeline
 from tests.builders import ended_flights as ended

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cpfls_cli.estimation.whittle import GaussMarkov
+from cpfls_cli.estimation.spectra import GaussMarkov
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.innovations import ResidualInnovations, about_mean, before, predicted, whitening
 from cpfls_cli.playback.lack import Lack, lack_of

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from cpfls_cli import page
 from cpfls_cli.changes.results import Alike, Found
-from cpfls_cli.report.change_words import cause_name, change_words, smallest_words, what_to_check
 from cpfls_cli.report.content import (
     Box,
     Cell,
@@ -38,6 +37,7 @@ from cpfls_cli.report.content import (
 from cpfls_cli.report.terminal import folded_words, terminal_lines, warnings_of
 from cpfls_cli.result import Estimate
 from cpfls_cli.stage import loaded
+from cpfls_cli.stages._flight_numbers import cause_name, change_words, smallest_words, what_to_check
 from cpfls_cli.words import joined
 from tests.builders.drawn_numbers import QUAD, drawn_changed, drawn_trend
 from tests.builders.gap_artifacts import source_of as made_of

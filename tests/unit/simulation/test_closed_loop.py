@@ -18,8 +18,15 @@ from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.gap.balance.weak_flight import weak_flight
 from cpfls_cli.simulation import model
 from cpfls_cli.simulation.closed_loop import ClosedLoop, Setpoints, fly_setpoints
-from cpfls_cli.simulation.inverse import ROTOR_SHARE, hover_squared, room_left, rotor_load, squared_speeds, tilt_of
-from cpfls_cli.simulation.measured import measure
+from cpfls_cli.simulation.inverse import (
+    ROTOR_SHARE,
+    hover_squared,
+    measure,
+    room_left,
+    rotor_load,
+    squared_speeds,
+    tilt_of,
+)
 from cpfls_cli.simulation.model import simulated_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.excited import added_motion

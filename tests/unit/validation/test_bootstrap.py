@@ -10,8 +10,8 @@ from cpfls_cli.dynamics import InertiaFunctions, rigid_columns
 from cpfls_cli.identification import data
 from cpfls_cli.identification.data import axis_scale
 from cpfls_cli.identification.evaluator import decode, uniform_chromosome
+from cpfls_cli.identification.findings import fit_baselines
 from cpfls_cli.identification.identify import model_evaluator
-from cpfls_cli.identification.judge import fit_baselines
 from cpfls_cli.identification.settings import IdentificationSettings, ValidationSettings
 from cpfls_cli.regressor.regressor import RIGID, Regressor
 from cpfls_cli.validation.bands import bootstrap

@@ -8,8 +8,7 @@ from numpy.polynomial import Polynomial
 from scipy.interpolate import CubicSpline
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.weak_form.resampling import blocks_of, folds
-from cpfls_cli.weak_form.windows import windows
+from cpfls_cli.weak_form.windows import blocks_of, folds, windows
 
 TIME = 3.0 + 0.01 * np.arange(500)
 LOCAL = np.array(TIME - 5.5)

@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 import pytest
 
 from cpfls_cli.errors import ComputationError, InputError
-from cpfls_cli.workers.compatibility import Processor, processor, require_same_processor, require_same_versions
+from cpfls_cli.workers.cluster import Processor, processor, require_same_processor, require_same_versions
 from cpfls_cli.workers.workforce import employ, require_address
 
 OWN = processor()
