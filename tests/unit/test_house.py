@@ -143,9 +143,7 @@ def test_tests_import_from_shared_builders_alone():
 # A module lives for two users or for more than about 80 lines of code. These are one thing of many of a kind, each
 # looked up by its place: a command, an effect, a reader of logs, a simulator that is exported to or whose file is read.
 ONE_OF_A_KIND = ("autopilots/catalogue/", "effects/catalogue/", "export/simulators/", "logs/", "simulators/", "stages/")
-SMALL_ALL_THE_SAME = {
-    "cli/main.py": "runs before anything heavy is loaded",
-}
+SMALL_ALL_THE_SAME = {"cli/main.py": "runs before anything heavy is loaded"}
 FEW_LINES = 80
 
 
