@@ -279,7 +279,7 @@ def widened(hidden, named):
     effects = [CATALOGUE[name] for name in ("rotor_drag", "parasitic_drag", "inflow", "com_offset", "torque_bias")]
     last = rank_effects(flights, [named], effects, SETTINGS, np.random.default_rng(0))
     found = fitted(flights, [named], last.floor, SETTINGS)
-    return found, with_unnamed(found, last, effects, np.random.default_rng(0))
+    return found, with_unnamed(found, last, effects, frozenset(), np.random.default_rng(0))
 
 
 def test_intervals_leave_room_for_what_is_too_small_for_a_name():
@@ -295,8 +295,10 @@ def test_intervals_leave_room_for_what_is_too_small_for_a_name():
 def test_where_nothing_else_is_there_intervals_stay_what_they_are():
     drag = candidate("rotor_drag")
     found, (wider, unnamed, _) = widened([(drag, [1.3e-3])], drag)
+    (alone,), (there,) = found.estimates.effects[0], wider.effects[0]
     assert unnamed == ()
-    assert wider is found.estimates
+    assert there.value == alone.value
+    assert there.high - there.low == pytest.approx(alone.high - alone.low, rel=0.1)
 
 
 def growing(effect):
