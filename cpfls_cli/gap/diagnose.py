@@ -136,7 +136,10 @@ def diagnose(
     progress(0.75, "rivals")
     # Lags of rotors in gusts instruments have decided.
     tried = [each for each in named.effects if gusts is None or not each.is_lag]
-    wider, unnamed, bends = with_unnamed(found, named.steps[-1], tried, rng)
+    judged = [named.in_gusts(each) for each in judge_effects(found, named.effects, rng)]
+    # What may be there instead of a named effect is no small one next to it.
+    instead = {rival.name for each in judged for rival in each.alternatives}
+    wider, unnamed, bends = with_unnamed(found, named.steps[-1], tried, instead, rng)
     named = named._replace(bends=bends)
     pairs = zip(hypothesis.chosen, estimates.effects, wider.effects, strict=True)
     # Averages over windows, which widen the others, are biased by the loop for what is small.
@@ -144,9 +147,7 @@ def diagnose(
         own if (each.effect.is_lag and named.sure) or each.effect.name in named.small else with_it
         for each, own, with_it in pairs
     )
-    estimates = replace(wider, effects=held_by)
-    fit = found._replace(estimates=estimates)
-    judged = [named.in_gusts(each) for each in judge_effects(fit, named.effects, rng)]
+    fit = found._replace(estimates=replace(wider, effects=held_by))
     hypothesis, estimates, *_ = with_noisy_rate(fit)
     known = renewed([each.effect for each in judged], hypothesis, estimates)
     judged = [replace(each, effect=effect) for each, effect in zip(judged, known, strict=True)]

@@ -244,14 +244,14 @@ def _with_intervals(
     if len(without) > 1:
         half = np.hypot(half_width(serial_error(np.array(without)), blocks), _KNOWN_TO * value)
     return tuple(
-        _within(Estimate(one.name, one.unit, float(v), float(v - h), float(v + h), one.bounds(vehicle)))
+        within(Estimate(one.name, one.unit, float(v), float(v - h), float(v + h), one.bounds(vehicle)))
         for one, v, h in zip(known, value, half, strict=True)
         # A column of zeros leaves its coefficient open: an offset along x, say, where only x is compared.
         if one in effect.shapes or (np.isfinite(v) and (v != 0 or h != 0 or effect.kind == "parameter"))
     )
 
 
-def _within(number: Estimate) -> Estimate:
+def within(number: Estimate) -> Estimate:
     """End the interval of a number that cannot be below 0 there."""
     return replace(number, low=max(number.low, 0.0)) if number.plausible[0] == 0 <= number.value else number
 

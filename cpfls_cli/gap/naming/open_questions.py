@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -19,13 +19,23 @@ from cpfls_cli.gap.balance.balance_system import System, is_free, residual_along
 from cpfls_cli.gap.balance.noise_floor import CORRELATIONS
 from cpfls_cli.gap.balance.refine import fit_within_bounds, least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, fitted, size_in_floors
-from cpfls_cli.gap.naming.ranking import RankedStep, candidates_of, names_of, rank_effects
-from cpfls_cli.gap.naming.results import Alternative, NamedEffect, NotExcited, Unexplained
+from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, channel_weight, estimates_of, size_in_floors, within
+from cpfls_cli.gap.naming.ranking import (
+    RankedStep,
+    candidates_of,
+    likely,
+    log_odds,
+    more_residual,
+    names_of,
+    rank_effects,
+    scoring_matrix,
+)
+from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
 from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, ERRORS, RARE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.weak_form.windows import folds
 
 Energy = Literal["feeds", "drains", "neither"]
 
@@ -225,6 +235,8 @@ def noise_like(smooth: Array, lengths: Sequence[int], present: BoolArray, on: Gr
 
 
 _USUAL_OF_BOUND = 0.2  # A coefficient that is large but not unheard of, as a share of its bound.
+_SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)
+"""Of that size, which effects without a name may have: none, and about half a decade apart."""
 
 
 def unexplained_channels(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
@@ -284,16 +296,21 @@ def energy_directions(torque: Array, body_rate: Array, block: IntArray) -> list[
 
 
 def with_unnamed(
-    found: NamedFit, last: RankedStep, effects: Sequence[Effect], rng: np.random.Generator
+    found: NamedFit, last: RankedStep, effects: Sequence[Effect], instead: Set[str], rng: np.random.Generator
 ) -> tuple[Estimates, tuple[str, ...], tuple[str, ...]]:
-    """Widen the intervals of named effects by what is more than chance and too small for a name.
+    """Widen the intervals of named effects by what is too small for a name.
 
-    A drag of the fuselage that shows in no channel on its own still takes its part from the drag of the rotors. And a
-    formula that is right in slow flight bends in fast flight: where a bend shows, its number changes with it.
+    Every vehicle has a little of every effect: a drag of the fuselage that shows in no channel on its own still takes
+    its part from the drag of the rotors. And a formula that is right in slow flight bends in fast flight. So named
+    effects are fitted together with all others and with their bends, these normal about 0 with a share of their usual
+    size as standard deviation. How likely each share is, none among them, blocks that no fit saw decide. Intervals are
+    those of the mean of these fits and of the named effects alone, both.
 
-    `last` is the look that ended the search, and `effects` are those to be tried. The intervals hold what the numbers
-    are with the unnamed effects, whose names come too, and without them. Last come bends that are a part of the gap
-    that counts: the formula is another one.
+    `last` is the look that ended the search, `effects` are those to be tried, and `instead` rivals, which may be there
+    in the place of named effects and are no small ones next to them. With the estimates come the unnamed effects that
+    explain more than chance, and bends that are a part of the gap that counts: the formula is another one.
+
+    Reference: Yao, Vehtari, Simpson and Gelman 2018 (averages of Bayesian predictive distributions).
     """
     flights, named, settings = found.hypothesis.flights, found.hypothesis.chosen, found.settings
     if not named:
@@ -301,24 +318,93 @@ def with_unnamed(
     step, counting = last, tuple[str, ...]()
     if names_of(named) != names_of(last.hypothesis.chosen):
         step = rank_effects(flights, named, effects, settings, rng)
+    vehicle, contain = found.hypothesis.vehicle, names_of(named).union(instead, *(each.effect.holds for each in named))
+    others = [
+        (each.candidate, usual_size(each.candidate.effect, vehicle, len(each.coefficients)))
+        for each in step.ranking
+        if _is_other(each.candidate.effect, contain)
+    ]
     chosen = _beyond_chance(step, effects, settings, rng)
-    bends = bends_of(named, flights)
+    # A formula bends by as much as it is; one that is 0 does not.
+    pairs = [(each, np.abs(size)) for each, size in zip(named, found.estimates.of_effect, strict=True) if size.all()]
+    sizes = {bend.name: (bend, size) for each, size in pairs for bend in bends_of([each], flights)}
+    bends = [bend for bend, _ in sizes.values()]
     if bends:
-        step = rank_effects(flights, chosen, bends, settings, rng)
-        least = COUNTS * rank_effects(flights, (), (), settings, None, floor=step.floor).above_floor
-        large = (each for each in step.ranking if each.gain > max(least, step.least_gain()))
-        counting = tuple(each.candidate.effect.title for each in large if step.p_value(each.gain) <= RARE)
-        chosen = _beyond_chance(step, bends, settings, rng)
-    if len(chosen) == len(named):
-        return found.estimates, (), counting
-    wider = fitted(flights, chosen, found.floor, settings).estimates
-    held = []
-    for numbers, others in zip(found.estimates.effects, wider.effects, strict=False):
-        there = {number.name: number for number in others}
-        pairs = [(number, there.get(number.name, number)) for number in numbers]
-        held.append(tuple(replace(n, low=min(n.low, o.low), high=max(n.high, o.high)) for n, o in pairs))
+        bent = rank_effects(flights, chosen, bends, settings, rng)
+        least = COUNTS * rank_effects(flights, (), (), settings, None, floor=bent.floor).above_floor
+        large = (each for each in bent.ranking if each.gain > max(least, bent.least_gain()))
+        counting = tuple(each.candidate.effect.title for each in large if bent.p_value(each.gain) <= RARE)
+        others += [(each.candidate, sizes[each.candidate.effect.name][1]) for each in bent.ranking]
+        chosen = _beyond_chance(bent, bends, settings, rng)
     unnamed = tuple(each.effect.title for each in chosen[len(named) :])
-    return replace(found.estimates, effects=tuple(held)), unnamed, counting
+    if not others:
+        return found.estimates, unnamed, counting
+    return _averaged(found.estimates, *_with_others(found, others, step)), unnamed, counting
+
+
+def _is_other(effect: Effect, named: Set[str]) -> bool:
+    """Check whether an effect adds torque and force of its own to those of named effects and of what these contain."""
+    return effect.kind == "wrench" and not {effect.name, *effect.holds} & named
+
+
+def _with_others(
+    found: NamedFit, others: Sequence[tuple[Candidate, Array]], step: RankedStep
+) -> tuple[list[Estimates], Array]:
+    """Fit named effects together with others for each of `_SHARES`, and say how likely each is, shape (share,).
+
+    `others`: each with the usual size of its linear coefficients.
+    """
+    hypothesis, shapes = found.hypothesis, found.hypothesis.shape_values
+    arranged = scoring_matrix(hypothesis, [each for each, _ in others], found.floor)
+    weight = channel_weight(hypothesis, found.floor) / found.floor
+    matrix, own = arranged.matrix / weight[..., None], len(arranged.base)
+    normal = folds(matrix, hypothesis.residual / found.floor / weight, step.block)
+    usual = np.concatenate([size for _, size in others])
+    ends = np.array([(shape.grid[0], shape.grid[-1]) for shape in hypothesis.shapes]).reshape(-1, 2)
+
+    def numbers(fitted_rows: Array) -> Array:
+        """Give coefficients and shapes, shape (..., number), of a fit whose shapes are steps."""
+        linear, steps = np.split(fitted_rows[..., :own], [own - len(shapes)], axis=-1)
+        return np.concatenate([linear, np.clip(shapes + steps, *ends.T)], axis=-1)
+
+    fits, errors = list[Estimates](), list[Array]()
+    for share in _SHARES:
+        with np.errstate(divide="ignore"):
+            known = np.append(arranged.prior[:own], (share * usual) ** -2.0)
+        # What has no size is left out.
+        columns = np.flatnonzero(np.isfinite(known))
+        informed = replace(normal, prior=known)
+        (values, _), (left_out, error) = informed.fit(columns), informed.solve(columns)
+        fits.append(estimates_of(hypothesis, numbers(values[:, 0]), numbers(left_out[..., 0])))
+        errors.append(error[:, 0])
+    # What formulas are off by is what others are fitted to.
+    return fits, likely([log_odds(more_residual(error, errors[0]), 0.0) for error in errors[1:]])
+
+
+def _averaged(own: Estimates, fits: Sequence[Estimates], chances: Array) -> Estimates:
+    """Widen the intervals of numbers by what fits with other effects change, and by their larger errors."""
+
+    def widened(number: Estimate, there: Sequence[Estimate]) -> Estimate:
+        values = np.array([each.value for each in there])
+        half = np.array([each.high for each in there]) - values
+        if len(there) < len(_SHARES) or not np.isfinite(half).all():
+            return number
+        apart = values - values[0]
+        mean = float(chances @ apart)
+        # 95 % intervals are about as many errors wide as Student's t says, so they are added in squares.
+        wider = np.maximum(half**2 - half[0] ** 2, 0.0) + (ERRORS * (apart - mean)) ** 2
+        more = float(np.sqrt(chances @ wider))
+        low, high = (
+            number.value + mean + way * np.hypot(end - number.value, more)
+            for way, end in ((-1, number.low), (1, number.high))
+        )
+        return within(replace(number, low=min(number.low, float(low)), high=max(number.high, float(high))))
+
+    effects = []
+    for place, numbers in enumerate(own.effects):
+        known = [{each.name: each for each in fit.effects[place]} for fit in fits]
+        effects.append(tuple(widened(n, [fit[n.name] for fit in known if n.name in fit]) for n in numbers))
+    return replace(own, effects=tuple(effects))
 
 
 def bends_of(named: Sequence[Candidate], flights: Sequence[WeakFlight]) -> list[Effect]:
