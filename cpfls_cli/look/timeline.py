@@ -14,6 +14,7 @@ from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.flightlog.crash import BEYOND, HARD
 from cpfls_cli.flightlog.names import is_of
 from cpfls_cli.flightlog.recognised import Recognition
+from cpfls_cli.flightlog.stretches import stands_still
 from cpfls_cli.flightlog.topics import STAMP, YAW_RESETS, Topics
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
 from cpfls_cli.look.flight import LogFlight, Samples
@@ -477,6 +478,12 @@ def _losses(flight: LogFlight, topics: Topics) -> Iterator[Event]:
             yield Event(time_s=begin, until_s=end, kind="gap", text=text, severity="warning")
         elif end - begin > _PAUSE_S:
             yield Event(time_s=begin, until_s=end, kind="pause", text=f"nothing is logged for {end - begin:.0f} s")
+    sensor = flight.gyroscope
+    for first, after in runs(stands_still(sensor.time, sensor.values)):
+        begin, end = float(sensor.time[first]), float(sensor.time[after - 1])
+        if flight.flown[(flight.time >= begin) & (flight.time <= end)].any():
+            text = f"the gyroscope repeats its last value for {end - begin:.2g} s"
+            yield Event(time_s=begin, until_s=end, kind="gap", text=text, severity="warning")
     for name in ("IMU", "sensor_combined", "vehicle_angular_velocity", "vehicle_attitude"):
         time = np.asarray(topics.get(name, {}).get(STAMP, ()), dtype=float)
         back = np.flatnonzero(np.diff(time) < -_RESTARTS_S)

@@ -199,6 +199,16 @@ def test_rotors_on_another_clock_are_said():
     assert "the rotor speeds are late by" in said(replace(lively, rotor_speed=np.roll(lively.rotor_speed, 5, axis=0)))
 
 
+def test_where_a_source_was_silent_nothing_is_compared():
+    long = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
+    late = replace(long, attitude=np.roll(long.attitude, 3, axis=0))
+    frozen = late.body_rate.copy()
+    frozen[800:1200] = frozen[800]
+    both, one = (check([own], SETTINGS) for own in (replace(late, body_rate=frozen), late))
+    assert [own.channels for own in both] == [own.channels for own in one] == [("attitude", "gyroscope")]
+    assert both[0].size == pytest.approx(one[0].size, abs=0.002)
+
+
 @pytest.mark.parametrize(("times", "idle"), [(0.3, 0.0), (0.3, 60.0), (0.3, 200.0), (9, 0.0), (9, 200.0), (60, 60.0)])
 def test_a_long_rest_on_the_ground_contradicts_nothing(flight, times, idle):
     rng, count = np.random.default_rng(1), round(times * len(flight))
