@@ -377,9 +377,11 @@ def _gross(fault: AuditFinding) -> Finding | None:
     estimate, largest = str(_estimate(fault.name)), max(named, key=lambda number: abs(number.value))
     if abs(largest.value) <= _GROSS[estimate]:
         return None
+    # A clock that runs fast or slow does so about all axes, and nothing else in a log of both shows it.
+    alike = estimate == "scale" and len(named) == 3 and max(own.low for own in named) < min(own.high for own in named)
     return Finding(
         f"{fault.sentence[0].lower()}{fault.sentence[1:-1]}",
-        "check import.signals.body_rate",
+        f"check import.signals.body_rate{', or, as it is alike about all axes, the clock of the log' if alike else ''}",
         ("gyroscope", "attitude"),
         largest.value,
         largest.unit,

@@ -433,5 +433,6 @@ def _take_sensed(
         points = "up" if up == "FLU" else "down"
         words = f"the accelerometer reads {vertical:.3g} along z, so z points {points}"
         # Some log gravity itself, which points down.
-        other = Rival("body_frame: FLU", "if the accelerometer logs gravity, not the force that carries the vehicle")
+        why = "if the accelerometer logs gravity, not the force that carries the vehicle, or its z is reversed"
+        other = Rival("body_frame: FLU", why)
         seen.choose("body_frame", up, words, *(("data",) if up == "FLU" else ("guess", other)))

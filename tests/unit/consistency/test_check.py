@@ -199,6 +199,14 @@ def test_rotors_on_another_clock_are_said():
     assert "the rotor speeds are late by" in said(replace(lively, rotor_speed=np.roll(lively.rotor_speed, 5, axis=0)))
 
 
+@pytest.mark.parametrize(("factors", "clock"), [((1.3, 1.3, 1.3), True), ((1.3, 1.0, 1.3), False)])
+def test_a_gyroscope_that_is_off_alike_about_all_axes_may_be_a_clock(factors, clock):
+    turning = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
+    words = said(times(body_rate=factors)(turning))
+    assert "the gyroscope reads" in words
+    assert ("the clock of the log" in words) is clock
+
+
 def test_where_a_source_was_silent_nothing_is_compared():
     long = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
     late = replace(long, attitude=np.roll(long.attitude, 3, axis=0))

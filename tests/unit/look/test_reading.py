@@ -364,3 +364,13 @@ def test_a_plain_word_has_the_unit_of_a_kind_of_log_among_its_own_names_alone(ot
     fields = {"t": time, "baroAlt": 3 + np.sin(time), other: np.cos(time)}
     heights = [own.values[:, 0] for own in LookedLog({"": fields}, {}, "").found("height")]
     assert [own.tolist() for own in heights] == [(factor * fields["baroAlt"]).tolist() for factor in factors]
+
+
+def test_samples_that_come_at_two_rates_leave_no_pause():
+    """Every second stretch has a third of the rows: slower, and never silent."""
+    contents = logs.WRITERS[""](OWN)
+    kept = (OWN.time % 4.0 < 2.5) | (np.arange(len(OWN.time)) % 4 == 0)
+    contents.topics[""] = {name: values[kept] for name, values in contents.topics[""].items()}
+    gaps = read(contents).gaps_s
+    assert len(gaps) > 100
+    assert np.diff(gaps, axis=1).max() < 0.05
