@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from cpfls_cli.arrays import runs
 from cpfls_cli.consistency.channels import channel_warnings, filter_warnings
 from cpfls_cli.consistency.findings import AuditFinding, Finding, contradictions, doubts
 from cpfls_cli.consistency.gyroscope import GyroFit
@@ -28,7 +27,6 @@ from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import FlownPart, find_flown, rotor_shares
-from cpfls_cli.flightlog.stretches import stands_still
 from cpfls_cli.result import about, part
 from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows, WindowSettings, fitting_windows
@@ -49,12 +47,12 @@ ENOUGH = 50_000  # Samples that identify units, axes and which rotor is where.
 def check(parts: Sequence[Signals], settings: WindowSettings) -> tuple[Finding, ...]:
     """Hold the channels of a flight against each other and against its vehicle; nothing is set right.
 
-    What is not flown, where a touchdown is a motion of its own, is left out, and so is where a source was silent.
+    What is not flown, where a touchdown is a motion of its own, is left out.
 
     `parts`: stretches of one flight, or flights with the same hardware; those too short for windows are left out.
     `settings`: of the section `gap`, as in the sensor audit.
     """
-    parts = [live for part in parts for live in _live(_flown(part))]
+    parts = [_flown(part) for part in parts]
     looked_at = _middle(parts)
     shared = fitting_windows(looked_at[0].period, settings)
     long = [part for part in looked_at if shared.count(len(part))]
@@ -71,14 +69,6 @@ def _flown(part: Signals) -> Signals:
         return part
     first, after = np.searchsorted(part.time - part.time[0], [span[0], span[1] + part.period / 2])
     return stretch_of(part, slice(int(first), int(after)))
-
-
-def _live(part: Signals) -> list[Signals]:
-    """Cut out where gyroscope or attitude repeat their last value, which is no motion."""
-    still = stands_still(part.time, part.body_rate)
-    if part.attitude is not None:
-        still |= stands_still(part.time, part.attitude)
-    return [stretch_of(part, slice(first, after)) for first, after in runs(~still)] or [part]
 
 
 def flown(part: Signals) -> FlownPart:

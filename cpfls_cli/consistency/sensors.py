@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from scipy.special import stdtr
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, runs
 from cpfls_cli.blocks import blocks_of_time, half_width, mean_error
 from cpfls_cli.consistency.channels import BODY_AXES, TURNING_RAD_S, gyroscope_apart, least_noise
 from cpfls_cli.consistency.findings import AuditFinding, FaultNumber, Finding, in_ms, off_clock
@@ -23,6 +23,7 @@ from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.importing import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
+from cpfls_cli.flightlog.stretches import stands_still
 from cpfls_cli.lag import fit_delay
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows
 from cpfls_cli.weak_form.windows import windows as windows_of
@@ -396,9 +397,18 @@ def _estimate(name: str) -> object:
     return test.estimate
 
 
+def _live(flight: Signals) -> list[Signals]:
+    """Cut out where gyroscope or attitude repeat their last value, which is no motion."""
+    still = stands_still(flight.time, flight.body_rate)
+    if flight.attitude is not None:
+        still |= stands_still(flight.time, flight.attitude)
+    return [stretch_of(flight, slice(first, after)) for first, after in runs(~still)] or [flight]
+
+
 def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     if all(signals.attitude is None for signals in flights):
         return Gyroscope.unjudged("the log has no attitude to check the gyroscope against")
+    flights = [live for signals in flights for live in _live(signals)]
     cut = [motion for signals in flights if (motion := kinematics(signals, windows)) is not None]
     if not cut:
         return Gyroscope.unjudged("the flights are too short")
