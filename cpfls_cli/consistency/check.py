@@ -37,6 +37,9 @@ _WEIGHED_S, _WEIGHED = 10.0, (0.7, 5.0)
 """Seconds in which nobody falls or climbs enough to feel less than the first share of gravity on average (that takes
 30 m/s), or pulls the second without an end."""
 
+_LEANS_M_S2, _FASTEST_M_S = 1.0, 40.0
+"""Force across gravity that an attitude which leans by 6 degrees makes, and a speed that hardly a multirotor gains."""
+
 ENOUGH = 50_000  # Samples that identify units, axes and which rotor is where.
 
 
@@ -96,6 +99,7 @@ def _findings(parts: Sequence[Signals], sensors: Sensors | None) -> Iterator[Fin
     if parts[0].attitude is None:
         yield _unlike_gravity(max(_middle(parts), key=len))
     if hangs is None:
+        yield _runs_away(max(_middle(parts), key=len))
         yield from against_lean(max(_middle(parts), key=len))
     if sensors is None or hangs is not None:
         return
@@ -133,6 +137,28 @@ def _unlike_gravity(part: Signals) -> Finding | None:
         "check import.signals.acceleration, its unit and scale",
         ("acceleration",),
         felt / STANDARD_GRAVITY,
+    )
+
+
+def _runs_away(part: Signals) -> Finding | None:
+    """Say of an accelerometer that, by the attitude, would have made the vehicle faster than any flies.
+
+    The mean of what it feels across gravity is the speed that is gained; no velocity is there that shows it.
+    """
+    if part.specific_force is None or part.attitude is None or part.velocity is not None:
+        return None
+    felt = float(np.hypot(*np.einsum("tij,tj->ti", part.rotation, part.specific_force).mean(axis=0)[:2]))
+    lasts = len(part) * part.period
+    if felt < _LEANS_M_S2 or felt * lasts < _FASTEST_M_S:
+        return None
+    return Finding(
+        f"by accelerometer and attitude it would be {felt * lasts:.0f} m/s faster after {lasts:.0f} s: across gravity "
+        f"it feels {felt:.2g} m/s^2 on average",
+        "check the offset and the axes of import.signals.acceleration, and the attitude",
+        ("acceleration", "attitude"),
+        felt,
+        "m/s^2",
+        contradiction=False,
     )
 
 

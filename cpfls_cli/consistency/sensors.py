@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from scipy.special import stdtr
 
-from cpfls_cli.arrays import Array
+from cpfls_cli.arrays import Array, runs
 from cpfls_cli.blocks import blocks_of_time, half_width, mean_error
 from cpfls_cli.consistency.channels import BODY_AXES, TURNING_RAD_S, gyroscope_apart, least_noise
 from cpfls_cli.consistency.findings import (
@@ -31,6 +31,7 @@ from cpfls_cli.effects.signals import Signals, stretch_of
 from cpfls_cli.errors import ComputationError, SettingError
 from cpfls_cli.flightlog.importing import estimate_delay
 from cpfls_cli.flightlog.results import DelayEstimate
+from cpfls_cli.flightlog.stretches import stands_still
 from cpfls_cli.lag import fit_delay
 from cpfls_cli.weak_form.windows import FEWEST_WINDOWS, Windows
 from cpfls_cli.weak_form.windows import windows as windows_of
@@ -385,9 +386,11 @@ def _gross(fault: AuditFinding) -> Finding | None:
     estimate, largest = str(_estimate(fault.name)), max(named, key=lambda number: abs(number.value))
     if abs(largest.value) <= _GROSS[estimate]:
         return None
+    # A clock that runs fast or slow does so about all axes, and nothing else in a log of both shows it.
+    alike = estimate == "scale" and len(named) == 3 and max(own.low for own in named) < min(own.high for own in named)
     return Finding(
         f"{fault.sentence[0].lower()}{fault.sentence[1:-1]}",
-        "check import.signals.body_rate",
+        f"check import.signals.body_rate{', or, as it is alike about all axes, the clock of the log' if alike else ''}",
         ("gyroscope", "attitude"),
         largest.value,
         largest.unit,
@@ -402,9 +405,18 @@ def _estimate(name: str) -> object:
     return test.estimate
 
 
+def _live(flight: Signals) -> list[Signals]:
+    """Cut out where gyroscope or attitude repeat their last value, which is no motion."""
+    still = stands_still(flight.time, flight.body_rate)
+    if flight.attitude is not None:
+        still |= stands_still(flight.time, flight.attitude)
+    return [stretch_of(flight, slice(first, after)) for first, after in runs(~still)] or [flight]
+
+
 def _gyroscope(flights: Sequence[Signals], windows: Windows) -> Gyroscope:
     if all(signals.attitude is None for signals in flights):
         return Gyroscope.unjudged("the log has no attitude to check the gyroscope against")
+    flights = [live for signals in flights for live in _live(signals)]
     cut = [motion for signals in flights if (motion := kinematics(signals, windows)) is not None]
     if not cut:
         return Gyroscope.unjudged("the flights are too short")

@@ -19,6 +19,7 @@ from cpfls_cli.flightlog.attitude_columns import CLEAR, GOOD, NEAR_GRAVITY, SENS
 from cpfls_cli.flightlog.names import Named
 from cpfls_cli.flightlog.recognised import DEGREES_FROM, RADIANS_UP_TO, Guess, LogTable, Rival, Seen, Sure, called
 from cpfls_cli.flightlog.settings import SignalName
+from cpfls_cli.flightlog.stretches import stands_still
 from cpfls_cli.flightlog.vocabulary import Row, sizes
 from cpfls_cli.rotations import body_rate
 from cpfls_cli.rounding import largest
@@ -40,6 +41,7 @@ _CLOSER = 0.4
 # What names a derivative; difference of Euler and body rates, as a share of them, that matters to nothing; and what is
 # left of rates by the ones, as a share of what is left by the others, that shows the former.
 _DERIVATIVE, _ALIKE, _CLEARLY = ("dot",), 0.02, 0.8
+_TUMBLES = 3.0  # Times the rate that 95 % of a log stay below.
 # Correlations of one axis: below the first a column follows nothing, below the second it runs the other way.
 _ALONG, _AGAINST = 0.3, -0.6
 
@@ -194,16 +196,25 @@ def _turns_as_body(log: LogTable, angles: Named, rates: Named) -> bool:
     # Between two samples on either side of a full turn lies no angle.
     turned = np.unwrap(unit.factor * angles.scale * values, axis=0)
     attitude = np.column_stack([np.interp(log.grid, time, column) for column in turned.T])
-    measured, derived = slow(log.on_grid(rates.group.columns), rate_hz), first_derivative(attitude, rate_hz)
+    read, derived = log.on_grid(rates.group.columns), first_derivative(attitude, rate_hz)
+    live = ~stands_still(log.grid, read)
+    speed = np.linalg.norm(read - np.median(read, axis=0), axis=1)
+    # In a tumble an estimator is lost, and what stands still measures nothing.
+    calm = live & (speed < _TUMBLES * np.quantile(speed, 0.95))
+    return any(rows.any() and _nearer_body(attitude[rows], derived[rows], read[rows], rate_hz) for rows in (live, calm))
+
+
+def _nearer_body(attitude: Array, derived: Array, read: Array, rate_hz: float) -> bool:
+    """Tell whether rates are nearer to those of the body than to the derivatives of angles, or both are alike."""
     # A pitch may count the other way than roll and yaw do.
     ways = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, 1.0])
-    euler, *bodies = (
-        slow(own, rate_hz) for own in (derived, *(body_rate(attitude * way, derived * way) * way for way in ways))
+    measured, euler, *bodies = (
+        slow(own, rate_hz) for own in (read, derived, *(body_rate(attitude * way, derived * way) * way for way in ways))
     )
 
     def left(turning: Array) -> float:
-        gain = float((measured * turning).sum()) / max(float((turning**2).sum()), 1e-12)
-        return float(((measured - gain * turning) ** 2).sum())
+        # An offset, a wrong sign or swapped axes of a gyroscope make no derivative of it.
+        return 1 - fit_axes(turning, measured).explained
 
     body = min(bodies, key=left)
     alike = float(((body - euler) ** 2).sum()) < _ALIKE**2 * float((euler**2).sum())
@@ -422,5 +433,6 @@ def _take_sensed(
         points = "up" if up == "FLU" else "down"
         words = f"the accelerometer reads {vertical:.3g} along z, so z points {points}"
         # Some log gravity itself, which points down.
-        other = Rival("body_frame: FLU", "if the accelerometer logs gravity, not the force that carries the vehicle")
+        why = "if the accelerometer logs gravity, not the force that carries the vehicle, or its z is reversed"
+        other = Rival("body_frame: FLU", why)
         seen.choose("body_frame", up, words, *(("data",) if up == "FLU" else ("guess", other)))

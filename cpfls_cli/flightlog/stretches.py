@@ -143,9 +143,19 @@ def clipped(values: Array, lowest_limit: float) -> bool:
 
 
 def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
-    """Say where a signal that is measured stands still on all axes for far longer than between its updates."""
+    """Say where a signal that is measured stands still."""
     known = np.isfinite(values).all(axis=1)
-    time, values = time[known], values[known]
+    time, marked = time[known], stands_still(time[known], values[known])
+    if marked.any():
+        each = "rotor" if name in ROTORS else "axis"
+        yield (
+            f"{name} does not change on any {each} {_when(time, marked)}: its source was silent there, and the last"
+            " value was repeated; cut it off with import.crop_s"
+        )
+
+
+def stands_still(time: Array, values: Array) -> BoolArray:
+    """Mark where a signal that is measured stands still on all axes for far longer than between its updates."""
     same = (np.diff(values, axis=0) == 0).all(axis=1)
     updates = np.flatnonzero(~same)
     usual = float(np.median(np.diff(updates))) if len(updates) > _FEWEST_IN_PAUSE else np.inf
@@ -154,12 +164,7 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
         # Steps from row to row: the row after the last one is still the same.
         enough = last - first + 1 >= max(_FEWEST_IN_PAUSE, _USUAL_STEPS * usual)
         marked[first : last + 1] = enough and time[last] - time[first] >= _SHORTEST_PAUSE_S
-    if marked.any():
-        each = "rotor" if name in ROTORS else "axis"
-        yield (
-            f"{name} does not change on any {each} {_when(time, marked)}: its source was silent there, and the last"
-            " value was repeated; cut it off with import.crop_s"
-        )
+    return marked
 
 
 def live_rows(table: SignalTable, origin: float) -> tuple[slice, str]:

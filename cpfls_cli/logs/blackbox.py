@@ -101,11 +101,14 @@ def _of_frames(header: Mapping[str, str], rows: IntArray | Array, slow: IntArray
         names = header["Field S name"].split(",")
         held = {name: slow[latest, 1 + place].astype(float) for place, name in enumerate(names)}
         columns |= {name: own for name, own in held.items() if name not in columns}
-    kept = _in_order(columns["time"])
+    kept, twice = _in_order(columns["time"]), int((np.diff(columns["time"]) == 0).sum())
     if len(kept) < len(rows):
-        broken += len(rows) - len(kept)
+        broken += max(0, len(rows) - len(kept) - twice)
         columns = {name: values[kept] for name, values in columns.items()}
-    lost = f"{broken} frames are broken; everything up to the next whole frame is missing"
+    notes = {
+        f"{broken} frames are broken; everything up to the next whole frame is missing": broken,
+        f"{twice} rows repeat the stamp of the one before: the first of each is used": twice,
+    }
     # Lines that are not about the log itself.
     stated = {key: value for key, value in header.items() if not re.match(r"Product|Data version|Field|[IP] ", key)}
     parameters = {key: float(own) if re.fullmatch(r"-?\d+(\.\d+)?", own) else own for key, own in stated.items()}
@@ -117,7 +120,8 @@ def _of_frames(header: Mapping[str, str], rows: IntArray | Array, slow: IntArray
     elif re.fullmatch(r"[0-9a-f]{7,}", system):
         # Before 2.1 Cleanflight wrote no version, but a commit.
         system = f"{header.get('Firmware type', '')} {system}".strip()
-    return LogContents({"": columns}, units, parameters, system, (lost,) if broken else (), _flown_at(header), first)
+    said = tuple(note for note, count in notes.items() if count)
+    return LogContents({"": columns}, units, parameters, system, said, _flown_at(header), first)
 
 
 def _is_kin(header: Mapping[str, str]) -> bool:

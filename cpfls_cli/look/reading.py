@@ -337,8 +337,9 @@ class _Reader:
             known = named_signals(column_groups(self.log.table.names))
             for group in [own.group for own in known if own.signal == "body_rate"][:1]:
                 still = np.ptp(self.log.table.values(group.columns)[1], axis=0).max(initial=0.0) == 0
-                derived = "are derivatives of angles" if group.words[-1:] == ("dot",) else "are no rates of the body"
-                held += f"; {joined(group.columns)} {'never change' if still else derived}"
+                derived = "are derivatives of angles, or wrong: as rates of the body they do not fit the attitude"
+                other = derived if group.words[-1:] == ("dot",) else "are no rates of the body"
+                held += f"; {joined(group.columns)} {'never change' if still else other}"
             raise InputError(f"a log without a gyroscope (it holds {held}): {faster}")
         return found
 
@@ -473,7 +474,7 @@ def _clock(rate: Samples, command: Samples | None) -> Array:
 
 
 def _gaps(*signals: Samples | None) -> Array:
-    """List where a signal lacks samples, begin and end, in order and joined where they overlap."""
+    """List where a signal lacks samples, begin and end, in order and joined where they overlap; a sample parts two."""
     found: list[tuple[float, float]] = []
     for own in (each for each in signals if each is not None):
         steps = np.diff(own.time)
@@ -481,7 +482,7 @@ def _gaps(*signals: Samples | None) -> Array:
         found += zip(own.time[lost].tolist(), own.time[lost + 1].tolist(), strict=True)
     joined: list[list[float]] = []
     for begin, end in sorted(found):
-        if joined and begin <= joined[-1][1]:
+        if joined and begin < joined[-1][1]:
             joined[-1][1] = max(end, joined[-1][1])
         else:
             joined.append([begin, end])

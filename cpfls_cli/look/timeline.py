@@ -14,6 +14,7 @@ from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.flightlog.crash import BEYOND, HARD
 from cpfls_cli.flightlog.names import is_of
 from cpfls_cli.flightlog.recognised import Recognition
+from cpfls_cli.flightlog.stretches import stands_still
 from cpfls_cli.flightlog.topics import STAMP, YAW_RESETS, Topics
 from cpfls_cli.flightlog.vocabulary import ARDUPILOT, BETAFLIGHT, PX4
 from cpfls_cli.look.flight import LogFlight, Samples
@@ -49,9 +50,9 @@ end of a log that stops in the air."""
 _CLIMBS_S: Final = 10.0
 """Between the autopilot's word for take-off or landing and a height that is surely none of the ground, s."""
 
-_NEAR_S, _RESTARTS_S, _LONG_GAP_S, _PAUSE_S = 3.0, 1.0, 0.1, 2.0
-"""By which the autopilot's word for take-off and landing is near that of the signals; by which a clock falls back that
-starts anew; and from which on a gap in flight, and a pause outside, is worth a line, s."""
+_NEAR_S, _FALLS_BACK_S, _RESTARTS_S, _LONG_GAP_S, _PAUSE_S = 3.0, 0.1, 1.0, 0.1, 2.0
+"""By which the autopilot's word for take-off and landing is near that of the signals; by which a clock surely falls
+back, and one that starts anew; and from which on a gap in flight, and a pause outside, is worth a line, s."""
 
 _AROUND_S, _AT_END_S, _LESS = 0.75, 0.1, 0.7
 _IN_THE_AIR = "the log ends in the air"
@@ -477,11 +478,19 @@ def _losses(flight: LogFlight, topics: Topics) -> Iterator[Event]:
             yield Event(time_s=begin, until_s=end, kind="gap", text=text, severity="warning")
         elif end - begin > _PAUSE_S:
             yield Event(time_s=begin, until_s=end, kind="pause", text=f"nothing is logged for {end - begin:.0f} s")
+    sensor = flight.gyroscope
+    for first, after in runs(stands_still(sensor.time, sensor.values)):
+        begin, end = float(sensor.time[first]), float(sensor.time[after - 1])
+        if flight.flown[(flight.time >= begin) & (flight.time <= end)].any():
+            text = f"the gyroscope repeats its last value for {end - begin:.2g} s"
+            yield Event(time_s=begin, until_s=end, kind="gap", text=text, severity="warning")
     for name in ("IMU", "sensor_combined", "vehicle_angular_velocity", "vehicle_attitude"):
         time = np.asarray(topics.get(name, {}).get(STAMP, ()), dtype=float)
-        back = np.flatnonzero(np.diff(time) < -_RESTARTS_S)
+        back = np.flatnonzero(np.diff(time) < -_FALLS_BACK_S)
         if len(back):
-            text = f"the clock of the log falls back by {time[back[0]] - time[back[0] + 1]:.3g} s: it started anew"
+            by = float(time[back[0]] - time[back[0] + 1])
+            anew = ": it started anew" if by > _RESTARTS_S else ", and samples are out of order there"
+            text = f"the clock of the log falls back by {by:.3g} s{anew}"
             yield Event(time_s=float(time[back[0]]), kind="restart", text=text, severity="warning")
             return
     yield from _counted(topics)

@@ -199,6 +199,38 @@ def test_rotors_on_another_clock_are_said():
     assert "the rotor speeds are late by" in said(replace(lively, rotor_speed=np.roll(lively.rotor_speed, 5, axis=0)))
 
 
+@pytest.mark.parametrize(
+    ("off", "known", "words"), [(0.0, False, ""), (3.0, False, "2.9 m/s^2"), (3.0, True, "constant")]
+)
+def test_an_accelerometer_that_would_carry_it_away_is_said(off, known, words):
+    """Where a velocity is known it says more."""
+    long = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
+    felt = np.einsum("tji,tj->ti", long.rotation, long.acceleration + np.array([0.0, 0.0, 9.80665]))
+    own = replace(long, acceleration=None, position=None, specific_force=felt + np.array([off, 0.0, 0.0]))
+    found = said(own if known else replace(own, velocity=None))
+    assert words in found
+    assert ("it would be 57 m/s faster" in found) is (off > 0 and not known)
+    assert bool(found) is (off > 0)
+
+
+@pytest.mark.parametrize(("factors", "clock"), [((1.3, 1.3, 1.3), True), ((1.3, 1.0, 1.3), False)])
+def test_a_gyroscope_that_is_off_alike_about_all_axes_may_be_a_clock(factors, clock):
+    turning = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
+    words = said(times(body_rate=factors)(turning))
+    assert "the gyroscope reads" in words
+    assert ("the clock of the log" in words) is clock
+
+
+def test_where_a_source_was_silent_nothing_is_compared():
+    long = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
+    late = replace(long, attitude=np.roll(long.attitude, 3, axis=0))
+    frozen = late.body_rate.copy()
+    frozen[800:1200] = frozen[800]
+    both, one = (check([own], SETTINGS) for own in (replace(late, body_rate=frozen), late))
+    assert [own.channels for own in both] == [own.channels for own in one] == [("attitude", "gyroscope")]
+    assert both[0].size == pytest.approx(one[0].size, abs=0.002)
+
+
 @pytest.mark.parametrize(("times", "idle"), [(0.3, 0.0), (0.3, 60.0), (0.3, 200.0), (9, 0.0), (9, 200.0), (60, 60.0)])
 def test_a_long_rest_on_the_ground_contradicts_nothing(flight, times, idle):
     rng, count = np.random.default_rng(1), round(times * len(flight))

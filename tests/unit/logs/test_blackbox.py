@@ -330,3 +330,12 @@ def test_what_an_export_never_knows_is_no_column(tmp_path):
     text = f'"Product","{PRODUCT}"\n"acc_1G",2048\nloopIteration,time,motor[0],flightModeFlags\n{rows}'
     (tmp_path / "log.csv").write_text(text)
     assert log_contents(tmp_path / "log.csv").topics[""].keys() == {"time", "motor[0]"}
+
+
+def test_rows_that_an_export_holds_twice_are_said_and_nothing_is_called_missing(tmp_path):
+    rows = "".join((1 + (row % 10 == 0)) * f"{row},{1000 * row},{row % 3}\n" for row in range(40))
+    text = f'"Product","{PRODUCT}"\n"acc_1G",2048\nloopIteration,time,motor[0]\n{rows}'
+    (tmp_path / "log.csv").write_text(text)
+    contents = log_contents(tmp_path / "log.csv")
+    assert contents.topics[""]["motor[0]"].tolist() == [float(row % 3) for row in range(40)]
+    assert contents.warnings == ("4 rows repeat the stamp of the one before: the first of each is used",)

@@ -222,7 +222,7 @@ def test_columns_that_are_called_rates_and_are_none_are_named():
     dots = ("roll_dot", "pitch_dot", "yaw_dot")
     angles = np.unwrap(OWN.angles, axis=0)
     for rates, why in (
-        (np.gradient(angles, OWN.time, axis=0), "are derivatives of angles"),
+        (np.gradient(angles, OWN.time, axis=0), "are derivatives of angles, or wrong: as rates of .* the attitude"),
         (0 * angles, "never change"),
     ):
         contents = logs.WRITERS[""](OWN)
@@ -232,6 +232,30 @@ def test_columns_that_are_called_rates_and_are_none_are_named():
         fields |= named(OWN.angles, "roll", "pitch", "yaw") | named(rates, *dots)
         with pytest.raises(InputError, match=rf"without a gyroscope \(.*; roll_dot, pitch_dot and yaw_dot {why}\)"):
             read(contents)
+
+
+def _frozen(rates):
+    return np.where((OWN.time > 8.0)[:, None] & (OWN.time < 12.0)[:, None], rates[800], rates)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda rates: rates,
+        lambda rates: rates + np.array([0.3, 0.0, 0.0]),
+        lambda rates: rates * np.array([1.0, -1.0, 1.0]) + np.array([0.0, 0.2, 0.0]),
+        lambda rates: rates[:, [1, 0, 2]],
+        _frozen,
+    ],
+)
+def test_rates_of_the_body_that_are_called_derivatives_may_be_wrong(wrong):
+    """An offset, a sign, swapped columns or a silent source make no rate of the body a derivative of angles."""
+    contents = logs.WRITERS[""](OWN)
+    fields = contents.topics[""]
+    for name in [name for name in fields if name.startswith(("gyro", "q"))]:
+        del fields[name]
+    fields |= named(OWN.angles, "roll", "pitch", "yaw") | named(wrong(OWN.rate), "roll_dot", "pitch_dot", "yaw_dot")
+    assert set(read(contents).gyroscope.source.split(", ")) == {"roll_dot", "pitch_dot", "yaw_dot"}
 
 
 def test_a_first_row_without_a_stamp_is_left_out():
@@ -340,3 +364,13 @@ def test_a_plain_word_has_the_unit_of_a_kind_of_log_among_its_own_names_alone(ot
     fields = {"t": time, "baroAlt": 3 + np.sin(time), other: np.cos(time)}
     heights = [own.values[:, 0] for own in LookedLog({"": fields}, {}, "").found("height")]
     assert [own.tolist() for own in heights] == [(factor * fields["baroAlt"]).tolist() for factor in factors]
+
+
+def test_samples_that_come_at_two_rates_leave_no_pause():
+    """Every second stretch has a third of the rows: slower, and never silent."""
+    contents = logs.WRITERS[""](OWN)
+    kept = (OWN.time % 4.0 < 2.5) | (np.arange(len(OWN.time)) % 4 == 0)
+    contents.topics[""] = {name: values[kept] for name, values in contents.topics[""].items()}
+    gaps = read(contents).gaps_s
+    assert len(gaps) > 100
+    assert np.diff(gaps, axis=1).max() < 0.05

@@ -215,6 +215,25 @@ def test_clipping_gaps_and_the_battery():
     assert not [e for e in events(logs.betaflight(OWN)) if e.kind in ("clipping", "gap", "battery")]
 
 
+@pytest.mark.parametrize(("by", "said"), [(0.05, None), (0.4, "out of order there"), (9.0, "it started anew")])
+def test_a_clock_that_falls_back_is_said(by, said):
+    contents = logs.px4(OWN)
+    for topic in contents.topics.values():
+        topic["timestamp"] = topic["timestamp"] - by * (topic["timestamp"] > 12.0)
+    found = of(events(contents), "restart")
+    assert [at for at, _ in found] == ([] if said is None else [12.0])
+    assert all(f"falls back by {by - 0.01:.3g} s" in text and text.endswith(said) for _, text in found)
+
+
+def test_a_gyroscope_that_is_silent_in_flight_is_said():
+    contents = logs.betaflight(OWN)
+    silent = (OWN.time >= 8.0) & (OWN.time < 10.0)
+    for axis in range(3):
+        rate = contents.topics[""][f"gyroADC[{axis}]"]
+        contents.topics[""][f"gyroADC[{axis}]"] = np.where(silent, rate[silent][0], rate)
+    assert of(events(contents), "gap") == [(8.0, "the gyroscope repeats its last value for 2 s")]
+
+
 def test_a_log_that_ends_in_the_air_is_said_and_who_disarms_with_the_rotors_on_may_touch_down():
     found = events(logs.px4(OWN))
     assert [text for _, text in of(found, "end")] == ["the log ends in the air"]
