@@ -40,6 +40,7 @@ from cpfls_cli.gap.naming.causes import (
     judge_effects,
     likely_sets,
     sensor_fault,
+    with_lever,
     wrong_numbers,
 )
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, ends_on_bound, fitted
@@ -308,6 +309,10 @@ def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Name
     """
     found, refusals = named.judgement.found, named.refusals
     lags = decided_by_instruments(found, named.effects, given)
+    while (refusal := ends_on_bound(lags.found)) is not None:
+        # With the right lags it is none.
+        found, refusals = by_instruments(found.without([refusal.name]), given), [*refusals, refusal]
+        lags = decided_by_instruments(found, named.effects, given)
     judgement = named.judge.judge(with_lean(lags.found, across))
     if not lags.chances:
         refusals = refusals + [
@@ -357,7 +362,8 @@ def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) ->
     if not small:
         return named
     judgement = named.judge.judge(with_lean(with_small_effects(found, small, given), across))
-    if min(judgement.held_out.shares().values()) < found.settings.named_share:
+    taken = min(judgement.held_out.shares().values())
+    if taken < found.settings.named_share or named.judge.harmed(judgement, named.judgement):
         return named
     return named._replace(
         judgement=judgement,
@@ -480,7 +486,7 @@ def _concluded(
     # In gusts instruments identify the numbers, and a gap need not be clear.
     still = not hypothesis.gusty.any()
     numbers = _wrong_numbers(found, {each.name: each.numbers for each in effects}, NOISE if still else 0.0)
-    effects += [numbers] if numbers is not None else []
+    effects = [with_lever(each, numbers) for each in effects] + ([] if numbers is None else [numbers])
     # Where wrong numbers leave no gap, there is none that names could take a share of.
     removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)
     if not named:

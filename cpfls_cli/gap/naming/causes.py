@@ -1,7 +1,7 @@
 """Causes of a gap: each chosen effect jointly with the others, faults of sensors, wrong parameters of the vehicle."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
@@ -167,6 +167,29 @@ def of_thrust(numbers: Sequence[Estimate]) -> list[str]:
     thrust = known.pop("thrust_scale", None)
     moments = {name: each for name, each in known.items() if name.startswith("inertia_")}
     return [] if thrust is None else [name for name, each in moments.items() if _undone(each, thrust)]
+
+
+def with_lever(effect: NamedEffect, wrong: NamedEffect | None) -> NamedEffect:
+    """Give an effect that has a lever for all forces the lever of the forces as they are, where the thrust is wrong.
+
+    Its torque is known over that of the rotors. If their thrust is larger than stated their torque is too, and if the
+    mass is smaller the force is: either way the measured force is too large for the lever by what the thrust is off.
+
+    `wrong`: numbers of the vehicle that are named as wrong.
+    """
+    thrust = None if wrong is None else wrong.coefficients.get("thrust_scale")
+    if thrust is None or not CATALOGUE[effect.name].of_all_forces:
+        return effect
+    scale, error = 1 + thrust.value, 0.5 * (thrust.high - thrust.low)
+
+    def scaled(number: Estimate) -> Estimate:
+        down, up = (
+            float(np.hypot(scale * (end - number.value), error * number.value)) for end in (number.low, number.high)
+        )
+        value = scale * number.value
+        return replace(number, value=value, low=value - down, high=value + up)
+
+    return replace(effect, numbers=tuple(scaled(number) for number in effect.numbers))
 
 
 def _undone(number: Estimate, other: Estimate) -> bool:

@@ -254,6 +254,18 @@ def test_two_that_contradict_each_other_without_a_third_are_only_warned_of(fligh
     assert any("velocity and acceleration" in warning and "early" in warning for warning in found.warnings)
 
 
+@pytest.mark.parametrize("delay_s", [0.012, 0.06])
+def test_a_velocity_that_comes_after_its_position_is_late_without_a_third(flights, delay_s):
+    """An estimator makes one of the other, later; the other way round nobody knows which is wrong."""
+    alone = [replace(s, rotor_speed=None, acceleration=None) for s in flights]
+    found = audit([replace(s, velocity=late(s.velocity, delay_s)) for s in alone], WINDOWS)
+    (repair,) = found.repairs
+    assert (repair.channel, repair.delay_s) == ("velocity", pytest.approx(delay_s, abs=1e-3))
+    early = audit([replace(s, position=late(s.position, delay_s)) for s in alone], WINDOWS)
+    assert early.repairs == ()
+    assert any("position and velocity" in warning and "early" in warning for warning in early.warnings)
+
+
 def test_a_late_gyroscope_is_not_taken_for_an_early_attitude(flights):
     found = audit([replace(signals, body_rate=late(signals.body_rate, 0.03)) for signals in flights], WINDOWS)
     assert [fault.name for fault in found.named] == ["channel_delay"]
