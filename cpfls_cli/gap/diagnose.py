@@ -36,6 +36,7 @@ from cpfls_cli.gap.naming.by_samples import small_effects, with_small_effects
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     all_numbers,
+    carries_the_weight,
     impossible_ratios,
     judge_effects,
     likely_sets,
@@ -406,6 +407,8 @@ def _wrong_numbers(named: _Named, effects: Mapping[str, Sequence[Estimate]], lea
     """Name the numbers of the vehicle that are wrong, where a gap is: a mean square of `least` squared floors."""
     (hypothesis, estimates, *_), held_out = named.judgement
     taken, unknown = held_out.removed_by_numbers(least), named.judge.unknown(held_out)
+    if not carries_the_weight(named.judgement.found):
+        taken[5] = 0.0
     return wrong_numbers(estimates, effects, taken, unknown, hypothesis.vehicle)
 
 

@@ -8,6 +8,7 @@ from scipy.special import ndtr
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.findings import AuditFinding
+from cpfls_cli.consistency.motion import OFFSET_M_S2
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
@@ -19,7 +20,7 @@ from cpfls_cli.gap.naming.odds import likely, odds
 from cpfls_cli.gap.naming.ranking import RankedStep, Scored, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in_place_of
-from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -197,6 +198,20 @@ def _undone(number: Estimate, other: Estimate) -> bool:
     off = (1 + number.value) * (1 + other.value) - 1
     own, its = ((1 + b.value) * 0.5 * (a.high - a.low) for a, b in ((number, other), (other, number)))
     return _chance_of(off, own + its) > RARE
+
+
+def carries_the_weight(found: NamedFit) -> bool:
+    """Check whether the scale of the thrust, within its interval, is that which carries the weight on the mean.
+
+    It shows by how force and thrust change as well, and where an effect is missing that may be another one. The mean
+    is off by no more than an accelerometer is.
+    """
+    number = next(each for each in found.estimates.parameters if each.name == "thrust_scale")
+    flights = [replace(flight, offset_share=np.zeros(6), seen={}) for flight in found.hypothesis.flights]
+    there = system(flights, found.hypothesis.chosen)
+    lift, vehicle = there.rotor_wrench[:, 5].mean(), there.vehicle
+    left = abs(float(there.residual_at(found.estimates.linear)[:, 5].mean()))
+    return left <= ERRORS * OFFSET_M_S2 * vehicle.mass_kg + lift * 0.5 * (number.high - number.low)
 
 
 def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:

@@ -348,6 +348,26 @@ def test_a_gyroscope_that_is_turned_leaves_the_attitude_as_it_is(flights, turn):
     assert not found.settled
 
 
+@pytest.mark.parametrize("both", [True, False])
+def test_an_accelerometer_is_askew_as_the_gyroscope_of_its_imu_is_where_it_leans_so(flights, both):
+    turned_back, rng = Rotation.from_rotvec([0.03, -0.04, 0.02]).inv(), np.random.default_rng(1)
+
+    def of_imu(signals):
+        felt = np.einsum("tji,tj->ti", signals.rotation, signals.acceleration + UP)
+        felt = felt + rng.normal(0.0, 0.1, felt.shape)
+        read = turned_back.apply(felt) if both else felt
+        return felt, replace(
+            signals, acceleration=None, specific_force=read, body_rate=turned_back.apply(signals.body_rate)
+        )
+
+    true, logged = zip(*map(of_imu, flights), strict=True)
+    found = audit(logged, WINDOWS)
+    assert [each.name for each in found.named] == ["imu_misalignment"]
+    assert [each.split(",")[0] for each in found.settled] == ["The accelerometer is rotated as the gyroscope is"][:both]
+    again = found.repaired(logged[0]).specific_force
+    np.testing.assert_allclose(again.mean(axis=0), true[0].mean(axis=0), atol=0.03)
+
+
 def test_motion_that_is_late_with_the_attitude_is_set_right_with_it(lively):
     """As by motion capture: the attitude alone on the clock of the gyroscope contradicts velocity and position."""
     names = ("attitude", "position", "velocity", "acceleration")
