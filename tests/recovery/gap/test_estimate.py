@@ -109,7 +109,7 @@ def test_an_offset_under_a_wrong_mass_or_thrust_is_where_it_is(wrong):
 
 
 def test_a_thrust_that_does_not_carry_the_weight_is_not_named():
-    """What lowers every change of the force by a third, and not its mean, is no thrust, which an accelerometer shows."""
+    """What lowers every change of the force by a third, and not its mean, is no thrust."""
 
     def damped(signals):
         force = signals.specific_force - [0.0, 0.0, 9.81]
