@@ -362,7 +362,15 @@ def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) ->
     small = small_effects(found, judged, candidates, gusts.split & unfiltered)
     if not small:
         return named
-    judgement = named.judge.judge(with_lean(with_small_effects(found, small, given), across))
+    fit, refusals = with_small_effects(found, small, given), named.refusals
+    new = frozenset(each.candidate.effect.name for each in small)
+    while (refusal := ends_on_bound(fit)) is not None:
+        if refusal.name in new:
+            return named
+        # It stood for the small ones.
+        found, refusals = by_instruments(found.without([refusal.name]), given), [*refusals, refusal]
+        fit = with_small_effects(found, small, given)
+    judgement = named.judge.judge(with_lean(fit, across))
     taken = min(judgement.held_out.shares().values())
     if taken < found.settings.named_share or named.judge.harmed(judgement, named.judgement):
         return named
@@ -370,7 +378,8 @@ def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) ->
         judgement=judgement,
         alike=(*named.alike, *(rival for each in small for rival in each.rivals)),
         sure={**named.sure, **{each.candidate.effect.name: each.chance for each in small}},
-        small=frozenset(each.candidate.effect.name for each in small),
+        small=new,
+        refusals=refusals,
     )
 
 
