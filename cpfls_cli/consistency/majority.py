@@ -207,7 +207,7 @@ def _mended(now: _Compared) -> tuple[tuple[ChannelRepair, ...], tuple[Finding, .
         opposed = () if read is None else _opposed(now, read[0])
         if read is not None and opposed:
             dropped.append(_verdict(now, *read, witnesses, opposed))
-        elif read is not None and (sure or read[0].is_mistake):
+        elif read is not None and (sure or read[0].is_mistake or _is_late(*read, witnesses)):
             return _outvoted(now, *read, witnesses), ()
         elif read is not None and _changed_to_thrust(now, read[0], lambda before, after: _surely_less(after, before)):
             return _outvoted(now, *read, [*witnesses, CHANNELS["thrust"].words]), ()
@@ -215,6 +215,11 @@ def _mended(now: _Compared) -> tuple[tuple[ChannelRepair, ...], tuple[Finding, .
         elif sure and read is None and len(set(witnesses)) > 1:
             return _of_fewest_mistakes(now) or (_left_out(now, channel, witnesses),), ()
     return (), tuple(dropped)
+
+
+def _is_late(repair: ChannelRepair, mistakes: tuple[str, ...], witnesses: Sequence[str]) -> bool:
+    """Check whether a channel does nothing but come after the position: no estimate is ahead of what it is made of."""
+    return not mistakes and repair.delay_s > 0 and [*witnesses] == [CHANNELS["position"].words]
 
 
 def _of_fewest_mistakes(now: _Compared) -> tuple[ChannelRepair, ...]:

@@ -305,6 +305,8 @@ def sensors_of(flights: Sequence[Signals], windows: Windows) -> Sensors:
         clocks, flights = (*clocks, turned), _repaired((turned,), flights)
         gyroscope = _gyroscope(flights, windows)
         late = gyroscope.named("delay", windows)
+    elif askew is not None and (along := _accelerometer_on_axes(askew, flights)) is not None:
+        clocks, flights = (*clocks, along), _repaired((along,), flights)
     # A gyroscope that is late is set right by what names its delay.
     delay = late.coefficients[0].value if late else 0.0
     ahead = [replace(each, body_rate=shifted(each.body_rate, each.time, delay)) for each in flights]
@@ -376,6 +378,37 @@ def _attitude_on_axes(fault: AuditFinding, flights: Sequence[Signals]) -> Channe
     )
     matrix = np.asarray(np.linalg.inv(test.error(turn).matrix), dtype=np.float64)
     return ChannelRepair("attitude", matrix=matrix).with_finding(finding, f"This is {_DONE}")
+
+
+def _accelerometer_on_axes(fault: AuditFinding, flights: Sequence[Signals]) -> ChannelRepair | None:
+    """Turn an accelerometer that is askew as the gyroscope is, as in one IMU.
+
+    Every half of every flight has to say so: turned, it leans off what velocity and attitude feel by less than half.
+
+    `fault`: rotation of the gyroscope against the attitude.
+    """
+    test = CATALOGUE[fault.name].test
+    assert test is not None, "found by it"
+    matrix = np.asarray(np.linalg.inv(test.error(fault.named_values(test.labels)).matrix), dtype=np.float64)
+    for flight in flights:
+        if flight.specific_force is None or flight.velocity is None or flight.attitude is None:
+            return None
+        felt = np.gradient(flight.velocity, flight.period, axis=0) + flight.vehicle.gravity_m_s2 * UP
+        felt = np.einsum("tij,ti->tj", flight.rotation, felt)
+        for half in np.array_split(
+            np.stack([flight.specific_force, flight.specific_force @ matrix.T]) - felt, 2, axis=1
+        ):
+            logged, turned = np.linalg.norm(half[:, :, :2].mean(axis=1), axis=1)
+            if not turned < _HALF * logged:
+                return None
+    finding = Finding(
+        "the accelerometer is rotated as the gyroscope is, judged by velocity and attitude",
+        "align the axes of the IMU with those of the vehicle",
+        ("accelerometer", "gyroscope", "velocity"),
+        contradiction=False,
+        repairable=True,
+    )
+    return ChannelRepair("specific_force", matrix=matrix).with_finding(finding, f"This is {_DONE}")
 
 
 def _gross(fault: AuditFinding) -> Finding | None:

@@ -36,10 +36,12 @@ from cpfls_cli.gap.naming.by_samples import small_effects, with_small_effects
 from cpfls_cli.gap.naming.causes import (
     JudgedEffect,
     all_numbers,
+    carries_the_weight,
     impossible_ratios,
     judge_effects,
     likely_sets,
     sensor_fault,
+    with_lever,
     wrong_numbers,
 )
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, ends_on_bound, fitted
@@ -309,6 +311,10 @@ def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Name
     """
     found, refusals = named.judgement.found, named.refusals
     lags = decided_by_instruments(found, named.effects, given)
+    while (refusal := ends_on_bound(lags.found)) is not None:
+        # With the right lags it is none.
+        found, refusals = by_instruments(found.without([refusal.name]), given), [*refusals, refusal]
+        lags = decided_by_instruments(found, named.effects, given)
     judgement = named.judge.judge(with_lean(lags.found, across))
     if not lags.chances:
         refusals = refusals + [
@@ -357,14 +363,24 @@ def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) ->
     small = small_effects(found, judged, candidates, gusts.split & unfiltered)
     if not small:
         return named
-    judgement = named.judge.judge(with_lean(with_small_effects(found, small, given), across))
-    if min(judgement.held_out.shares().values()) < found.settings.named_share:
+    fit, refusals = with_small_effects(found, small, given), named.refusals
+    new = frozenset(each.candidate.effect.name for each in small)
+    while (refusal := ends_on_bound(fit)) is not None:
+        if refusal.name in new:
+            return named
+        # It stood for the small ones.
+        found, refusals = by_instruments(found.without([refusal.name]), given), [*refusals, refusal]
+        fit = with_small_effects(found, small, given)
+    judgement = named.judge.judge(with_lean(fit, across))
+    taken = min(judgement.held_out.shares().values())
+    if taken < found.settings.named_share or named.judge.harmed(judgement, named.judgement):
         return named
     return named._replace(
         judgement=judgement,
         alike=(*named.alike, *(rival for each in small for rival in each.rivals)),
         sure={**named.sure, **{each.candidate.effect.name: each.chance for each in small}},
-        small=frozenset(each.candidate.effect.name for each in small),
+        small=new,
+        refusals=refusals,
     )
 
 
@@ -401,6 +417,8 @@ def _wrong_numbers(named: _Named, effects: Mapping[str, Sequence[Estimate]], lea
     """Name the numbers of the vehicle that are wrong, where a gap is: a mean square of `least` squared floors."""
     (hypothesis, estimates, *_), held_out = named.judgement
     taken, unknown = held_out.removed_by_numbers(least), named.judge.unknown(held_out)
+    if not carries_the_weight(named.judgement.found):
+        taken[5] = 0.0
     return wrong_numbers(estimates, effects, taken, unknown, hypothesis.vehicle)
 
 
@@ -482,7 +500,7 @@ def _concluded(
     # In gusts instruments identify the numbers, and a gap need not be clear.
     still = not hypothesis.gusty.any()
     numbers = _wrong_numbers(found, {each.name: each.numbers for each in effects}, NOISE if still else 0.0)
-    effects += [numbers] if numbers is not None else []
+    effects = [with_lever(each, numbers) for each in effects] + ([] if numbers is None else [numbers])
     # Where wrong numbers leave no gap, there is none that names could take a share of.
     removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)
     if not named:

@@ -139,7 +139,7 @@ def fit(hypothesis: System, floor: Array) -> Array:
 def least_squares(matrix: Array, right: Array) -> Array:
     """Solve for one or several right sides; columns are brought to one length, and one of zeros gets 0."""
     length = np.linalg.norm(matrix, axis=0)
-    scale = 1.0 / np.where(length > 0, length, 1.0)
+    scale = np.where(length > 0, 1.0, 0.0) / np.where(length > 0, length, 1.0)
     return np.asarray((np.linalg.lstsq(matrix * scale, right, rcond=ROUNDING)[0].T * scale).T)
 
 

@@ -86,6 +86,8 @@ def by_instruments(
             break
     if (lost := far & ~now & ~held).any():
         return by_instruments(found, given, held | lost, together=together)
+    if (less := _below_zero(at) & moved).any():
+        return by_instruments(_at_zero(found, less), given, held | less, together=together)
     if together:
         fit_error = np.where(stated.values == found.values, found.estimates.left_out - found.values, 0.0)
         _, joint = _stepped(*last, fit_error)
@@ -97,6 +99,23 @@ def by_instruments(
     if dropped.any():
         numbers = _holding(numbers, by_instruments(found, given, held, together=False).estimates)
     return at._replace(estimates=numbers)
+
+
+def _below_zero(found: NamedFit) -> BoolArray:
+    """Mark coefficients of effects below 0 that cannot be, shape (number,)."""
+    below, vehicle = np.zeros(len(found.values), dtype=bool), found.hypothesis.vehicle
+    for (effect, _), (own, _) in zip(found.hypothesis.chosen, places_of(found.hypothesis), strict=True):
+        least = [each.bounds(vehicle)[0] for each in effect.coefficients]
+        if effect.physical is None and len(least) == len(found.values[own]):
+            below[own] = (np.array(least) == 0.0) & (found.values[own] < 0.0)
+    return below
+
+
+def _at_zero(found: NamedFit, numbers: BoolArray) -> NamedFit:
+    """Set coefficients, shape (number,), to 0 for good."""
+    values, left_out = (np.where(numbers, 0.0, each) for each in (found.values, found.estimates.left_out))
+    there = estimates_of(found.hypothesis, values, left_out)
+    return found._replace(estimates=replace(there, parameters=found.estimates.parameters))
 
 
 def _holding(numbers: Estimates, others: Estimates) -> Estimates:

@@ -1,13 +1,14 @@
 """Causes of a gap: each chosen effect jointly with the others, faults of sensors, wrong parameters of the vehicle."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtr
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.consistency.findings import AuditFinding
+from cpfls_cli.consistency.motion import OFFSET_M_S2
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
@@ -18,7 +19,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, effect_sentence
 from cpfls_cli.gap.naming.ranking import RankedStep, Scored, likely, odds, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
 from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in_place_of
-from cpfls_cli.gap.settings import COUNTS, RARE, GapSettings
+from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -168,11 +169,48 @@ def of_thrust(numbers: Sequence[Estimate]) -> list[str]:
     return [] if thrust is None else [name for name, each in moments.items() if _undone(each, thrust)]
 
 
+def with_lever(effect: NamedEffect, wrong: NamedEffect | None) -> NamedEffect:
+    """Give an effect that has a lever for all forces the lever of the forces as they are, where the thrust is wrong.
+
+    Its torque is known over that of the rotors. If their thrust is larger than stated their torque is too, and if the
+    mass is smaller the force is: either way the measured force is too large for the lever by what the thrust is off.
+
+    `wrong`: numbers of the vehicle that are named as wrong.
+    """
+    thrust = None if wrong is None else wrong.coefficients.get("thrust_scale")
+    if thrust is None or not CATALOGUE[effect.name].of_all_forces:
+        return effect
+    scale, error = 1 + thrust.value, 0.5 * (thrust.high - thrust.low)
+
+    def scaled(number: Estimate) -> Estimate:
+        down, up = (
+            float(np.hypot(scale * (end - number.value), error * number.value)) for end in (number.low, number.high)
+        )
+        value = scale * number.value
+        return replace(number, value=value, low=value - down, high=value + up)
+
+    return replace(effect, numbers=tuple(scaled(number) for number in effect.numbers))
+
+
 def _undone(number: Estimate, other: Estimate) -> bool:
     """Check whether two relative errors cancel as factors."""
     off = (1 + number.value) * (1 + other.value) - 1
     own, its = ((1 + b.value) * 0.5 * (a.high - a.low) for a, b in ((number, other), (other, number)))
     return _chance_of(off, own + its) > RARE
+
+
+def carries_the_weight(found: NamedFit) -> bool:
+    """Check whether the scale of the thrust, within its interval, is that which carries the weight on the mean.
+
+    It shows by how force and thrust change as well, and where an effect is missing that may be another one. The mean
+    is off by no more than an accelerometer is.
+    """
+    number = next(each for each in found.estimates.parameters if each.name == "thrust_scale")
+    flights = [replace(flight, offset_share=np.zeros(6), seen={}) for flight in found.hypothesis.flights]
+    there = system(flights, found.hypothesis.chosen)
+    lift, vehicle = there.rotor_wrench[:, 5].mean(), there.vehicle
+    left = abs(float(there.residual_at(found.estimates.linear)[:, 5].mean()))
+    return left <= ERRORS * OFFSET_M_S2 * vehicle.mass_kg + lift * 0.5 * (number.high - number.low)
 
 
 def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:

@@ -343,8 +343,13 @@ def on_bound(found: NamedFit) -> Refusal | None:
 
 
 def ends_on_bound(found: NamedFit) -> Refusal | None:
-    """Find an effect, lags apart, that instruments have moved onto a bound of its size."""
-    for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
+    """Find an effect, lags apart, that instruments have moved onto a bound of its size, or below 0 as a whole."""
+    estimates = found.estimates
+    for (effect, _), numbers, linear in zip(
+        found.hypothesis.chosen, estimates.effects, estimates.of_effect, strict=True
+    ):
+        if linear.size and not linear.any():
+            return Refusal(effect.name, "by instruments it would be below 0")
         for number, bound in () if effect.is_lag else _on_bounds(sized(effect, numbers)).items():
             most = f"{bound:.3g} {number.unit}"
             reason = f"by instruments its {spoken(number.name)} sits on the bound of what is possible, {most}"

@@ -219,11 +219,23 @@ class Judge:
             return Refusal(least, "on the held-out flights the gap is as small without it")
         return _bent(judgement, compared) or _filling(judgement, compared)
 
+    def harmed(self, judgement: Judgement, before: Judgement) -> bool:
+        """Check whether what a fit has more than one before makes a channel surely and visibly worse."""
+        after = judgement.held_out.size(judgement.held_out.after).floors
+        return bool(self._compared(judgement, before.found, before.held_out.after).worsened(after).any())
+
     def _without(self, judgement: Judgement, name: str) -> Without:
         """Leave an effect out and refit the others."""
         without = judgement.found.without([name])
         there = system(without.hypothesis.shown_in(self.repaired), without.hypothesis.chosen)
-        residual, unseen = there.residual_at(without.estimates.linear), judgement.held_out
+        return self._compared(judgement, without, there.residual_at(without.estimates.linear))
+
+    def _compared(self, judgement: Judgement, without: NamedFit, residual: Array) -> Without:
+        """Compare a fit with the residual, shape (window, 6), that another one leaves of the same flights."""
+        there, unseen = (
+            system(without.hypothesis.shown_in(self.repaired), without.hypothesis.chosen),
+            judgement.held_out,
+        )
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
         count = np.maximum(unseen.known.sum(axis=0), 1)
         difference, block = squares[0] - squares[1], block_index(there, without.settings)

@@ -11,7 +11,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.effects.registry import CATALOGUE, effect
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.residual.rotor_loss import RotorLoss
-from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, GapSettings
+from cpfls_cli.gap.settings import CLEAR, COUNTS, ERRORS, OFF, VISIBLE, GapSettings
 from cpfls_cli.result import about, part, result
 
 BODY = "body (FLU)"
@@ -276,7 +276,7 @@ def verdict_of(
     if min(shares) < settings.named_share or remains or by_chance:
         return GapVerdict.PARTIAL
     # What may be left without a name may be called by another one.
-    main = {effect.name for effect in effects if effect.share >= 1 - settings.named_share}
+    main = {effect.name for effect in effects if abs(effect.share) >= 1 - settings.named_share}
     return GapVerdict.AMBIGUOUS if any(rival.instead_of in main for rival in alternatives) else GapVerdict.NAMED
 
 
@@ -288,7 +288,7 @@ def gap_remains(
     A gap is above `CLEAR` floors. It remains where a channel keeps more of it than names may leave, or several times
     that limit and more than a formula may be off by; with several effects wherever there is one, because one may fill
     in for what the formula of another is off by. A residual that depends on a signal, or has a narrow band, is a second
-    cause where that part of it counts.
+    cause where that part of it counts and is visible.
 
     `before`, `after`, shape (6,), floors: on held-out flights, with the vehicle's own parameters refitted, and with so
     many named effects.
@@ -303,4 +303,4 @@ def gap_remains(
 def _second_cause(unexplained: Unexplained, before: Array) -> bool:
     kind = slice(0, 3) if unexplained.axis.startswith("torque") else slice(3, 6)
     part = unexplained.share * unexplained.floors**2
-    return part > COUNTS * float(np.nanmax(before[kind], initial=1.0)) ** 2
+    return part > max(COUNTS * float(np.nanmax(before[kind], initial=1.0)) ** 2, VISIBLE**2)

@@ -254,6 +254,18 @@ def test_two_that_contradict_each_other_without_a_third_are_only_warned_of(fligh
     assert any("velocity and acceleration" in warning and "early" in warning for warning in found.warnings)
 
 
+@pytest.mark.parametrize("delay_s", [0.012, 0.06])
+def test_a_velocity_that_comes_after_its_position_is_late_without_a_third(flights, delay_s):
+    """An estimator makes one of the other, later; the other way round nobody knows which is wrong."""
+    alone = [replace(s, rotor_speed=None, acceleration=None) for s in flights]
+    found = audit([replace(s, velocity=late(s.velocity, delay_s)) for s in alone], WINDOWS)
+    (repair,) = found.repairs
+    assert (repair.channel, repair.delay_s) == ("velocity", pytest.approx(delay_s, abs=1e-3))
+    early = audit([replace(s, position=late(s.position, delay_s)) for s in alone], WINDOWS)
+    assert early.repairs == ()
+    assert any("position and velocity" in warning and "early" in warning for warning in early.warnings)
+
+
 def test_a_late_gyroscope_is_not_taken_for_an_early_attitude(flights):
     found = audit([replace(signals, body_rate=late(signals.body_rate, 0.03)) for signals in flights], WINDOWS)
     assert [fault.name for fault in found.named] == ["channel_delay"]
@@ -334,6 +346,26 @@ def test_a_gyroscope_that_is_turned_leaves_the_attitude_as_it_is(flights, turn):
     found = audit([replace(each, body_rate=turned_back.apply(each.body_rate)) for each in flights], WINDOWS)
     assert [each.name for each in found.named] == ["imu_misalignment"]
     assert not found.settled
+
+
+@pytest.mark.parametrize("both", [True, False])
+def test_an_accelerometer_is_askew_as_the_gyroscope_of_its_imu_is_where_it_leans_so(flights, both):
+    turned_back, rng = Rotation.from_rotvec([0.03, -0.04, 0.02]).inv(), np.random.default_rng(1)
+
+    def of_imu(signals):
+        felt = np.einsum("tji,tj->ti", signals.rotation, signals.acceleration + UP)
+        felt = felt + rng.normal(0.0, 0.1, felt.shape)
+        read = turned_back.apply(felt) if both else felt
+        return felt, replace(
+            signals, acceleration=None, specific_force=read, body_rate=turned_back.apply(signals.body_rate)
+        )
+
+    true, logged = zip(*map(of_imu, flights), strict=True)
+    found = audit(logged, WINDOWS)
+    assert [each.name for each in found.named] == ["imu_misalignment"]
+    assert [each.split(",")[0] for each in found.settled] == ["The accelerometer is rotated as the gyroscope is"][:both]
+    again = found.repaired(logged[0]).specific_force
+    np.testing.assert_allclose(again.mean(axis=0), true[0].mean(axis=0), atol=0.03)
 
 
 def test_motion_that_is_late_with_the_attitude_is_set_right_with_it(lively):

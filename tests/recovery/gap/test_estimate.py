@@ -83,6 +83,50 @@ def test_longer_flights_narrow_the_intervals_as_the_root_of_their_length():
     assert widths[0] / widths[1] == pytest.approx(2, rel=0.3)
 
 
+@pytest.mark.parametrize("wrong", ["mass", "thrust"])
+def test_an_offset_under_a_wrong_mass_or_thrust_is_where_it_is(wrong):
+    """Either way the measured force is not that of the rotors as stated, whose torque the offset is known over."""
+
+    def misstated(signals):
+        rotors = tuple(
+            replace(
+                each, thrust_factor_n_s2=each.thrust_factor_n_s2 / 1.2, drag_factor_n_m_s2=each.drag_factor_n_m_s2 / 1.2
+            )
+            for each in VEHICLE.rotors
+        )
+        given = {"mass_kg": 1.2 * VEHICLE.mass_kg} if wrong == "mass" else {"rotors": rotors}
+        return replace(signals, vehicle=replace(VEHICLE, **given))
+
+    at = (0.012, -0.009)
+    flights = [noisy(fly(seed, [(candidate("com_offset"), at)]), np.random.default_rng(seed)) for seed in (1, 2, 3)]
+    found = diagnose(*_held_last(map(misstated, flights)), SETTINGS, np.random.default_rng(1)).diagnosis
+    offset, numbers = found.effects
+    assert (offset.name, numbers.name) == ("com_offset", "parameter_error")
+    assert "thrust_scale" in numbers.coefficients
+    for name, true in zip(("c_x", "c_y"), at, strict=True):
+        assert offset.coefficients[name].low < true < offset.coefficients[name].high
+        assert offset.coefficients[name].value == pytest.approx(true, rel=0.03)
+
+
+def test_a_thrust_that_does_not_carry_the_weight_is_not_named():
+    """What lowers every change of the force by a third, and not its mean, is no thrust."""
+
+    def damped(signals):
+        force = signals.specific_force - [0.0, 0.0, 9.81]
+        return replace(signals, specific_force=[0.0, 0.0, 9.81] + force * [1.0, 1.0, 2 / 3])
+
+    flights = [damped(noisy(fly(seed), np.random.default_rng(seed))) for seed in (1, 2, 3)]
+    found = diagnose(*_held_last(flights), SETTINGS, np.random.default_rng(1))
+    scale = next(each for each in found.estimates.parameters if each.name == "thrust_scale")
+    assert scale.high < -0.1
+    assert not any("thrust_scale" in each.coefficients for each in found.diagnosis.effects)
+
+
+def _held_last(flights):
+    *learned, last = flights
+    return learned, [last]
+
+
 def test_shapes_and_coefficients_of_unit_stand_in_their_places():
     """A delay between two free effects: the order of numbers and their places in the fit must not shift."""
     chosen = [candidate("com_offset"), candidate("channel_delay", delay_s=0.02), candidate("linear_damping")]

@@ -121,7 +121,7 @@ def test_channels_that_agree_are_not_warned_about(turning):
         (lambda s: replace(s, velocity=s.velocity[:, [1, 0, 2]], acceleration=None), "axes are swapped"),
         (lambda s: replace(s, velocity=s.velocity * [1, -1, -1], acceleration=None), "opposite signs along y"),
         (lambda s: replace(s, position=None, acceleration=s.acceleration + 0.5 * UP), "gravity"),
-        (lambda s: replace(s, velocity=np.roll(s.velocity, 6, axis=0), acceleration=None), "late by (59|60)\\."),
+        (lambda s: replace(s, position=np.roll(s.position, 6, axis=0), acceleration=None), "early by (59|60)\\."),
         (lambda s: replace(s, velocity=s.velocity[::-1] ** 2 - 2.0, acceleration=None), "do not match"),
     ],
 )

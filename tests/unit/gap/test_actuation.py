@@ -34,7 +34,9 @@ def found_with(names, sizes):
         for each, (value, half) in zip(chosen, sizes, strict=True)
     ]
     hypothesis = SimpleNamespace(chosen=tuple(chosen), flights=(), can=lambda _candidate: True)
-    estimates = Estimates(linear=np.zeros(0), effects=tuple(numbers), parameters=(), of_effect=())
+    estimates = Estimates(
+        linear=np.zeros(0), effects=tuple(numbers), parameters=(), of_effect=(np.zeros(0),) * len(numbers)
+    )
     return NamedFit(hypothesis, estimates, np.ones(6), GapSettings())
 
 

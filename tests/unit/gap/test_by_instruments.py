@@ -290,3 +290,30 @@ def test_what_follows_from_others_that_did_not_go_far_is_not_asked_for_again_and
     monkeypatch.setattr(by_instruments, "_sources", lambda *_: nothing)
     monkeypatch.setattr(by_instruments, "_stepped", stepped)
     assert by_instruments.by_instruments(found, None).values[-1] == pytest.approx(depth + 0.05)
+
+
+def test_what_cannot_be_below_0_and_would_be_is_0(monkeypatch):
+    """Of three dampings that instruments move, one would drive the vehicle; the two others are fitted without it."""
+    effect = (candidate("linear_damping"), [0.1, 0.1, 0.05])
+    found = fitted([weak(fly(1, [effect], gyro=0.005))], [effect[0]], np.ones(6), GapSettings())
+    places = np.arange(len(found.estimates.linear))[-3:]
+    asked = []
+
+    def stepped(at, sources, *_):
+        values = at.values.copy()
+        values[places] = np.where(sources[0].numbers[places], [0.08, 0.12, -0.03], values[places])
+        # Without one block each moves a little.
+        return values, values + 1e-3 * np.eye(len(values))[places] * sources[0].numbers
+
+    def sources(at, _given, held=None):
+        numbers = np.isin(np.arange(len(at.values)), places) & ~held
+        asked.append(numbers[places].tolist())
+        return [_Source(np.zeros((1, len(numbers) + 1, len(numbers) + 1)), numbers)]
+
+    monkeypatch.setattr(by_instruments, "_sources", sources)
+    monkeypatch.setattr(by_instruments, "_stepped", stepped)
+    after = by_instruments.by_instruments(found, None, together=False)
+    assert after.estimates.linear[places] == pytest.approx([0.08, 0.12, 0.0])
+    assert [number.name for number in after.estimates.effects[0]] == ["d_x", "d_y"]
+    assert asked[0] == [True, True, True]
+    assert asked[-1] == [True, True, False]
