@@ -208,7 +208,7 @@ def carries_the_weight(found: NamedFit) -> bool:
     number = next(each for each in found.estimates.parameters if each.name == "thrust_scale")
     flights = [replace(flight, offset_share=np.zeros(6), seen={}) for flight in found.hypothesis.flights]
     there = system(flights, found.hypothesis.chosen)
-    lift, vehicle = there.rotor_wrench[:, 5].mean(), there.vehicle
+    lift, vehicle = float(there.rotor_wrench[:, 5].mean()), there.vehicle
     left = abs(float(there.residual_at(found.estimates.linear)[:, 5].mean()))
     return left <= ERRORS * OFFSET_M_S2 * vehicle.mass_kg + lift * 0.5 * (number.high - number.low)
 

@@ -6,7 +6,7 @@ from scipy.stats import permutation_test, wilcoxon
 
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
-from cpfls_cli.gap.balance.refine import Equations
+from cpfls_cli.gap.balance.refine import Equations, least_squares
 from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of
 from cpfls_cli.gap.naming.ranking import chance_of_ranks, likely, off_by, within_bounds
 from cpfls_cli.gap.naming.results import Estimate
@@ -215,3 +215,11 @@ def test_about_a_solution_nothing_is_left_to_do():
     rows = drawn(0.6, right=0.4)
     there = rows.around(rows.solve(), np.array([True, True, True, False]), np.zeros((ROWS, 0)))
     assert there.solve() == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_a_column_that_shows_nothing_gets_0_and_not_its_rounding():
+    rng = np.random.default_rng(1)
+    matrix = rng.standard_normal((400, 12)) * 10.0 ** rng.integers(-6, 6, 12)
+    matrix[:, [3, 8]] = 0.0
+    found = least_squares(matrix, matrix @ np.ones(12) + rng.standard_normal(400))
+    assert found[[3, 8]].tolist() == [0.0, 0.0]
