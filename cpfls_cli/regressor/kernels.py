@@ -4,7 +4,7 @@ A sample fires at most two membership functions per input, so most columns of it
 in the order of what they fire: those that fire the same rules have the same columns, and one product of matrices adds
 them up. What is computed of them stands in one array, a line for each quantity, the sample last: first what is known,
 then degrees of membership, then whatever `Program` writes as sums of products of lines, the columns last. Which lines
-those are follows from the structure alone (`cpfls_cli.regressor.table`), so one short loop computes all of them: a loop
+those are follows from the structure alone (`identification.samples`), so one short loop computes all of them: a loop
 for each would take three times as long to compile. All loops stand in one module because the cache of compiled code
 follows its file.
 """
