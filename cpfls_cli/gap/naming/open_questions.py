@@ -33,7 +33,7 @@ from cpfls_cli.gap.naming.ranking import (
 from cpfls_cli.gap.naming.results import Alternative, Estimate, NamedEffect, NotExcited, Unexplained
 from cpfls_cli.gap.naming.search import of_motion
 from cpfls_cli.gap.residual.dependence import joined_states, rank_dependence, state_signals, without_actuation
-from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, ERRORS, RARE, VISIBLE, GapSettings
+from cpfls_cli.gap.settings import CHANCE, CLEAR, COUNTS, ERRORS, OFF, RARE, VISIBLE, GapSettings
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import folds
 
@@ -235,8 +235,6 @@ def noise_like(smooth: Array, lengths: Sequence[int], present: BoolArray, on: Gr
 
 
 _USUAL_OF_BOUND = 0.2  # A coefficient that is large but not unheard of, as a share of its bound.
-_SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)
-"""Of that size, which effects without a name may have: none, and about half a decade apart."""
 
 
 def unexplained_channels(found: NamedFit, rng: np.random.Generator) -> tuple[Unexplained, ...]:
@@ -350,9 +348,9 @@ def _is_other(effect: Effect, named: Set[str]) -> bool:
 def _with_others(
     found: NamedFit, others: Sequence[tuple[Candidate, Array]], step: RankedStep
 ) -> tuple[list[Estimates], Array]:
-    """Fit named effects together with others for each of `_SHARES`, and say how likely each is, shape (share,).
+    """Fit named effects together with others of a share of their size, and say how likely each is, shape (share,).
 
-    `others`: each with the usual size of its linear coefficients.
+    `others`: each with the usual size of its linear coefficients. The first share is none, the others are decades.
     """
     hypothesis, shapes = found.hypothesis, found.hypothesis.shape_values
     arranged = scoring_matrix(hypothesis, [each for each, _ in others], found.floor)
@@ -368,7 +366,7 @@ def _with_others(
         return np.concatenate([linear, np.clip(shapes + steps, *ends.T)], axis=-1)
 
     fits, errors = list[Estimates](), list[Array]()
-    for share in _SHARES:
+    for share in (0.0, OFF**2, OFF, 1.0):
         with np.errstate(divide="ignore"):
             known = np.append(arranged.prior[:own], (share * usual) ** -2.0)
         # What has no size is left out.
@@ -387,7 +385,7 @@ def _averaged(own: Estimates, fits: Sequence[Estimates], chances: Array) -> Esti
     def widened(number: Estimate, there: Sequence[Estimate]) -> Estimate:
         values = np.array([each.value for each in there])
         half = np.array([each.high for each in there]) - values
-        if len(there) < len(_SHARES) or not np.isfinite(half).all():
+        if len(there) < len(fits) or not np.isfinite(half).all():
             return number
         apart = values - values[0]
         mean = float(chances @ apart)
