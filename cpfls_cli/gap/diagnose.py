@@ -518,9 +518,11 @@ def _concluded(
     effects = [*faults, *named]
     floor, differ = found.steps[-1].floor, found.differ
     # In gusts instruments identify the numbers, and a gap need not be clear.
-    still = not hypothesis.gusty.any()
-    known, least = {each.name: each.numbers for each in effects}, NOISE if still else 0.0
-    numbers, weightless = _wrong_numbers(found, known, least), _weightless(found, known, least)
+    known, least = (
+        {each.name: each.numbers for each in effects},
+        NOISE if (still := not hypothesis.gusty.any()) else 0.0,
+    )
+    numbers = _wrong_numbers(found, known, least)
     effects = [with_lever(each, numbers) for each in effects] + ([] if numbers is None else [numbers])
     # Where wrong numbers leave no gap, there is none that names could take a share of.
     removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)
@@ -532,10 +534,10 @@ def _concluded(
     once = {(rival.name, rival.instead_of, rival.jointly_with): rival for rival in listed}
     rivals = (*once.values(), *untried(hypothesis, named, settings), *not_separated(found.judgement.found, numbers))
     before, after = (held_out.size(each).floors for each in (held_out.parameters, held_out.after))
-    remains = bool(remainder) or weightless
+    remains = bool(remainder)
     if effects:
-        others = bool(found.bends) or weightless
-        remains = gap_remains(before, after, remainder, settings.named_share, len(named)) or others
+        remains = gap_remains(before, after, remainder, settings.named_share, len(named)) or bool(found.bends)
+    remains = remains or _weightless(found, known, least)
     verdict = verdict_of(effects, rivals, remains, tuple(removed.values()) or (1.0,), excited, settings)
     if verdict is GapVerdict.NAMED and any(not CATALOGUE[rival.instead_of].is_lag for rival in found.alike):
         # A rival that does as well as a small effect may be there instead.
