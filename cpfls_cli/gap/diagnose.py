@@ -518,10 +518,7 @@ def _concluded(
     effects = [*faults, *named]
     floor, differ = found.steps[-1].floor, found.differ
     # In gusts instruments identify the numbers, and a gap need not be clear.
-    known, least = (
-        {each.name: each.numbers for each in effects},
-        NOISE if (still := not hypothesis.gusty.any()) else 0.0,
-    )
+    known, least = {e.name: e.numbers for e in effects}, NOISE if (still := not hypothesis.gusty.any()) else 0.0
     numbers = _wrong_numbers(found, known, least)
     effects = [with_lever(each, numbers) for each in effects] + ([] if numbers is None else [numbers])
     # Where wrong numbers leave no gap, there is none that names could take a share of.
