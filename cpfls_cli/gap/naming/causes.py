@@ -24,7 +24,6 @@ from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MATTERS = 0.02  # Relative error of a moment of inertia or of the thrust from which on it is named.
-_WEIGHT_LEFT = 0.5  # Share of the weight that rotors as stated do not carry, up to which a wrong thrust may leave it.
 
 
 @dataclass(frozen=True)
@@ -214,7 +213,7 @@ def carries_the_weight(found: NamedFit) -> bool:
     stated[[each.name for each in VEHICLE_NUMBERS.coefficients].index(number.name)] = 0.0
     left, before = (abs(float(there.residual_at(each)[:, 5].mean())) for each in (found.estimates.linear, stated))
     known = ERRORS * OFFSET_M_S2 * vehicle.mass_kg + lift * 0.5 * (number.high - number.low)
-    return left <= max(known, _WEIGHT_LEFT * before)
+    return left <= max(known, (1 - found.settings.partial_share) * before)
 
 
 def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:
