@@ -302,6 +302,14 @@ def _significant(named: _Named, given: Instruments) -> _Named:
     return named._replace(judgement=judgement, refusals=refusals, sure=sure, unidentified=loose)
 
 
+def _within_bounds(found: NamedFit, given: Instruments) -> tuple[NamedFit, list[Refusal]]:
+    """Fit by instruments without what these move onto a bound."""
+    refusals = list[Refusal]()
+    while (refusal := ends_on_bound(moved := by_instruments(found, given))) is not None:
+        found, refusals = moved.without([refusal.name]), [*refusals, refusal]
+    return moved, refusals
+
+
 def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Named:
     """Judge what is significant by instruments, and name lags where they are.
 
@@ -329,8 +337,9 @@ def _judged_with_lags(named: _Named, given: Instruments, across: Array) -> _Name
         last, unconfirmed = named.judge.confirmed(judgement)
         differ = differences(judgement, last, named.steps[0], named.judge)
         if unconfirmed and not differ:
-            judgement = named.judge.judge(with_lean(by_instruments(last.found, given), across))
-            refusals = refusals + unconfirmed
+            found, refused = _within_bounds(last.found, given)
+            judgement = named.judge.judge(with_lean(found, across))
+            refusals = [*refusals, *unconfirmed, *refused]
     names = {each.effect.name for each in judgement.found.hypothesis.chosen}
     alike = tuple(each for each in lags.alike if each.instead_of in names)
     return named._replace(judgement=judgement, refusals=refusals, alike=alike, sure=sure, differ=differ)

@@ -97,7 +97,7 @@ def by_instruments(
     dropped = np.any([each.numbers for each in conditional], axis=0) & ~moved
     numbers = _with_unidentified(stated, at.estimates, moved)
     if dropped.any():
-        numbers = _holding(numbers, by_instruments(found, given, held, together=False).estimates)
+        numbers = holding(numbers, by_instruments(found, given, held, together=False).estimates)
     return at._replace(estimates=numbers)
 
 
@@ -118,7 +118,7 @@ def _at_zero(found: NamedFit, numbers: BoolArray) -> NamedFit:
     return found._replace(estimates=replace(there, parameters=found.estimates.parameters))
 
 
-def _holding(numbers: Estimates, others: Estimates) -> Estimates:
+def holding(numbers: Estimates, others: Estimates) -> Estimates:
     """Widen the intervals of numbers of effects by those of another fit of them."""
     effects = []
     for own, there in zip(numbers.effects, others.effects, strict=True):

@@ -19,7 +19,16 @@ from cpfls_cli.gap.balance.balance_system import System, is_free, residual_along
 from cpfls_cli.gap.balance.noise_floor import CORRELATIONS
 from cpfls_cli.gap.balance.refine import fit_within_bounds, least_squares
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
-from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, channel_weight, estimates_of, size_in_floors, within
+from cpfls_cli.gap.naming.by_instruments import holding
+from cpfls_cli.gap.naming.estimate import (
+    Estimates,
+    NamedFit,
+    channel_weight,
+    estimates_of,
+    fitted,
+    size_in_floors,
+    within,
+)
 from cpfls_cli.gap.naming.ranking import (
     RankedStep,
     candidates_of,
@@ -336,10 +345,14 @@ def with_unnamed(
         counting = tuple(each.candidate.effect.title for each in large if bent.p_value(each.gain) <= RARE)
         others += [(each.candidate, sizes[each.candidate.effect.name][1]) for each in bent.ranking]
         chosen = _beyond_chance(bent, bends, settings, rng)
-    unnamed = tuple(each.effect.title for each in chosen[len(named) :])
-    if not others:
-        return found.estimates, unnamed, counting
-    return _averaged(found.estimates, *_with_others(found, others, step)), unnamed, counting
+    unnamed, small = chosen[len(named) :], names_of([each for each, _ in others])
+    wider = _averaged(found.estimates, *_with_others(found, others, step)) if others else found.estimates
+    # A lag is no torque or force of a usual size: it is there as it is, or not.
+    as_they_are = [each for each in unnamed if each.effect.name not in small]
+    if as_they_are:
+        joint = fitted(flights, [*named, *as_they_are], found.floor, settings).estimates
+        wider = holding(wider, replace(joint, effects=joint.effects[: len(named)]))
+    return wider, tuple(each.effect.title for each in unnamed), counting
 
 
 def _is_other(effect: Effect, named: Set[str]) -> bool:

@@ -336,6 +336,35 @@ def test_intervals_leave_room_for_what_is_too_small_for_a_name():
     assert (there.value, there.high) == (alone.value, alone.high)
 
 
+def logged_early(seed):
+    flown = fly(seed, [(candidate("linear_damping"), DAMPING)], gyro=0.005)
+    early = [np.interp(flown.time + 0.004, flown.time, channel) for channel in flown.speed.T]
+    return replace(flown, rotor_speed=np.column_stack(early))
+
+
+def off_and_biased(seed):
+    there = [(candidate("com_offset"), [0.0, 0.001]), (candidate("torque_bias"), [0.3, 0.0, 0.0])]
+    return fly(seed, there, gyro=0.002)
+
+
+@pytest.mark.parametrize(
+    ("named", "true", "other", "logged"),
+    [("linear_damping", DAMPING[0], "channel_delay", logged_early), ("torque_bias", 0.3, "com_offset", off_and_biased)],
+    ids=["lag", "rival"],
+)
+def test_intervals_hold_an_unnamed_lag_or_rival_as_it_is(named, true, other, logged):
+    """Neither has a usual size to be small by: rotors that are 4 ms early take a third of a damping."""
+    flights, effects = [weak(logged(seed)) for seed in (1, 2)], [CATALOGUE[named], CATALOGUE[other]]
+    last = rank_effects(flights, [candidate(named)], effects, SETTINGS, np.random.default_rng(0))
+    found = fitted(flights, [candidate(named)], last.floor, SETTINGS)
+    wider, unnamed, _ = with_unnamed(found, last, effects, {other}, np.random.default_rng(0))
+    assert unnamed == (CATALOGUE[other].title,)
+    (alone, *_), (there, *_) = found.estimates.effects[0], wider.effects[0]
+    assert not alone.low <= true <= alone.high
+    assert there.low <= true <= there.high
+    assert (there.low <= alone.low, alone.high <= there.high) == (True, True)
+
+
 def test_where_nothing_else_is_there_intervals_stay_what_they_are():
     drag = candidate("rotor_drag")
     found, (wider, unnamed, _) = widened([(drag, [1.3e-3])], drag)

@@ -224,3 +224,22 @@ def test_a_lag_that_held_out_flights_do_not_confirm_has_no_rival(unconfirmed, mo
     judged = diagnose._judged_with_lags(named, None, np.zeros(2))
     assert (judged.differ, judged.refusals) == ((), refusals)
     assert judged.alike == (() if unconfirmed else (rival,))
+
+
+def test_what_instruments_move_onto_a_bound_without_a_lag_that_goes_is_no_name(monkeypatch):
+    """The flights held out do not confirm the lag, and without it nothing is left of another effect."""
+    both, other, none = (found_with(names, [SURE] * len(names)) for names in (BOTH, BOTH[1:], ()))
+    lag, bound = Refusal(BOTH[0], "the gap is as small without it"), Refusal(BOTH[1], "it would be below 0")
+    judge = SimpleNamespace(
+        judge=lambda found: Judgement(found, None), confirmed=lambda _: (Judgement(other, None), [lag])
+    )
+    monkeypatch.setattr(diagnose, "decided_by_instruments", lambda *_: ActuationFit(both, {BOTH[0]: 1e-3}, ()))
+    monkeypatch.setattr(diagnose, "differences", lambda *_: ())
+    monkeypatch.setattr(diagnose, "ends_on_bound", lambda found: bound if found is other else None)
+    monkeypatch.setattr(NamedFit, "without", lambda *_: none)
+    for name in ("by_instruments", "with_lean"):
+        monkeypatch.setattr(diagnose, name, lambda found, _: found)
+    named = diagnose._Named([], [None], judge, Judgement(both, None), both, [], ("the flights differ",))
+    judged = diagnose._judged_with_lags(named, None, np.zeros(2))
+    assert judged.judgement.found is none
+    assert judged.refusals == [lag, bound]

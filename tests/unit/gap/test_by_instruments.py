@@ -13,13 +13,13 @@ from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_instruments, by_samples
 from cpfls_cli.gap.naming.by_instruments import (
     _chance,
-    _holding,
     _Source,
     _sources,
     _stepped,
     _strong,
     _strong_together,
     _Windows,
+    holding,
     significant_effects,
     with_lean,
 )
@@ -239,7 +239,7 @@ def test_intervals_hold_those_of_another_fit():
         return Estimates(np.zeros(0), (numbers,), (Estimate("thrust_scale", "1", *of_vehicle, (-0.9, 3.0)),), ())
 
     found = fit((1.0, 0.9, 1.1), (2.0, 1.9, 2.1), (0.1, 0.0, 0.2))
-    numbers = _holding(found, fit((1.3, 1.2, 1.4), (1.7, 1.6, 2.0), (0.5, 0.4, 0.6)))
+    numbers = holding(found, fit((1.3, 1.2, 1.4), (1.7, 1.6, 2.0), (0.5, 0.4, 0.6)))
     assert [(n.value, n.low, n.high) for n in numbers.effects[0]] == [(1.0, 0.9, 1.4), (2.0, 1.6, 2.1)]
     assert numbers.parameters == found.parameters
 
