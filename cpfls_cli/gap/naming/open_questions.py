@@ -316,13 +316,15 @@ def with_unnamed(
     step, counting = last, tuple[str, ...]()
     if names_of(named) != names_of(last.hypothesis.chosen):
         step = rank_effects(flights, named, effects, settings, rng)
-    vehicle, contain = found.hypothesis.vehicle, names_of(named).union(instead, *(each.effect.holds for each in named))
+    chosen = _beyond_chance(step, effects, settings, rng)
+    vehicle, contain = found.hypothesis.vehicle, names_of(named).union(*(each.effect.holds for each in named))
+    # A rival that explains more than chance next to the named ones is no rival.
+    contain |= instead - names_of(chosen)
     others = [
         (each.candidate, usual_size(each.candidate.effect, vehicle, len(each.coefficients)))
         for each in step.ranking
         if _is_other(each.candidate.effect, contain)
     ]
-    chosen = _beyond_chance(step, effects, settings, rng)
     # A formula bends by as much as it is; one that is 0 does not.
     pairs = [(each, np.abs(size)) for each, size in zip(named, found.estimates.of_effect, strict=True) if size.all()]
     sizes = {bend.name: (bend, size) for each, size in pairs for bend in bends_of([each], flights)}
