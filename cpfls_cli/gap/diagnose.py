@@ -422,13 +422,24 @@ def _wrong_inertia(named: _Named) -> bool:
     return wrong is not None and any(each.name.startswith("inertia") for each in wrong.numbers)
 
 
-def _wrong_numbers(named: _Named, effects: Mapping[str, Sequence[Estimate]], least: float) -> NamedEffect | None:
-    """Name the numbers of the vehicle that are wrong, where a gap is: a mean square of `least` squared floors."""
+def _wrong_numbers(
+    named: _Named, effects: Mapping[str, Sequence[Estimate]], least: float, *, of_weight: bool = True
+) -> NamedEffect | None:
+    """Name the numbers of the vehicle that are wrong, where a gap is: a mean square of `least` squared floors.
+
+    `of_weight`: whether a thrust has to carry the weight.
+    """
     (hypothesis, estimates, *_), held_out = named.judgement
     taken, unknown = held_out.removed_by_numbers(least), named.judge.unknown(held_out)
-    if not carries_the_weight(named.judgement.found):
+    if of_weight and not carries_the_weight(named.judgement.found):
         taken[5] = 0.0
     return wrong_numbers(estimates, effects, taken, unknown, hypothesis.vehicle)
+
+
+def _weightless(named: _Named, effects: Mapping[str, Sequence[Estimate]], least: float) -> bool:
+    """Check whether what changes the force as a wrong thrust would is none, so that it has no name."""
+    asked, numbers = (_wrong_numbers(named, effects, least, of_weight=own) for own in (False, True))
+    return asked is not None and (numbers is None or len(numbers.numbers) < len(asked.numbers))
 
 
 def _doubts(
@@ -508,7 +519,8 @@ def _concluded(
     floor, differ = found.steps[-1].floor, found.differ
     # In gusts instruments identify the numbers, and a gap need not be clear.
     still = not hypothesis.gusty.any()
-    numbers = _wrong_numbers(found, {each.name: each.numbers for each in effects}, NOISE if still else 0.0)
+    known, least = {each.name: each.numbers for each in effects}, NOISE if still else 0.0
+    numbers, weightless = _wrong_numbers(found, known, least), _weightless(found, known, least)
     effects = [with_lever(each, numbers) for each in effects] + ([] if numbers is None else [numbers])
     # Where wrong numbers leave no gap, there is none that names could take a share of.
     removed = held_out.shares(as_given=numbers is not None and held_out.closed_by_numbers)
@@ -520,9 +532,10 @@ def _concluded(
     once = {(rival.name, rival.instead_of, rival.jointly_with): rival for rival in listed}
     rivals = (*once.values(), *untried(hypothesis, named, settings), *not_separated(found.judgement.found, numbers))
     before, after = (held_out.size(each).floors for each in (held_out.parameters, held_out.after))
-    remains = bool(remainder)
+    remains = bool(remainder) or weightless
     if effects:
-        remains = gap_remains(before, after, remainder, settings.named_share, len(named)) or bool(found.bends)
+        others = bool(found.bends) or weightless
+        remains = gap_remains(before, after, remainder, settings.named_share, len(named)) or others
     verdict = verdict_of(effects, rivals, remains, tuple(removed.values()) or (1.0,), excited, settings)
     if verdict is GapVerdict.NAMED and any(not CATALOGUE[rival.instead_of].is_lag for rival in found.alike):
         # A rival that does as well as a small effect may be there instead.

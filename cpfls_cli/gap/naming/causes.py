@@ -24,6 +24,7 @@ from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _MATTERS = 0.02  # Relative error of a moment of inertia or of the thrust from which on it is named.
+_WEIGHT_LEFT = 0.5  # Share of the weight that rotors as stated do not carry, up to which a wrong thrust may leave it.
 
 
 @dataclass(frozen=True)
@@ -203,14 +204,17 @@ def carries_the_weight(found: NamedFit) -> bool:
     """Check whether the scale of the thrust, within its interval, is that which carries the weight on the mean.
 
     It shows by how force and thrust change as well, and where an effect is missing that may be another one. The mean
-    is off by no more than an accelerometer is.
+    is off by no more than an accelerometer is; or by less than half of what it is with the thrust as stated, where the
+    accelerometer is off by more.
     """
     number = next(each for each in found.estimates.parameters if each.name == "thrust_scale")
     flights = [replace(flight, offset_share=np.zeros(6), seen={}) for flight in found.hypothesis.flights]
     there = system(flights, found.hypothesis.chosen)
-    lift, vehicle = float(there.rotor_wrench[:, 5].mean()), there.vehicle
-    left = abs(float(there.residual_at(found.estimates.linear)[:, 5].mean()))
-    return left <= ERRORS * OFFSET_M_S2 * vehicle.mass_kg + lift * 0.5 * (number.high - number.low)
+    lift, vehicle, stated = float(there.rotor_wrench[:, 5].mean()), there.vehicle, found.estimates.linear.copy()
+    stated[[each.name for each in VEHICLE_NUMBERS.coefficients].index(number.name)] = 0.0
+    left, before = (abs(float(there.residual_at(each)[:, 5].mean())) for each in (found.estimates.linear, stated))
+    known = ERRORS * OFFSET_M_S2 * vehicle.mass_kg + lift * 0.5 * (number.high - number.low)
+    return left <= max(known, _WEIGHT_LEFT * before)
 
 
 def all_numbers(estimates: Estimates) -> tuple[Estimate, ...]:

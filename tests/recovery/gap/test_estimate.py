@@ -120,6 +120,19 @@ def test_a_thrust_that_does_not_carry_the_weight_is_not_named():
     scale = next(each for each in found.estimates.parameters if each.name == "thrust_scale")
     assert scale.high < -0.1
     assert not any("thrust_scale" in each.coefficients for each in found.diagnosis.effects)
+    assert found.diagnosis.verdict == "UNEXPLAINED"
+
+
+@pytest.mark.parametrize("off", [-0.5, 0.3])
+def test_a_wrong_mass_is_named_under_an_accelerometer_that_is_off(off):
+    """By more than is usual along z, but by less than the weight that the rotors as stated do not carry."""
+    heavy = replace(VEHICLE, mass_kg=1.2 * VEHICLE.mass_kg)
+    flights = [noisy(fly(seed), np.random.default_rng(seed)) for seed in (1, 2, 3)]
+    along_z = np.array([0.0, 0.0, off])
+    logged = [replace(each, vehicle=heavy, specific_force=each.specific_force + along_z) for each in flights]
+    found = diagnose(*_held_last(logged), SETTINGS, np.random.default_rng(1)).diagnosis
+    assert found.verdict == "NAMED"
+    assert found.effects[0].coefficients["thrust_scale"].value == pytest.approx(0.2, abs=0.01)
 
 
 def _held_last(flights):
