@@ -58,9 +58,15 @@ def _margin(left: Array | float, right: Array | float, scale: Array | float) -> 
 
 def apart(first: float, second: float, digits: int = 3) -> tuple[str, str]:
     """Write two numbers that a sentence compares, with as many more digits as show that they differ."""
-    written = (f"{first:.{digits}g}", f"{second:.{digits}g}")
+    written = (_written(first, digits), _written(second, digits))
     same = written[0] == written[1] and digits < _MOST_DIGITS
     return apart(first, second, digits + 1) if same else written
+
+
+def _written(value: float, digits: int) -> str:
+    text = f"{value:.{digits}g}"
+    # Up to 10⁹ zeros read better than a power of ten.
+    return f"{float(text):.0f}" if "e+0" in text else text
 
 
 def levelled(values: Array) -> Array:

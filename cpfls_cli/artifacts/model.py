@@ -10,6 +10,7 @@ import numpy as np
 from cpfls_cli.artifacts.gate import InputFile
 from cpfls_cli.inertia import INERTIA_PARAMETERS, beyond_any_body, more_than_others
 from cpfls_cli.result import About
+from cpfls_cli.rounding import less
 from cpfls_cli.validation.trust import Trust
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ class LearnedFlight(NamedTuple):
         if not self.log or self.log != other.log:
             return None
         begin, end = max(self.begins, other.begins), min(self.ends, other.ends)
-        return (begin, end) if begin < end else None
+        # One stretch may end where the next begins, and stamps on a clock of steps are no exact numbers.
+        return (begin, end) if less(begin, end) else None
 
     @property
     def file(self) -> InputFile:
@@ -68,7 +70,8 @@ def joined_flights(*groups: Iterable[LearnedFlight]) -> tuple[LearnedFlight, ...
     for flight in (flight for group in groups for flight in group):
         known = kept.get(flight.sha256, flight)
         most = flight if (known.samples or 0) < (flight.samples or 0) else known
-        kept[flight.sha256] = most._replace(log=known.log or flight.log)
+        of_log = known if known.log else flight
+        kept[flight.sha256] = most._replace(log=of_log.log, begins=of_log.begins, ends=of_log.ends)
     return tuple(kept.values())
 
 

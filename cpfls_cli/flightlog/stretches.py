@@ -10,6 +10,7 @@ from cpfls_cli.arrays import Array, BoolArray, runs
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.repair import SMALLEST_SHARE_KEPT, SignalTable, count_saturated
 from cpfls_cli.flightlog.settings import ROTORS, ImportSettings, SignalMap
+from cpfls_cli.rounding import less
 from cpfls_cli.units import KNOWN_UNITS
 from cpfls_cli.words import joined
 
@@ -155,15 +156,22 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
 
 
 def stands_still(time: Array, values: Array) -> BoolArray:
-    """Mark where a signal that is measured stands still on all axes for far longer than between its updates."""
+    """Mark where a signal that is measured stands still on all axes for far longer than between its updates.
+
+    What is written with few digits and then goes on by no more than the last of them was within it, not silent.
+    """
     same = (np.diff(values, axis=0) == 0).all(axis=1)
+    levels = (np.unique(column[np.isfinite(column)]) for column in values.T)
+    digit = np.array([np.diff(own).min(initial=np.inf) for own in levels])
     updates = np.flatnonzero(~same)
     usual = float(np.median(np.diff(updates))) if len(updates) > _FEWEST_IN_PAUSE else np.inf
     marked = np.zeros(len(time), dtype=bool)
     for first, last in runs(same):
         # Steps from row to row: the row after the last one is still the same.
         enough = last - first + 1 >= max(_FEWEST_IN_PAUSE, _USUAL_STEPS * usual)
-        marked[first : last + 1] = enough and time[last] - time[first] >= _SHORTEST_PAUSE_S
+        enough &= bool(time[last] - time[first] >= _SHORTEST_PAUSE_S)
+        then = np.abs(values[last + 1 : last + 2] - values[last])
+        marked[first : last + 1] = enough and (not len(then) or less(digit, then, np.abs(values[last])).any())
     return marked
 
 

@@ -76,7 +76,7 @@ def test_a_flight_is_not_judged_by_the_log_that_it_was_imported_from(cpfls, refu
 def test_a_stretch_of_a_log_is_not_judged_by_one_that_overlaps_it(cpfls, refuse, usual, tmp_path, command):
     log, study, _ = usual
     first, second, third = (tmp_path / f"{name}.h5" for name in ("first", "second", "third"))
-    for made, ends in ((first, "[0, 9]"), (second, "[8.5, 18]"), (third, "[9.1, 18]")):
+    for made, ends in ((first, "[0, 9]"), (second, "[8.5, 18]"), (third, "[9, 18]")):
         cpfls.done("import", study, log, "--set", f"import.crop_s={ends}", "-o", made)
     words, output = ("--accept-guesses",) if command == "gap" else (), tmp_path / "out.h5"
     (line,) = refuse(command, study, first, "--held-out", second, "-o", output, "--dry-run", *words)

@@ -55,7 +55,12 @@ def test_nothing_has_no_order():
 
 @pytest.mark.parametrize(
     ("first", "second", "written"),
-    [(0.266, 0.033, ("0.266", "0.033")), (0.26634, 0.26571, ("0.2663", "0.2657")), (1.0, 1.0 + 1e-12, ("1", "1"))],
+    [
+        (0.266, 0.033, ("0.266", "0.033")),
+        (0.26634, 0.26571, ("0.2663", "0.2657")),
+        (1.0, 1.0 + 1e-12, ("1", "1")),
+        (4403, 62.0, ("4400", "62")),
+    ],
 )
 def test_numbers_that_a_sentence_compares_differ_as_they_are_written(first, second, written):
     assert apart(first, second) == written

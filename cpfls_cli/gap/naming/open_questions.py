@@ -325,13 +325,15 @@ def with_unnamed(
     step, counting = last, tuple[str, ...]()
     if names_of(named) != names_of(last.hypothesis.chosen):
         step = rank_effects(flights, named, effects, settings, rng)
-    vehicle, contain = found.hypothesis.vehicle, names_of(named).union(instead, *(each.effect.holds for each in named))
+    chosen = _beyond_chance(step, effects, settings, rng)
+    vehicle, contain = found.hypothesis.vehicle, names_of(named).union(*(each.effect.holds for each in named))
+    # A rival that explains more than chance next to the named ones is no rival.
+    contain |= instead - names_of(chosen)
     others = [
         (each.candidate, usual_size(each.candidate.effect, vehicle, len(each.coefficients)))
         for each in step.ranking
         if _is_other(each.candidate.effect, contain)
     ]
-    chosen = _beyond_chance(step, effects, settings, rng)
     # A formula bends by as much as it is; one that is 0 does not.
     pairs = [(each, np.abs(size)) for each, size in zip(named, found.estimates.of_effect, strict=True) if size.all()]
     sizes = {bend.name: (bend, size) for each, size in pairs for bend in bends_of([each], flights)}
@@ -345,7 +347,7 @@ def with_unnamed(
         chosen = _beyond_chance(bent, bends, settings, rng)
     unnamed, small = chosen[len(named) :], names_of([each for each, _ in others])
     wider = _averaged(found.estimates, *_with_others(found, others, step)) if others else found.estimates
-    # A lag is no torque or force of a usual size, and a rival is no small one: they are there as they are, or not.
+    # A lag is no torque or force of a usual size: it is there as it is, or not.
     as_they_are = [each for each in unnamed if each.effect.name not in small]
     if as_they_are:
         joint = fitted(flights, [*named, *as_they_are], found.floor, settings).estimates

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from tests.builders.artifacts import edited
 from tests.builders.shifted_flights import save
 
 
@@ -97,6 +98,11 @@ def test_a_flight_that_is_learned_from_is_not_held_out(cpfls, refuse, gap_config
     (message,) = refuse(*words, "--held-out", shifted[0])
     assert message.startswith(said)
     assert "flight_1.csv: is given twice, also as flight_1.csv" in cpfls(*words).stderr
+    # A file of an older version does not hold the files of its flights.
+    with edited(tmp_path / "d.h5") as older:
+        del older["files"]
+    (message,) = refuse(*words, "--held-out", shifted[0], "--force")
+    assert message.startswith(said)
 
 
 def test_all_numbers_that_differ_are_named_and_the_first_with_both_values(refuse, gap_config, pipeline, tmp_path):

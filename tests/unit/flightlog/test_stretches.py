@@ -78,3 +78,17 @@ def test_a_signal_that_falls_silent_is_said_with_place():
     assert warning.startswith("body_rate does not change on any axis from 5.02 s to 6.98 s: its source was silent")
     # One axis of three is not the whole sensor.
     assert warnings(flying(w0=silent["w0"])) == []
+
+
+def test_what_is_written_with_few_digits_and_hardly_moves_is_not_silent():
+    """In quiet hover rates of two decimals repeat on all axes for seconds."""
+    calm = np.abs(TIME - 6) < 1.5
+    quiet = {f"w{axis}": np.round(np.where(calm, 0.004, flying()[f"w{axis}"]), 2) for axis in range(3)}
+    after = np.flatnonzero(calm)[-1] + 1
+    for values in quiet.values():
+        values[after] = 0.01
+    assert warnings(flying(**quiet)) == []
+    # What goes on elsewhere was silent.
+    quiet["w0"][after] = 0.05
+    (warning,) = warnings(flying(**quiet))
+    assert warning.startswith("body_rate does not change on any axis")

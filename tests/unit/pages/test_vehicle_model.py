@@ -429,6 +429,7 @@ def test_the_log_that_a_flight_was_imported_from_is_one_that_was_learned_from():
     later = own._replace(name="two.h5", sha256="6" * 64, begins=9.0, ends=12.0)
     assert not [*seen_warnings("vehicle.h5", [own], [later])]
     refuse_seen([own], [later])
+    assert own._replace(ends=9.0 + 1e-13).shared_with(later) is None
     (said,) = seen_warnings("vehicle.h5", [own], [later._replace(begins=8.0)])
     assert said.startswith("two.h5: vehicle.h5 has learned from 8.0 to 9.0 s of its log")
     again = own._replace(name="two.h5", sha256="6" * 64)
@@ -439,8 +440,8 @@ def test_the_log_that_a_flight_was_imported_from_is_one_that_was_learned_from():
 
 
 def test_the_log_of_a_flight_is_kept_where_a_gap_was_found_in_it_too():
-    known = LearnedFlight("one.h5", "5" * 64, "cpfls/flight", 9, 9, "9" * 64)
-    again = known._replace(log="")
+    known = LearnedFlight("one.h5", "5" * 64, "cpfls/flight", 9, 9, "9" * 64, begins=1.0, ends=9.0)
+    again = known._replace(log="", begins=0.0, ends=0.0)
     assert joined_flights([again], [known]) == joined_flights([known], [again]) == (known,)
 
 
