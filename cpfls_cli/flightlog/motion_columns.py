@@ -199,7 +199,7 @@ def _turns_as_body(log: LogTable, angles: Named, rates: Named) -> bool:
     read, derived = log.on_grid(rates.group.columns), first_derivative(attitude, rate_hz)
     live = ~stands_still(log.grid, read)
     speed = np.linalg.norm(read - np.median(read, axis=0), axis=1)
-    # In a tumble an estimator is lost, and what stands still measures nothing.
+    # In a tumble an estimator is lost, and what repeats its last value measures nothing.
     calm = live & (speed < _TUMBLES * np.quantile(speed, 0.95))
     return any(rows.any() and _nearer_body(attitude[rows], derived[rows], read[rows], rate_hz) for rows in (live, calm))
 

@@ -144,7 +144,7 @@ def clipped(values: Array, lowest_limit: float) -> bool:
 
 
 def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
-    """Say where a signal that is measured stands still."""
+    """Warn of stretches in which a measured signal does not change."""
     known = np.isfinite(values).all(axis=1)
     time, marked = time[known], stands_still(time[known], values[known])
     if marked.any():
@@ -156,7 +156,7 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
 
 
 def stands_still(time: Array, values: Array) -> BoolArray:
-    """Mark where a signal that is measured stands still on all axes for far longer than between its updates.
+    """Mark where a measured signal does not change on any axis for far longer than between its updates.
 
     What is written with few digits and then goes on by no more than the last of them was within it, not silent.
     """

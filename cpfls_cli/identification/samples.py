@@ -30,7 +30,7 @@ _BEHIND = 10**6
 
 @dataclass
 class _Writer:
-    """Sums of products of lines, without what is zero or stands in a line already."""
+    """Sums of products of lines, without what is zero or the same as an earlier one."""
 
     free: int
     lines: int = 0

@@ -106,7 +106,7 @@ def what_is_logged(
         frame="" if frame is None else frame[0],
         rotors=recognition.rotors,
         date="" if not np.isfinite(flown_at) else datetime.fromtimestamp(flown_at, UTC).strftime("%Y-%m-%d %H:%M"),
-        # Each sample stands for the time up to the next.
+        # Each sample counts for the time up to the next.
         duration_s=float(flight.time[-1] - flight.time[0]) + 1 / flight.rate_hz,
         flown_s=float(flight.flown.sum() / flight.rate_hz),
         spans_s=np.array(spans).reshape(-1, 2),

@@ -15,7 +15,7 @@ from cpfls_cli.reduction.settings import CriterionName
 from cpfls_cli.reduction.survey import RowSpace, project
 from cpfls_cli.rounding import at_most, less, levelled
 
-# The six different elements of a symmetric 3 x 3 matrix, and where in it each of them stands.
+# The six different elements of a symmetric 3 x 3 matrix, and the place of each in it.
 _ELEMENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 _PLACES = (0, 1, 2, 1, 3, 4, 2, 4, 5)
 # A sample may be all that holds a direction; I - K is then singular.

@@ -232,10 +232,8 @@ class Judge:
 
     def _compared(self, judgement: Judgement, without: NamedFit, residual: Array) -> Without:
         """Compare a fit with the residual, shape (window, 6), that another one leaves of the same flights."""
-        there, unseen = (
-            system(without.hypothesis.shown_in(self.repaired), without.hypothesis.chosen),
-            judgement.held_out,
-        )
+        there = system(without.hypothesis.shown_in(self.repaired), without.hypothesis.chosen)
+        unseen = judgement.held_out
         squares = [((each / unseen.noise) ** 2) * unseen.known for each in (residual, unseen.after)]
         count = np.maximum(unseen.known.sum(axis=0), 1)
         difference, block = squares[0] - squares[1], block_index(there, without.settings)

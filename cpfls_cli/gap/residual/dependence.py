@@ -288,5 +288,5 @@ def _edges(signal: Array, bins: int) -> Array:
     if not len(signal):
         return np.linspace(0.0, 1.0, bins + 1)
     low, high = np.percentile(signal, [OUTER_PERCENT, 100 - OUTER_PERCENT])
-    # A signal that stands still still needs cells of some width.
+    # A signal that does not change needs cells of some width, too.
     return np.linspace(low, high if high > low else low + max(1e-9, 1e-9 * abs(low)), bins + 1)
