@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, groupby, pairwise, permutations
+from itertools import chain, combinations, groupby, pairwise, permutations
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -305,20 +305,30 @@ def small_effects(
 def _surest(
     learned: _Products, tried: Sequence[_Tried], named: Sequence[IntArray], rate: float
 ) -> tuple[_Tried | None, tuple[Alternative, ...]]:
-    """Choose the surest effect that no other one replaces, and its rivals: each does without the other one.
+    """Choose the surest effect that no others replace, and its rivals: each does without the other one.
 
-    Of these the first of the catalogue, which is the usual one. None where an effect with shapes is to be chosen: it
-    would have to be sought at all of them.
+    Two others may replace one that none of them replaces alone: inflow and rotor drag damp all rates. Of rivals the
+    first of the catalogue is chosen, which is the usual one. None where an effect with shapes is to be chosen: it would
+    have to be sought at all of them.
     """
     sure = ascending((each for each in tried if each.test.chance <= rate), lambda each: each.test.chance)
     if not sure or len(tried) * sure[0].test.chance > rate:
         return None, ()
+
+    def is_unneeded(one: int, *others: int) -> bool:
+        """Check whether one of the sure effects may be 0 where others are free."""
+        jointly = [*named, *(sure[other].own for other in others)]
+        return learned.tested(sure[one].candidate.effect, sure[one].own, jointly).chance > rate
+
     unneeded = np.zeros((len(sure), len(sure)), dtype=bool)
     for one, other in permutations(range(len(sure)), 2):
-        jointly = learned.tested(sure[one].candidate.effect, sure[one].own, [*named, sure[other].own])
-        unneeded[one, other] = jointly.chance > rate
+        unneeded[one, other] = is_unneeded(one, other)
     over_all = np.array([len(tried) * each.test.chance <= rate for each in sure])
     unbeaten = over_all & ~(unneeded & ~unneeded.T).any(axis=1)
+    for one in np.flatnonzero(unbeaten).tolist():
+        able = np.flatnonzero(over_all & ~unneeded[one] & ~unneeded[:, one])
+        pairs = ((a, b) for a, b in combinations(able[able != one].tolist(), 2) if is_unneeded(one, a, b))
+        unbeaten[one] = not any(not (is_unneeded(a, b, one) or is_unneeded(b, a, one)) for a, b in pairs)
     if not unbeaten.any():
         return None, ()
     alike = unneeded[best := int(np.argmax(unbeaten))] & unneeded[:, best]
