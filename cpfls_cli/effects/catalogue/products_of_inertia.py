@@ -32,6 +32,7 @@ EFFECT = Effect(
     rivals={
         "imu_misalignment": "compare roll on pitch with pitch on roll: products have one sign, misalignment has two",
         "rotor_gyroscopic": "repeat the roll rates with the yaw effort reversed: products stay",
+        "rotor_mismatch": "apply yaw effort at constant roll and pitch: rotors that differ then change the lift",
         "wind": "turn in yaw without rolling or pitching",
     },
     source="Newton-Euler equations; RotorPy and PX4 sih.cpp (Ixy, Ixz, Iyz)",

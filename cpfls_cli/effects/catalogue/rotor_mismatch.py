@@ -60,15 +60,32 @@ def _accounts(_number: str, values: Mapping[str, float]) -> float:
     return sum(abs(value) for name, value in values.items() if name.startswith("difference"))
 
 
+def _across(vehicle: VehicleSettings) -> Array:
+    """Compute the arms about x and y of the thrust that one spin has more than the other, shape (2, rotor), m.
+
+    Of an X each spin is on a diagonal: what it has more turns roll into pitch. A part along all arms about an axis
+    scales the torque about it as a wrong inertia does, and is left out: of a plus nothing else is there.
+    """
+    x, y, _ = np.array([rotor.position_m for rotor in vehicle.rotors]).T
+    spins = np.array([float(rotor.spin) for rotor in vehicle.rotors])
+    arms = np.array([y, -x])
+    own = (spins * arms**2).sum(axis=1) / np.maximum((arms**2).sum(axis=1), np.finfo(float).tiny)
+    across = spins * arms - own[:, None] * arms
+    return np.where(np.abs(across) > 1e-9 * np.abs(arms).max(), across, 0.0)
+
+
 def _acts(see: Instant, p: Numbers) -> Wrench:
     functions, drag = see.functions, see.rotor_drag
     modes = (functions.rotors(mode) for mode in gain_modes(see.vehicle).T.tolist())
     gain = sum(mode * p[name] for mode, name in zip(modes, _DIFFERENCES, strict=False))
     # A propeller that pulls less drags less.
     yaw = functions.total(drag * (p["drag_imbalance"] - see.spins * gain))
-    # What one spin has more than the other scales roll and pitch torque like a wrong inertia: only the force shows it.
     lift = p["lift_imbalance"] * functions.total(see.spins * see.rotor_thrust)
-    return Wrench((0, 0, yaw), (0, 0, lift), at_hubs=(0, 0, gain * see.rotor_thrust))
+    roll, pitch = (
+        p["lift_imbalance"] * functions.total(functions.rotors(arms) * see.rotor_thrust)
+        for arms in _across(see.vehicle).tolist()
+    )
+    return Wrench((roll, pitch, yaw), (0, 0, lift), at_hubs=(0, 0, gain * see.rotor_thrust))
 
 
 EFFECT = Effect(
@@ -97,7 +114,7 @@ EFFECT = Effect(
             "1",
             -0.25,
             0.25,
-            "counter-clockwise rotors pull this much more, the others less; force only",
+            "counter-clockwise rotors pull this much more, the others less; in an X this turns roll into pitch",
         ),
         # One weak rotor of many is a sum of four patterns.
         Coefficient("difference_3", "1", -0.5, 0.5, "from six rotors on, growth along x with the spin"),
@@ -110,6 +127,7 @@ EFFECT = Effect(
         "com_offset": "apply yaw effort: it loads one pair of rotors more than the other",
         "torque_bias": "change the thrust and apply yaw effort",
         "parameter_error": "apply yaw effort at constant roll and pitch",
+        "products_of_inertia": "apply yaw effort at constant roll and pitch: rotors that differ then change the lift",
     },
     source="rotor by rotor thrust factors in quad_race_env (tudelft) and SkyFlow",
     describe=_describe,

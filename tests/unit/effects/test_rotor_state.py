@@ -165,6 +165,42 @@ def test_what_one_spin_lifts_more_shows_in_force_only(columns, flight):
     np.testing.assert_allclose(true.body_torque - flight.torque, flight.torque * [-0.05, 0.05, 0.0], atol=1e-12)
 
 
+def crossed(number):
+    """Rotors between the axes, in turn on both sides of them and of both spins."""
+    places = circle(number).rotors
+    turn = np.pi / number
+    cos, sin = np.cos(turn), np.sin(turn)
+    hubs = [(cos * x - sin * y, sin * x + cos * y, z) for x, y, z in (each.position_m for each in places)]
+    return VehicleSettings(rotors=tuple(replace(each, position_m=at) for each, at in zip(places, hubs, strict=True)))
+
+
+def long_cross():
+    """An X whose arms are longer along x than along y."""
+    hubs = [(0.25, -0.15, 0.0), (-0.25, -0.15, 0.0), (-0.25, 0.15, 0.0), (0.25, 0.15, 0.0)]
+    return VehicleSettings(
+        rotors=tuple(RotorSettings(position_m=hub, spin=spin) for hub, spin in zip(hubs, (1, -1, 1, -1), strict=True))
+    )
+
+
+@pytest.mark.parametrize("craft", [crossed(4), long_cross()], ids=["X", "long X"])
+def test_what_one_spin_of_an_x_lifts_more_turns_roll_into_pitch(flight, craft):
+    """Which products of inertia would explain."""
+    efforts = 0.2 * flight.body_rate / np.abs(flight.body_rate).max(axis=0)
+    hubs, spins = np.array([each.position_m for each in craft.rotors]).T, [each.spin for each in craft.rotors]
+    squared = (
+        350.0**2
+        * np.column_stack([np.ones(len(flight)), efforts])
+        @ np.stack([np.ones(4), hubs[1] / 0.3, -hubs[0] / 0.3, spins])
+    )
+    flown = replace(flight, vehicle=craft, rotor_speed=np.sqrt(squared))
+    gains = 0.04 * np.array(spins)
+    true = body_wrench(with_gains(craft, gains), flown.rotor_speed)
+    found = CATALOGUE["rotor_mismatch"].columns(flown, {}).direct[..., 3] * 0.04
+    np.testing.assert_allclose(found[:, :2], (true.body_torque - flown.torque)[:, :2], atol=1e-12)
+    assert np.abs(found[:, :2]).max() > 0.01 * np.abs(flown.torque).max()
+    np.testing.assert_allclose(found[:, 5], true.thrust - flown.thrust, atol=1e-9)
+
+
 def test_pairs_face_each_other_and_spin_alike(vehicle):
     assert (opposite_pairs(vehicle), opposite_pairs(circle(6))) == (((0, 2), (1, 3)), ())
     beside = (
