@@ -33,6 +33,7 @@ class Coefficient:
     meaning: str
     scale: Callable[[VehicleSettings], float] | None = None  # Natural size on a vehicle, in `unit`; None for 1.
     of_log: bool = False  # Whether it is of the log, and not of the motion.
+    by_force: bool = False  # Whether flights without force do not identify it, so that it is 0 in them.
 
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the coefficient on a vehicle, in `unit`."""
@@ -165,6 +166,7 @@ class Effect:
     # What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
     # would do as well, or with those that others depend on as shapes, under the same names.
     exact: Effect | None = None
+    added: str = ""  # The effect that the numbers which `exact` adds are, where all others are 0.
     # ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
     # possible, a torque being no larger than its force on a lever as long as the body.
     lever: Callable[[Array, Array, VehicleSettings], BoolArray] | None = None

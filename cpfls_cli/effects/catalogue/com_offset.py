@@ -30,6 +30,7 @@ _EFFECT = Effect(
         "torque_bias": "change the thrust: a bias stays, the torque of an offset grows with thrust",
         "rotor_mismatch": "apply yaw effort: it loads one pair of rotors more than the other",
         "wind": "turn in yaw, and change the thrust",
+        "flapping_moment": "balance the vehicle on its side, which shows the height",
     },
     source="geometry; RotorPy (hub positions relative to the centre of mass)",
     of_all_forces=True,
@@ -41,4 +42,5 @@ _EFFECT = Effect(
 _HEIGHT = Coefficient(
     "c_z", "m", -0.4, 0.4, "true centre of mass, above that of the model; shown by forces across the rotors", scales.arm
 )
-EFFECT = replace(_EFFECT, exact=replace(_EFFECT, coefficients=(*_EFFECT.coefficients, _HEIGHT), columns=None))
+_EXACT = replace(_EFFECT, coefficients=(*_EFFECT.coefficients, _HEIGHT), columns=None)
+EFFECT = replace(_EFFECT, exact=_EXACT, added="flapping_moment")

@@ -115,6 +115,7 @@ EFFECT = Effect(
             -0.25,
             0.25,
             "counter-clockwise rotors pull this much more, the others less; in an X this turns roll into pitch",
+            by_force=True,
         ),
         # One weak rotor of many is a sum of four patterns.
         Coefficient("difference_3", "1", -0.5, 0.5, "from six rotors on, growth along x with the spin"),

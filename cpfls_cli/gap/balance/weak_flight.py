@@ -233,7 +233,11 @@ def columns_of(candidate: Candidate, signals: Signals) -> Columns:
     `candidate`: of an effect with columns; Result: shape (time, 6, coefficient).
     """
     assert candidate.effect.columns is not None, "only effects with columns are candidates"
-    return candidate.effect.columns(signals, candidate.shape)
+    columns = candidate.effect.columns(signals, candidate.shape)
+    hidden = [place for place, each in enumerate(candidate.effect.coefficients) if each.by_force]
+    if hidden and not signals.has_force:
+        columns.direct[..., hidden] = 0.0
+    return columns
 
 
 def nuisance() -> Candidate:

@@ -1,6 +1,6 @@
 """Causes of a gap: each chosen effect jointly with the others, faults of sensors, wrong parameters of the vehicle."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from cpfls_cli.gap.balance.weak_flight import WeakFlight
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, effect_sentence
 from cpfls_cli.gap.naming.ranking import RankedStep, Scored, likely, odds, rank_effects
 from cpfls_cli.gap.naming.results import Alternative, Estimate, LikelySet, NamedEffect
-from cpfls_cli.gap.naming.search import alternatives, chance_given_actuation, in_place_of
+from cpfls_cli.gap.naming.search import alternative, alternatives, chance_given_actuation, in_place_of
 from cpfls_cli.gap.settings import COUNTS, ERRORS, RARE, GapSettings
 from cpfls_cli.rounding import ascending
 from cpfls_cli.vehicle.settings import VehicleSettings
@@ -68,8 +68,16 @@ def judge_effects(found: NamedFit, effects: Sequence[Effect], rng: np.random.Gen
             compared = {
                 names: min(own_odds, also.get(names, own_odds), key=np.sum) for names, own_odds in compared.items()
             }
-        judged.append(JudgedEffect(effect, rivals, compared))
+        judged.append(JudgedEffect(effect, (*rivals, *_added_alone(candidate.effect, numbers)), compared))
     return judged
+
+
+def _added_alone(effect: Effect, numbers: Sequence[Estimate]) -> Iterator[Alternative]:
+    """Give the rival of an effect of which only what its exact form adds is surely not 0."""
+    plain = CATALOGUE[effect.name]
+    sure = {each.name for each in numbers if each.low > 0 or each.high < 0}
+    if plain.added and sure and not sure & {each.name for each in plain.coefficients}:
+        yield alternative(effect, CATALOGUE[plain.added], 1.0)
 
 
 def _rivals(
