@@ -283,14 +283,15 @@ def _significant(named: _Named, given: Instruments) -> _Named:
             refusals.append(refusal)
             fit = found.without([refusal.name])
             continue
-        kept = significant_effects(found, given)
+        kept = significant_effects(found, given, found.settings.significance)
         names = {each.effect.name for each, _ in kept}
         out = [each.effect for each in found.hypothesis.chosen if each.effect.name not in names]
         if not out:
             break
         fewer = fitted(judge.training, [each for each, _ in kept], found.floor, found.settings)
-        # A gap above the gusts is none of them: what it takes to explain it stays.
+        # A gap above the gusts is none of them: what it takes to explain it stays, with the p-value that it has.
         if (fewer.rms_floors > np.maximum(found.rms_floors, CLEAR)).any():
+            kept = significant_effects(found, given, 1.0)
             break
         for effect in out:
             what = "".join(f"all that it adds to {name}" for name in effect.holds & names) or "it"

@@ -222,12 +222,13 @@ def unidentified_axes(found: NamedFit, given: Instruments) -> BoolArray:
     return np.asarray(~np.any([np.zeros(3, dtype=bool), *found_by], axis=0))
 
 
-def significant_effects(found: NamedFit, given: Instruments) -> list[tuple[Candidate, float]]:
+def significant_effects(found: NamedFit, given: Instruments, most: float) -> list[tuple[Candidate, float]]:
     """Keep the effects that are not 0 by instruments, and what an effect holds where all else of it may be 0.
 
     Where an effect is 0, the residual without it does not correlate with its instruments. That is tested at its shapes
     instead of whether its numbers may be 0, which instruments may separate badly: a drag from the wind that it acts in.
-    With each comes the p-value; it is NaN for an effect without instruments, which is judged by its interval.
+    With each comes the p-value, `most` at most; it is NaN for an effect without instruments, which is judged by its
+    interval.
 
     Reference: Anderson and Rubin 1949 (a test that weak instruments do not mislead); Hotelling 1931.
     """
@@ -236,12 +237,12 @@ def significant_effects(found: NamedFit, given: Instruments) -> list[tuple[Candi
     for candidate, places in zip(found.hypothesis.chosen, places_of(found.hypothesis), strict=True):
         effect, (linear, shapes) = candidate.effect, (every[place] for place in places)
         chance = _chance_of(sources, linear, shapes, values)
-        if chance > found.settings.significance if np.isfinite(chance) else effect.name in nothing:
+        if chance > most if np.isfinite(chance) else effect.name in nothing:
             continue
         for held in (CATALOGUE[name] for name in effect.holds):
             known = {number.name for number in held.numbers}
             beyond = np.concatenate([linear, shapes])[[number.name not in known for number in effect.numbers]]
-            if _chance_of(sources, beyond, shapes[:0], values) > found.settings.significance:
+            if _chance_of(sources, beyond, shapes[:0], values) > most:
                 candidate = Candidate(held, {shape.name: candidate.shape[shape.name] for shape in held.shapes})
         significant.append((candidate, chance))
     return significant

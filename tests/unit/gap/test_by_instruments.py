@@ -101,7 +101,7 @@ def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that
         rng = np.random.default_rng(seed)
         sources = [result(true, found, 1.0 if knows else 0.03, rng), result(true, found, 1.0, rng)]
         monkeypatch.setattr(by_instruments, "_sources", lambda *_, those=sources: those)
-        stand.append([each.effect.name for each, _ in significant_effects(fit, None)])
+        stand.append([each.effect.name for each, _ in significant_effects(fit, None, fit.settings.significance)])
     assert stand.count(names) >= 17
 
 

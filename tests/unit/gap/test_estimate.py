@@ -7,9 +7,12 @@ from scipy.stats import permutation_test, wilcoxon
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import Equations, least_squares
-from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of
+from cpfls_cli.gap.balance.weak_flight import Candidate
+from cpfls_cli.gap.naming.causes import judge_effects
+from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of, fitted
 from cpfls_cli.gap.naming.ranking import chance_of_ranks, likely, off_by, within_bounds
 from cpfls_cli.gap.naming.results import Estimate
+from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
@@ -223,3 +226,17 @@ def test_a_column_that_shows_nothing_gets_0_and_not_its_rounding():
     matrix[:, [3, 8]] = 0.0
     found = least_squares(matrix, matrix @ np.ones(12) + rng.standard_normal(400))
     assert found[[3, 8]].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(("offset", "rivals"), [((0.0, 0.0), ["flapping_moment"]), ((0.01, 0.0), [])])
+def test_a_height_of_the_centre_of_mass_alone_may_be_a_moment_of_flapping(offset, rivals):
+    """Both follow the drag of the rotors."""
+    drag, plain, exact = candidate("rotor_drag"), candidate("com_offset"), Candidate(OFFSET.exact, {})
+    flown = [(drag, [2e-4]), (candidate("flapping_moment"), [6e-6]), (plain, offset)]
+    flights = [weak(fly(seed, flown, gyro=1e-4)) for seed in (1, 2)]
+    settings = GapSettings()
+    found = fitted(flights, [exact, drag], np.array([2e-3] * 3 + [2e-2] * 3), settings)
+    judged, _ = judge_effects(found, [OFFSET, drag.effect], np.random.default_rng(1))
+    height = judged.effect.numbers[2]
+    assert 0 < height.low < 0.03 < height.high
+    assert [each.name for each in judged.alternatives] == rivals

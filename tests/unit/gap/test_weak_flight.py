@@ -21,7 +21,7 @@ from cpfls_cli.gap.balance.weak_flight import (
 )
 from cpfls_cli.gap.naming.open_questions import bends_of
 from cpfls_cli.regressor.regressor import InertiaValues
-from cpfls_cli.vehicle.settings import VehicleSettings
+from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings
 from cpfls_cli.weak_form.windows import windows
 from tests.builders.gap_flights import THROUGH, VEHICLE, candidate, effect_wrench, fly, sines, weak
 
@@ -213,3 +213,15 @@ def test_force_is_what_an_accelerometer_feels_times_the_mass(known):
     given = {name: felt if isinstance(value, str) else value for name, value in known.items()}
     found = averaged(translation_balance(replace(FLIGHT, **given)))
     np.testing.assert_allclose(found, 6.0 * AVERAGED.average(felt), atol=2e-5)
+
+
+def test_a_number_that_only_force_identifies_is_0_where_there_is_none():
+    """What one spin of an X lifts more turns roll into pitch, by a torque that a hover hardly shows."""
+    angles = np.pi / 4 + np.pi / 2 * np.arange(4)
+    hubs = [(0.25 * float(np.cos(a)), 0.25 * float(np.sin(a)), 0.0) for a in angles]
+    rotors = tuple(RotorSettings(position_m=hub, spin=(-1) ** place) for place, hub in enumerate(hubs))
+    with_force = replace(fly(1), vehicle=VehicleSettings(rotors=rotors))
+    without = replace(with_force, velocity=None, acceleration=None, specific_force=None)
+    lift, *others = (columns_of(candidate("rotor_mismatch"), each).direct[..., 3] for each in (with_force, without))
+    assert np.abs(lift[:, :2]).max() > 0
+    assert not others[0].any()
