@@ -10,19 +10,29 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.blocks import half_width, jackknife_error
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.blocks import ENOUGH_BLOCKS, MOST_BLOCKS, contiguous, half_width, jackknife_error, leaving_out
 from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
-from cpfls_cli.inertia import FLAT, INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others, rescaled
+from cpfls_cli.effects.signals import Signals
+from cpfls_cli.inertia import (
+    FLAT,
+    INERTIA_PARAMETERS,
+    KNOWN,
+    MEASURED,
+    VISIBLE,
+    beyond_any_body,
+    more_than_others,
+    rescaled,
+)
 from cpfls_cli.playback.constants import Constants, UsedInstruments, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.evaluation import OF_A_WEIGHT, Group, JointNumbers
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import ANY, LoopBounds, loop_and_plain
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import INERTIA, LAG, LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -52,6 +62,10 @@ _AT_BOUND = 1e-6
 _STEP = 1e-5
 """Of central differences, in natural sizes."""
 
+
+_SAG = "battery_sag"
+_PIECE_S = 2.0
+"""Length of pieces over which thrust carries the weight: gusts and climbs are shorter, a discharge is longer."""
 
 _SI = About("estimate", unit="SI")
 _LOW, _HIGH = (About(f"{end} end of the 95 % interval", unit="SI") for end in ("lower", "upper"))
@@ -153,10 +167,15 @@ def find_vehicle(
     settings: PlaybackSettings,
     progress: Progress,
     kept: Kept = MappingProxyType({}),
+    battery: FoundNumber | None = None,
 ) -> VehicleFit:
-    """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`."""
+    """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`.
+
+    `battery`: with which power of the voltage their commands count, as `under_battery` has taken them.
+    """
     own = [flight for flight in flights if not flight.group]
     begun, sensed = carrying_weight(vehicle, own)
+    supply = _supply(battery)
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     choice, given = choose(begun, own, settings, progress, kept), instruments(own)
@@ -182,6 +201,7 @@ def find_vehicle(
     else:
         solved, spread = fitted, uncertainty(fitted, windows)
     model = replace(solved.model, vehicle=replace(solved.model.vehicle, unknown=()))
+    sensed = sensed if battery is None else (*sensed, battery)
     numbers = (*sensed, *bodily(begun, (*held.numbers, *found_numbers(solved, spread))))
     if constants is None:
         numbers = tuple(widened_by_loop(numbers, held.loop))
@@ -193,7 +213,7 @@ def find_vehicle(
     correlation = estimate_correlation(solved, spread)
     past = choice.complete and settings.history_s and not settings.quick
     return VehicleFit(
-        model=replace(model, gusts=None if gusts is None else gusts.gusts),
+        model=replace(model, gusts=None if gusts is None else gusts.gusts, effects=(*model.effects, *supply)),
         numbers=numbers,
         shares=shares,
         airspeed_m_s=airspeed,
@@ -209,11 +229,17 @@ def find_vehicle(
         differences=tuple(differences(fitted, uncertainty(fitted, windows))) if groups and not apart else (),
         loop=held.loop,
         instruments=None if constants is None else constants.used,
-        forecast=None if forecast is None else replace(forecast, vehicle=replace(forecast.vehicle, unknown=())),
+        forecast=None
+        if forecast is None
+        else replace(forecast, vehicle=replace(forecast.vehicle, unknown=()), effects=(*forecast.effects, *supply)),
         disturbance=gusts,
         history=find_history(choice.chosen, fitted, own, settings) if past else None,
         sources=given,
-        others={group.name: fitted.free.at(fitted.values, group.name).model for group in groups},
+        others={
+            group.name: replace(other, effects=(*other.effects, *supply))
+            for group in groups
+            for other in [fitted.free.at(fitted.values, group.name).model]
+        },
     )
 
 
@@ -311,23 +337,28 @@ def carrying_weight(
     """Replace the guess of the thrust factor by what carries the weight; a guessed drag factor scales with it.
 
     Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found
-    and returned: it is no longer unknown to the runs. Without one either, or where it feels no lift, nothing separates
-    thrust from weight, and the guess stays.
+    and returned: it is no longer unknown to the runs. So is one that is stated and that the accelerometer contradicts.
+    Without one either, or where it feels no lift, nothing separates thrust from weight, and the guess stays.
     """
-    if "thrust_factor" not in vehicle.unknown:
+    open_thrust, moves = "thrust_factor" in vehicle.unknown, all(flight.translates for flight in flights)
+    if not open_thrust and moves:
         return vehicle, ()
     squares = np.concatenate([(flight.speed**2).sum(axis=1) for flight in flights])
     if not squares.any():
         return vehicle, ()
-    moves = all(flight.translates for flight in flights)
     sensed = None if moves else _sensed_thrust_factor(vehicle, flights)
+    stated = float(np.mean([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors]))
+    if not open_thrust:
+        if sensed is None or sensed.low <= stated <= sensed.high or abs(np.log(sensed.value / stated)) < VISIBLE:
+            return vehicle, ()
+        sensed = sensed._replace(stated=stated)
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     thrust = weight / float(np.mean(squares)) if sensed is None else sensed.value
-    factor = thrust / float(np.mean([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors]))
+    factor = thrust / stated
     rotors = tuple(
         replace(
             rotor,
-            thrust_factor_n_s2=thrust,
+            thrust_factor_n_s2=thrust if open_thrust else factor * rotor.thrust_factor_n_s2,
             drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * (factor if "drag_factor" in vehicle.unknown else 1.0),
         )
         for rotor in vehicle.rotors
@@ -358,6 +389,62 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
         return None
     low, high = _interval(value, half, positive=True)
     return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < KNOWN * low, False)
+
+
+def battery_power(flights: Sequence[LoggedFlight]) -> FoundNumber | None:
+    """Find the power of the voltage with which the thrust of a command goes, by what carries the weight.
+
+    Over short pieces, the logarithm of the weight that squared commands carry, by velocity or else by accelerometer,
+    is regressed on those of voltage and squared commands: thrust that follows no square goes with the latter. None
+    where speeds are measured or a flight lacks the voltage, and where the power may be 0.
+    """
+    parts = [part for flight in flights for part in flight.parts]
+    if not all(part.commanded and part.rotor_speed is not None and part.voltage is not None for part in parts):
+        return None
+    rows = np.array([row for part in parts for row in _carried(part)])
+    if len(rows) < 2 * ENOUGH_BLOCKS or not np.isfinite(rows).all():
+        return None
+
+    def power(kept: BoolArray) -> Array:
+        return np.asarray(np.linalg.lstsq(np.column_stack([np.ones(kept.sum()), rows[kept, 1:]]), rows[kept, 0])[0])
+
+    blocks = min(len(rows) // 2, MOST_BLOCKS)
+    found, left_out = leaving_out(power, len(rows), blocks)
+    value, half = float(found[1]), float(half_width(jackknife_error(left_out), blocks)[1])
+    shape = CATALOGUE[_SAG].shapes[0]
+    if not half < value <= shape.grid[-1]:
+        return None
+    return FoundNumber(f"{_SAG}.{shape.name}", shape.unit, value, value - half, value + half, np.nan, True, False)
+
+
+def _carried(part: Signals) -> Iterator[tuple[float, float, float]]:
+    """Give by pieces logarithms: of what squared commands carry for their size, of the voltage, of these squares."""
+    squares = (part.speed**2).sum(axis=1)
+    velocity, force, volts = part.velocity, part.specific_force, part.voltage
+    assert volts is not None, "asked for"
+    piece = contiguous(len(part), max(1, round(len(part) * part.period / _PIECE_S)))
+    for number in range(piece[-1] + 1):
+        own = np.flatnonzero(piece == number)
+        if part.attitude is not None and velocity is not None:
+            upward, lift = part.rotation[own, 2, 2], velocity[own[[0, -1]], 2]
+            needed = part.vehicle.gravity_m_s2 + (lift[1] - lift[0]) / (part.time[own[-1]] - part.time[own[0]])
+        elif force is not None:
+            upward, needed = np.ones(len(own)), force[own, 2].mean()
+        else:
+            return
+        carries = float((squares[own] * upward).mean())
+        with np.errstate(invalid="ignore", divide="ignore"):
+            yield float(np.log(needed / carries)), float(np.log(volts[own].mean())), float(np.log(carries))
+
+
+def under_battery(flight: LoggedFlight, power: FoundNumber | None) -> PlaybackFlight:
+    """Give a flight whose commands count as with a full battery."""
+    acting = VehicleModel(vehicle=flight.parts[0].vehicle, effects=_supply(power)).acting
+    return replace(flight, parts=tuple(map(acting, flight.parts))).playback
+
+
+def _supply(power: FoundNumber | None) -> tuple[ModelEffect, ...]:
+    return () if power is None else (ModelEffect(_SAG, {power.name.partition(".")[2]: power.value}, np.zeros(0)),)
 
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
@@ -442,6 +529,7 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}
     factors["drag_factor"] = [1 / high[2], 1 / low[2]]
     carries = {"thrust_factor"} if LAW not in {number.name for number in numbers} else set[str]()
+    carries |= {number.name for number in numbers if number.name.startswith(_SAG)}
     for number in numbers:
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above
