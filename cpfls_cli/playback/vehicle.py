@@ -64,6 +64,8 @@ _STEP = 1e-5
 
 
 _SAG = "battery_sag"
+_LINEAR = 0.5
+"""Power of squared commands with which thrust rises that goes with the commands themselves."""
 _PIECE_S = 2.0
 """Length of pieces over which thrust carries the weight: gusts and climbs are shorter, a discharge is longer."""
 
@@ -167,15 +169,15 @@ def find_vehicle(
     settings: PlaybackSettings,
     progress: Progress,
     kept: Kept = MappingProxyType({}),
-    battery: FoundNumber | None = None,
+    commands: CommandedThrust | None = None,
 ) -> VehicleFit:
     """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`.
 
-    `battery`: with which power of the voltage their commands count, as `under_battery` has taken them.
+    `commands`: how the thrust of their commands goes; they are those of a full battery already.
     """
     own = [flight for flight in flights if not flight.group]
     begun, sensed = carrying_weight(vehicle, own)
-    supply = _supply(battery)
+    commands = commands or CommandedThrust()
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     choice, given = choose(begun, own, settings, progress, kept), instruments(own)
@@ -201,10 +203,11 @@ def find_vehicle(
     else:
         solved, spread = fitted, uncertainty(fitted, windows)
     model = replace(solved.model, vehicle=replace(solved.model.vehicle, unknown=()))
-    sensed = sensed if battery is None else (*sensed, battery)
+    sensed = sensed if commands.power is None else (*sensed, commands.power)
     numbers = (*sensed, *bodily(begun, (*held.numbers, *found_numbers(solved, spread))))
     if constants is None:
         numbers = tuple(widened_by_loop(numbers, held.loop))
+    numbers = tuple(widened_by_law(numbers, commands.rises))
     gusts: FoundGusts | None = None
     if constants is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
@@ -213,7 +216,7 @@ def find_vehicle(
     correlation = estimate_correlation(solved, spread)
     past = choice.complete and settings.history_s and not settings.quick
     return VehicleFit(
-        model=replace(model, gusts=None if gusts is None else gusts.gusts, effects=(*model.effects, *supply)),
+        model=replace(model, gusts=None if gusts is None else gusts.gusts, effects=(*model.effects, *commands.supply)),
         numbers=numbers,
         shares=shares,
         airspeed_m_s=airspeed,
@@ -231,12 +234,14 @@ def find_vehicle(
         instruments=None if constants is None else constants.used,
         forecast=None
         if forecast is None
-        else replace(forecast, vehicle=replace(forecast.vehicle, unknown=()), effects=(*forecast.effects, *supply)),
+        else replace(
+            forecast, vehicle=replace(forecast.vehicle, unknown=()), effects=(*forecast.effects, *commands.supply)
+        ),
         disturbance=gusts,
         history=find_history(choice.chosen, fitted, own, settings) if past else None,
         sources=given,
         others={
-            group.name: replace(other, effects=(*other.effects, *supply))
+            group.name: replace(other, effects=(*other.effects, *commands.supply))
             for group in groups
             for other in [fitted.free.at(fitted.values, group.name).model]
         },
@@ -391,37 +396,60 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
     return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < KNOWN * low, False)
 
 
-def battery_power(flights: Sequence[LoggedFlight]) -> FoundNumber | None:
-    """Find the power of the voltage with which the thrust of a command goes, by what carries the weight.
+class CommandedThrust(NamedTuple):
+    """How the thrust of commands goes with the voltage of the battery, and with the commands.
+
+    `power`: of the voltage; None where none is known. `rises`: ends of the power of squared commands with which it
+    rises, 1 for a square, one half for a line.
+    """
+
+    power: FoundNumber | None = None
+    rises: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def supply(self) -> tuple[ModelEffect, ...]:
+        """What takes commands to those of a full battery."""
+        own = self.power
+        return () if own is None else (ModelEffect(_SAG, {own.name.partition(".")[2]: own.value}, np.zeros(0)),)
+
+    def acting(self, flight: LoggedFlight) -> PlaybackFlight:
+        """Give a flight whose commands count as with a full battery."""
+        acting = VehicleModel(vehicle=flight.parts[0].vehicle, effects=self.supply).acting
+        return replace(flight, parts=tuple(map(acting, flight.parts))).playback
+
+
+def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
+    """Find how the thrust of commands goes with voltage and command, by what carries the weight.
 
     Over short pieces, the logarithm of the weight that squared commands carry, by velocity or else by accelerometer,
-    is regressed on those of voltage and squared commands: thrust that follows no square goes with the latter. None
-    where speeds are measured or a flight lacks the voltage, and where the power may be 0.
+    is regressed on those of the squared commands, and of the voltage where all flights know it.
     """
     parts = [part for flight in flights for part in flight.parts]
-    if not all(part.commanded and part.rotor_speed is not None and part.voltage is not None for part in parts):
-        return None
-    rows = np.array([row for part in parts for row in _carried(part)])
-    if len(rows) < 2 * ENOUGH_BLOCKS or not np.isfinite(rows).all():
-        return None
+    rows = np.array([row for part in parts if part.commanded for row in _carried(part)])
+    if len(rows) < 2 * ENOUGH_BLOCKS or not np.isfinite(rows[:, :2]).all():
+        return CommandedThrust()
+    known = rows if np.isfinite(rows).all() and np.ptp(rows[:, 2]) > 0 else rows[:, :2]
 
-    def power(kept: BoolArray) -> Array:
-        return np.asarray(np.linalg.lstsq(np.column_stack([np.ones(kept.sum()), rows[kept, 1:]]), rows[kept, 0])[0])
+    def powers(kept: BoolArray) -> Array:
+        return np.asarray(np.linalg.lstsq(np.column_stack([np.ones(kept.sum()), known[kept, 1:]]), known[kept, 0])[0])
 
     blocks = min(len(rows) // 2, MOST_BLOCKS)
-    found, left_out = leaving_out(power, len(rows), blocks)
-    value, half = float(found[1]), float(half_width(jackknife_error(left_out), blocks)[1])
+    found, left_out = leaving_out(powers, len(rows), blocks)
+    half = half_width(jackknife_error(left_out), blocks)
+    low, high = np.clip(1 + found[1] + half[1] * np.array([-1, 1]), _LINEAR, 1 / _LINEAR).tolist()
+    rises = min(low, 1.0), max(high, 1.0)
     shape = CATALOGUE[_SAG].shapes[0]
-    if not half < value <= shape.grid[-1]:
-        return None
-    return FoundNumber(f"{_SAG}.{shape.name}", shape.unit, value, value - half, value + half, np.nan, True, False)
+    if len(found) < 3 or not half[2] < found[2] <= shape.grid[-1]:
+        return CommandedThrust(None, rises)
+    ends = (float(found[2]), float(found[2] - half[2]), float(found[2] + half[2]))
+    return CommandedThrust(FoundNumber(f"{_SAG}.{shape.name}", shape.unit, *ends, np.nan, True, False), rises)
 
 
 def _carried(part: Signals) -> Iterator[tuple[float, float, float]]:
-    """Give by pieces logarithms: of what squared commands carry for their size, of the voltage, of these squares."""
-    squares = (part.speed**2).sum(axis=1)
-    velocity, force, volts = part.velocity, part.specific_force, part.voltage
-    assert volts is not None, "asked for"
+    """Give by pieces logarithms: of what squared commands carry for their size, of these squares, of the voltage."""
+    squares = (part.speed**2).sum(axis=1) if part.rotor_speed is not None else np.zeros(len(part))
+    velocity, force = part.velocity, part.specific_force
+    volts = np.full(len(part), np.nan) if part.voltage is None else part.voltage
     piece = contiguous(len(part), max(1, round(len(part) * part.period / _PIECE_S)))
     for number in range(piece[-1] + 1):
         own = np.flatnonzero(piece == number)
@@ -434,17 +462,7 @@ def _carried(part: Signals) -> Iterator[tuple[float, float, float]]:
             return
         carries = float((squares[own] * upward).mean())
         with np.errstate(invalid="ignore", divide="ignore"):
-            yield float(np.log(needed / carries)), float(np.log(volts[own].mean())), float(np.log(carries))
-
-
-def under_battery(flight: LoggedFlight, power: FoundNumber | None) -> PlaybackFlight:
-    """Give a flight whose commands count as with a full battery."""
-    acting = VehicleModel(vehicle=flight.parts[0].vehicle, effects=_supply(power)).acting
-    return replace(flight, parts=tuple(map(acting, flight.parts))).playback
-
-
-def _supply(power: FoundNumber | None) -> tuple[ModelEffect, ...]:
-    return () if power is None else (ModelEffect(_SAG, {power.name.partition(".")[2]: power.value}, np.zeros(0)),)
+            yield float(np.log(needed / carries)), float(np.log(carries)), float(np.log(volts[own].mean()))
 
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
@@ -539,6 +557,19 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
         known = ends[1] <= KNOWN * ends[0] if number.name in factors else not loop.misses
         identified = number.name in carries or (known and not loop.shows_loop)
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and identified)
+
+
+def widened_by_law(numbers: Sequence[FoundNumber], rises: tuple[float, float]) -> Iterator[FoundNumber]:
+    """Widen the intervals of the inertia by what is not known of the thrust of commands where no law was found.
+
+    Weight shows the thrust that carries it, and rotation how it changes over the moments of inertia.
+    """
+    lawless = LAW not in {number.name for number in numbers}
+    for number in numbers:
+        widened = lawless and number.name.startswith("inertia.")
+        low, high = (number.low * rises[0], number.high * rises[1]) if widened else number[3:5]
+        known = not widened or high <= KNOWN * low
+        yield number._replace(low=low, high=high, determined=number.determined and known)
 
 
 def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:

@@ -63,7 +63,7 @@ from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
-from cpfls_cli.playback.vehicle import Share, VehicleFit, battery_power, find_vehicle, under_battery
+from cpfls_cli.playback.vehicle import Share, VehicleFit, commanded_thrust, find_vehicle
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, legend_over, line, style_of
 from cpfls_cli.report.content import percent
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
@@ -410,10 +410,10 @@ def _found(
         if stop:
             raise SearchStoppedError
 
-    battery = battery_power([flight for flight in flights if not flight.group])
-    along = [under_battery(flight, battery) for flight in flights]
+    commands = commanded_thrust([flight for flight in flights if not flight.group])
+    along = [commands.acting(flight) for flight in flights]
     with settings_of("playback", study), watch.deferring():
-        vehicle = find_vehicle(study.vehicle, along, settings, progress, kept, battery)
+        vehicle = find_vehicle(study.vehicle, along, settings, progress, kept, commands)
     return vehicle, watch.signal
 
 
