@@ -421,32 +421,41 @@ class CommandedThrust(NamedTuple):
 def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
     """Find how the thrust of commands goes with voltage and command, by what carries the weight.
 
-    Over short pieces, the logarithm of the weight that squared commands carry, by velocity or else by accelerometer,
-    is regressed on those of the squared commands, and of the voltage where all flights know it.
+    Over short pieces, logarithms of what is carried, by velocity or else by accelerometer, and of the squared commands
+    are regressed on each other, and on that of the voltage where all flights know it. A loop that answers gusts leaves
+    the power of squared commands between the two (see `loop_bounds`).
     """
     parts = [part for flight in flights for part in flight.parts]
     rows = np.array([row for part in parts if part.commanded for row in _carried(part)])
     if len(rows) < 2 * ENOUGH_BLOCKS or not np.isfinite(rows[:, :2]).all():
         return CommandedThrust()
-    known = rows if np.isfinite(rows).all() and np.ptp(rows[:, 2]) > 0 else rows[:, :2]
+    known = np.isfinite(rows).all() and np.ptp(rows[:, 2]) > 0
+    carried, squares, volts = rows.T
+    apart = volts[:, None] if known else np.zeros((len(rows), 0))
 
     def powers(kept: BoolArray) -> Array:
-        return np.asarray(np.linalg.lstsq(np.column_stack([np.ones(kept.sum()), known[kept, 1:]]), known[kept, 0])[0])
+        def slopes(of: Array, by: Array) -> list[float]:
+            columns = np.column_stack([np.ones(len(rows)), by, apart])[kept]
+            return np.asarray(np.linalg.lstsq(columns, of[kept])[0])[1:].tolist()
+
+        # A supply acts on the command; gusts that the loop answers blur what is carried less than what carries it.
+        lowest, (rise, *supply) = slopes(carried, squares)[0], slopes(squares, carried)
+        return np.array([lowest, 1 / max(rise, _LINEAR), *(-own for own in supply)])
 
     blocks = min(len(rows) // 2, MOST_BLOCKS)
     found, left_out = leaving_out(powers, len(rows), blocks)
     half = half_width(jackknife_error(left_out), blocks)
-    low, high = np.clip(1 + found[1] + half[1] * np.array([-1, 1]), _LINEAR, 1 / _LINEAR).tolist()
+    low, high = np.clip([found[0] - half[0], found[1] + half[1]], _LINEAR, 1 / _LINEAR).tolist()
     rises = min(low, 1.0), max(high, 1.0)
     shape = CATALOGUE[_SAG].shapes[0]
-    if len(found) < 3 or not half[2] < found[2] <= shape.grid[-1]:
+    if not known or not half[2] < found[2] <= shape.grid[-1]:
         return CommandedThrust(None, rises)
     ends = (float(found[2]), float(found[2] - half[2]), float(found[2] + half[2]))
     return CommandedThrust(FoundNumber(f"{_SAG}.{shape.name}", shape.unit, *ends, np.nan, True, False), rises)
 
 
 def _carried(part: Signals) -> Iterator[tuple[float, float, float]]:
-    """Give by pieces logarithms: of what squared commands carry for their size, of these squares, of the voltage."""
+    """Give by pieces logarithms: of what is carried, of the squared commands that carry it, of the voltage."""
     squares = (part.speed**2).sum(axis=1) if part.rotor_speed is not None else np.zeros(len(part))
     velocity, force = part.velocity, part.specific_force
     volts = np.full(len(part), np.nan) if part.voltage is None else part.voltage
@@ -462,7 +471,7 @@ def _carried(part: Signals) -> Iterator[tuple[float, float, float]]:
             return
         carries = float((squares[own] * upward).mean())
         with np.errstate(invalid="ignore", divide="ignore"):
-            yield float(np.log(needed / carries)), float(np.log(carries)), float(np.log(volts[own].mean()))
+            yield float(np.log(needed)), float(np.log(carries)), float(np.log(volts[own].mean()))
 
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
