@@ -64,6 +64,8 @@ _STEP = 1e-5
 
 
 _SAG = "battery_sag"
+_CALIBRATED = 0.01
+"""Share of its weight that an accelerometer may be off by, as calibrated before a flight: 0.1 m/s^2."""
 _LINEAR = 0.5
 """Power of squared commands with which thrust rises that goes with the commands themselves."""
 _PIECE_S = 2.0
@@ -388,7 +390,8 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
     if not (left > 0).all():
         return None
     value = float(above.sum() / below.sum())
-    half = float(half_width(jackknife_error((above.sum() - above) / left), len(products)))
+    scatter = float(half_width(jackknife_error((above.sum() - above) / left), len(products)))
+    half = float(np.hypot(scatter, _CALIBRATED * value))
     # An accelerometer that is upside down, or noise, feels no lift.
     if value <= half:
         return None
@@ -436,7 +439,7 @@ def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
     def powers(kept: BoolArray) -> Array:
         def slopes(of: Array, by: Array) -> list[float]:
             columns = np.column_stack([np.ones(len(rows)), by, apart])[kept]
-            return np.asarray(np.linalg.lstsq(columns, of[kept])[0])[1:].tolist()
+            return [float(own) for own in np.linalg.lstsq(columns, of[kept])[0][1:]]
 
         # A supply acts on the command; gusts that the loop answers blur what is carried less than what carries it.
         lowest, (rise, *supply) = slopes(carried, squares)[0], slopes(squares, carried)
