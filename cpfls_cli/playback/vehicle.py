@@ -165,13 +165,46 @@ class VehicleFit:
         return self.loop.misses and self.instruments is None
 
 
+class CommandedThrust(NamedTuple):
+    """How the thrust of commands goes with the voltage of the battery, and with the commands.
+
+    `power`: of the voltage; None where none is known. `rises`: ends of the power of squared commands with which it
+    rises, 1 for a square, one half for a line.
+    """
+
+    power: FoundNumber | None = None
+    rises: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def supply(self) -> tuple[ModelEffect, ...]:
+        """What takes commands to those of a full battery."""
+        return tuple(ModelEffect(_SAG, {own.name.partition(".")[2]: own.value}, np.zeros(0)) for own in self.numbers)
+
+    @property
+    def numbers(self) -> tuple[FoundNumber, ...]:
+        """What was found."""
+        return () if self.power is None else (self.power,)
+
+    def whole(self, model: VehicleModel) -> VehicleModel:
+        """Let a model take commands as they are logged."""
+        return replace(model, effects=(*model.effects, *self.supply))
+
+    def acting(self, flight: LoggedFlight) -> PlaybackFlight:
+        """Give a flight whose commands count as with a full battery."""
+        acting = self.whole(VehicleModel(vehicle=flight.parts[0].vehicle)).acting
+        return replace(flight, parts=tuple(map(acting, flight.parts))).playback
+
+
+_AS_COMMANDED = CommandedThrust()
+
+
 def find_vehicle(
     vehicle: VehicleSettings,
     flights: Sequence[PlaybackFlight],
     settings: PlaybackSettings,
     progress: Progress,
     kept: Kept = MappingProxyType({}),
-    commands: CommandedThrust | None = None,
+    commands: CommandedThrust = _AS_COMMANDED,
 ) -> VehicleFit:
     """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`.
 
@@ -179,7 +212,6 @@ def find_vehicle(
     """
     own = [flight for flight in flights if not flight.group]
     begun, sensed = carrying_weight(vehicle, own)
-    commands = commands or CommandedThrust()
     flown = {flight.group for flight in flights}
     groups = tuple(Group(group.name, group.differs or OF_A_WEIGHT) for group in settings.groups if group.name in flown)
     choice, given = choose(begun, own, settings, progress, kept), instruments(own)
@@ -204,8 +236,8 @@ def find_vehicle(
         tried = (*tried, choice.judge("held", solved, own, settings))
     else:
         solved, spread = fitted, uncertainty(fitted, windows)
-    model = replace(solved.model, vehicle=replace(solved.model.vehicle, unknown=()))
-    sensed = sensed if commands.power is None else (*sensed, commands.power)
+    model = _known(solved.model)
+    sensed = (*sensed, *commands.numbers)
     numbers = (*sensed, *bodily(begun, (*held.numbers, *found_numbers(solved, spread))))
     if constants is None:
         numbers = tuple(widened_by_loop(numbers, held.loop))
@@ -218,7 +250,7 @@ def find_vehicle(
     correlation = estimate_correlation(solved, spread)
     past = choice.complete and settings.history_s and not settings.quick
     return VehicleFit(
-        model=replace(model, gusts=None if gusts is None else gusts.gusts, effects=(*model.effects, *commands.supply)),
+        model=replace(commands.whole(model), gusts=None if gusts is None else gusts.gusts),
         numbers=numbers,
         shares=shares,
         airspeed_m_s=airspeed,
@@ -234,20 +266,16 @@ def find_vehicle(
         differences=tuple(differences(fitted, uncertainty(fitted, windows))) if groups and not apart else (),
         loop=held.loop,
         instruments=None if constants is None else constants.used,
-        forecast=None
-        if forecast is None
-        else replace(
-            forecast, vehicle=replace(forecast.vehicle, unknown=()), effects=(*forecast.effects, *commands.supply)
-        ),
+        forecast=None if forecast is None else commands.whole(_known(forecast)),
         disturbance=gusts,
         history=find_history(choice.chosen, fitted, own, settings) if past else None,
         sources=given,
-        others={
-            group.name: replace(other, effects=(*other.effects, *commands.supply))
-            for group in groups
-            for other in [fitted.free.at(fitted.values, group.name).model]
-        },
+        others={group.name: commands.whole(fitted.free.at(fitted.values, group.name).model) for group in groups},
     )
+
+
+def _known(model: VehicleModel) -> VehicleModel:
+    return replace(model, vehicle=replace(model.vehicle, unknown=()))
 
 
 def _identified(
@@ -397,28 +425,6 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
         return None
     low, high = _interval(value, half, positive=True)
     return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < KNOWN * low, False)
-
-
-class CommandedThrust(NamedTuple):
-    """How the thrust of commands goes with the voltage of the battery, and with the commands.
-
-    `power`: of the voltage; None where none is known. `rises`: ends of the power of squared commands with which it
-    rises, 1 for a square, one half for a line.
-    """
-
-    power: FoundNumber | None = None
-    rises: tuple[float, float] = (1.0, 1.0)
-
-    @property
-    def supply(self) -> tuple[ModelEffect, ...]:
-        """What takes commands to those of a full battery."""
-        own = self.power
-        return () if own is None else (ModelEffect(_SAG, {own.name.partition(".")[2]: own.value}, np.zeros(0)),)
-
-    def acting(self, flight: LoggedFlight) -> PlaybackFlight:
-        """Give a flight whose commands count as with a full battery."""
-        acting = VehicleModel(vehicle=flight.parts[0].vehicle, effects=self.supply).acting
-        return replace(flight, parts=tuple(map(acting, flight.parts))).playback
 
 
 def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
