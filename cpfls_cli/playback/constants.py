@@ -33,8 +33,6 @@ _LONGEST_S = 8.0
 """Length from which on a run identifies something in all bands."""
 _NOT_TRIED = "slow_actuation"
 """It answers for whatever is slow, and is no constant of the vehicle."""
-_LAW = "thrust_law"
-"""Of commands: at a measured speed a propeller pulls by its square."""
 _STEPS, _SETTLED = 12, 1e-3
 """Of an estimate, and natural sizes of a step that is none any more."""
 _LEAST = 1e-6
@@ -275,8 +273,8 @@ def find_constants(
     if len(periods) > 1 or len(fitting_bands(max(periods))) < len(BANDS) - 1:
         return None
     translates = all(flight.translates for flight in flights)
-    # Next to gusts along z, whose drag none of the blocks has, a law joins that measured speeds do not have.
-    measured = set[str]() if any(flight.commanded for flight in flights) else {_LAW}
+    # At a measured speed a propeller pulls by its square; next to gusts along z another law would join.
+    measured = set[str]() if any(flight.commanded for flight in flights) else {"thrust_law"}
     tried = [
         block
         for block in blocks_of(vehicle)

@@ -309,11 +309,8 @@ class VehicleModel:
             signals = replace(signals, wind=np.array(self.wind))
         if signals.voltage is not None and {signals.full_voltage, self.full_voltage}.isdisjoint({1.0}):
             # The fullest battery of other flights is another one.
-            signals = replace(
-                signals,
-                voltage=signals.voltage * (signals.full_voltage / self.full_voltage),
-                full_voltage=self.full_voltage,
-            )
+            share = signals.voltage * (signals.full_voltage / self.full_voltage)
+            signals = replace(signals, voltage=share, full_voltage=self.full_voltage)
         for one in self.filters:
             apply = one.effect.apply
             if apply is not None and not one.effect.missing(signals):

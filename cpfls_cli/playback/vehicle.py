@@ -14,16 +14,7 @@ from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, MOST_BLOCKS, contiguous, half_width, jackknife_error, leaving_out
 from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
 from cpfls_cli.effects.signals import Signals
-from cpfls_cli.inertia import (
-    FLAT,
-    INERTIA_PARAMETERS,
-    KNOWN,
-    MEASURED,
-    VISIBLE,
-    beyond_any_body,
-    more_than_others,
-    rescaled,
-)
+from cpfls_cli.inertia import FLAT, INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others, rescaled
 from cpfls_cli.playback.constants import Constants, UsedInstruments, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.evaluation import OF_A_WEIGHT, Group, JointNumbers
@@ -168,26 +159,17 @@ class VehicleFit:
 class CommandedThrust(NamedTuple):
     """How the thrust of commands goes with the voltage of the battery, and with the commands.
 
-    `power`: of the voltage; None where none is known. `rises`: ends of the power of squared commands with which it
-    rises, 1 for a square, one half for a line.
+    `numbers`: the power of the voltage, where one is known. `rises`: ends of the power of squared commands with which
+    it rises, 1 for a square, one half for a line.
     """
 
-    power: FoundNumber | None = None
+    numbers: tuple[FoundNumber, ...] = ()
     rises: tuple[float, float] = (1.0, 1.0)
 
-    @property
-    def supply(self) -> tuple[ModelEffect, ...]:
-        """What takes commands to those of a full battery."""
-        return tuple(ModelEffect(_SAG, {own.name.partition(".")[2]: own.value}, np.zeros(0)) for own in self.numbers)
-
-    @property
-    def numbers(self) -> tuple[FoundNumber, ...]:
-        """What was found."""
-        return () if self.power is None else (self.power,)
-
     def whole(self, model: VehicleModel) -> VehicleModel:
-        """Let a model take commands as they are logged."""
-        return replace(model, effects=(*model.effects, *self.supply))
+        """Let a model with known numbers take commands as they are logged."""
+        sags = (ModelEffect(_SAG, {own.name.partition(".")[2]: own.value}, np.zeros(0)) for own in self.numbers)
+        return replace(model, vehicle=replace(model.vehicle, unknown=()), effects=(*model.effects, *sags))
 
     def acting(self, flight: LoggedFlight) -> PlaybackFlight:
         """Give a flight whose commands count as with a full battery."""
@@ -236,12 +218,11 @@ def find_vehicle(
         tried = (*tried, choice.judge("held", solved, own, settings))
     else:
         solved, spread = fitted, uncertainty(fitted, windows)
-    model = _known(solved.model)
-    sensed = (*sensed, *commands.numbers)
-    numbers = (*sensed, *bodily(begun, (*held.numbers, *found_numbers(solved, spread))))
+    model = commands.whole(solved.model)
+    of_fit = bodily(begun, (*held.numbers, *found_numbers(solved, spread)))
+    numbers = tuple(widened_by_law((*sensed, *commands.numbers, *of_fit), commands.rises))
     if constants is None:
         numbers = tuple(widened_by_loop(numbers, held.loop))
-    numbers = tuple(widened_by_law(numbers, commands.rises))
     gusts: FoundGusts | None = None
     if constants is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
@@ -250,13 +231,13 @@ def find_vehicle(
     correlation = estimate_correlation(solved, spread)
     past = choice.complete and settings.history_s and not settings.quick
     return VehicleFit(
-        model=replace(commands.whole(model), gusts=None if gusts is None else gusts.gusts),
+        model=replace(model, gusts=None if gusts is None else gusts.gusts),
         numbers=numbers,
         shares=shares,
         airspeed_m_s=airspeed,
         trades=(*held.trades, *_trades(solved.free.physical(solved.values), correlation)),
         # What was sensed, or is held, goes with no number of the fit.
-        correlation=block_diag(np.eye(len(sensed)), held.correlation, correlation),
+        correlation=block_diag(np.eye(len((*sensed, *commands.numbers))), held.correlation, correlation),
         structures=tried,
         evaluated=choice.evaluated,
         complete=choice.complete,
@@ -266,16 +247,12 @@ def find_vehicle(
         differences=tuple(differences(fitted, uncertainty(fitted, windows))) if groups and not apart else (),
         loop=held.loop,
         instruments=None if constants is None else constants.used,
-        forecast=None if forecast is None else commands.whole(_known(forecast)),
+        forecast=None if forecast is None else commands.whole(forecast),
         disturbance=gusts,
         history=find_history(choice.chosen, fitted, own, settings) if past else None,
         sources=given,
         others={group.name: commands.whole(fitted.free.at(fitted.values, group.name).model) for group in groups},
     )
-
-
-def _known(model: VehicleModel) -> VehicleModel:
-    return replace(model, vehicle=replace(model.vehicle, unknown=()))
 
 
 def _identified(
@@ -384,7 +361,7 @@ def carrying_weight(
     sensed = None if moves else _sensed_thrust_factor(vehicle, flights)
     stated = float(np.mean([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors]))
     if not open_thrust:
-        if sensed is None or sensed.low <= stated <= sensed.high or abs(np.log(sensed.value / stated)) < VISIBLE:
+        if sensed is None or sensed.low <= stated <= sensed.high:
             return vehicle, ()
         sensed = sensed._replace(stated=stated)
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
@@ -458,9 +435,9 @@ def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
     rises = min(low, 1.0), max(high, 1.0)
     shape = CATALOGUE[_SAG].shapes[0]
     if not known or not half[2] < found[2] <= shape.grid[-1]:
-        return CommandedThrust(None, rises)
+        return CommandedThrust((), rises)
     ends = (float(found[2]), float(found[2] - half[2]), float(found[2] + half[2]))
-    return CommandedThrust(FoundNumber(f"{_SAG}.{shape.name}", shape.unit, *ends, np.nan, True, False), rises)
+    return CommandedThrust((FoundNumber(f"{_SAG}.{shape.name}", shape.unit, *ends, np.nan, True, False),), rises)
 
 
 def _carried(part: Signals) -> Iterator[tuple[float, float, float]]:

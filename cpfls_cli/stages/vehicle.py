@@ -430,8 +430,7 @@ def _judged(
     behind = any(flight.parts[0].commanded for flight in training)
     shares = any(flight.shares for flight in training)
     own = {each.name: getattr(found, each.name) for each in fields(found)}
-    volts = flights[0].parts[0].full_voltage
-    known = {"commanded": behind, "full_voltage": volts}
+    known = {"commanded": behind, "full_voltage": flights[0].parts[0].full_voltage}
     own |= {name: replace(own[name], **known) for name in ("model", "forecast") if own[name] is not None}
     responses = mismatches(_responses(found, training), instrumented=found.instruments is not None)
     return Vehicle(

@@ -112,12 +112,12 @@ def test_an_accelerometer_that_feels_no_lift_leaves_the_thrust_factor_open(sense
         assert rotor.thrust_factor_n_s2 * squares.mean() == pytest.approx(weight)
 
 
-@pytest.mark.parametrize("off", [0.75, 1.3, 1.03])
+@pytest.mark.parametrize("off", [0.75, 1.3, 1.005])
 def test_a_stated_thrust_factor_gives_way_to_an_accelerometer_that_contradicts_it(off):
     flights = without_velocity(flown(TRUE, noise=MIDDLING, seed=2, hold="linear"), accelerometer=True)
     true = TRUE.vehicle.rotors[0].thrust_factor_n_s2
     vehicle, sensed = carrying_weight(replace(TRUE.vehicle, rotors=with_thrust(off * true)), flights)
-    if abs(off - 1) < 0.05:
+    if abs(off - 1) < 0.01:
         assert sensed == ()
     else:
         (number,) = sensed
@@ -171,20 +171,21 @@ def emptying(*, power=2.0, linear=0.3, gust=0.5, sensor="velocity", voltage=True
 @pytest.mark.parametrize(("power", "gust"), [(1.6, 0.0), (2.0, 0.5), (2.4, 0.5)])
 def test_what_carries_the_weight_shows_how_commands_go_with_the_voltage(power, gust, sensor):
     found = commanded_thrust([emptying(power=power, gust=gust, sensor=sensor)])
-    assert found.power.low <= power <= found.power.high
-    assert found.power.high - found.power.low < (0.1 if gust == 0.0 else 1.2)
+    (number,) = found.numbers
+    assert number.low <= power <= number.high
+    assert number.high - number.low < (0.1 if gust == 0.0 else 1.2)
     # A square that is 30 % linear, at 40 % of the largest command.
     low, high = found.rises
     assert low - 0.01 <= (0.5 * 0.3 + 0.7 * 0.4) / (0.3 + 0.7 * 0.4) <= high
     flight = emptying(power=power, gust=gust, sensor=sensor)
-    full = flight.parts[0].voltage[:, None] ** (found.power.value / 2) * flight.playback.speed
+    full = flight.parts[0].voltage[:, None] ** (number.value / 2) * flight.playback.speed
     np.testing.assert_allclose(found.acting(flight).speed, full)
 
 
 def test_where_speeds_are_measured_or_no_voltage_is_known_commands_count_as_they_are():
     assert commanded_thrust([emptying(commanded=False)]) == CommandedThrust()
-    assert commanded_thrust([emptying(voltage=False)]).power is None
-    assert commanded_thrust([emptying(power=0.0)]).power is None
+    assert commanded_thrust([emptying(voltage=False)]).numbers == ()
+    assert commanded_thrust([emptying(power=0.0)]).numbers == ()
 
 
 def test_an_inertia_of_commands_is_as_open_as_their_law():
