@@ -227,8 +227,7 @@ def find_vehicle(
     if constants is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
         gusts = find_gusts(model, given, determined, identified=constants is not None)
-    shares, airspeed = _shares(model, own)
-    correlation = estimate_correlation(solved, spread)
+    (shares, airspeed), correlation = _shares(model, own), estimate_correlation(solved, spread)
     past = choice.complete and settings.history_s and not settings.quick
     return VehicleFit(
         model=replace(model, gusts=None if gusts is None else gusts.gusts),
