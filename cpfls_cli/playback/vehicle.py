@@ -412,7 +412,7 @@ def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
     """
     parts = [part for flight in flights for part in flight.parts]
     rows = np.array([row for part in parts if part.commanded for row in _carried(part)])
-    if len(rows) < 2 * ENOUGH_BLOCKS or not np.isfinite(rows[:, :2]).all():
+    if len(rows) < ENOUGH_BLOCKS or not np.isfinite(rows[:, :2]).all():
         return CommandedThrust()
     known = np.isfinite(rows).all() and np.ptp(rows[:, 2]) > 0
     carried, squares, volts = rows.T
@@ -427,7 +427,7 @@ def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
         lowest, (rise, *supply) = slopes(carried, squares)[0], slopes(squares, carried)
         return np.array([lowest, 1 / max(rise, _LINEAR), *(-own for own in supply)])
 
-    blocks = min(len(rows) // 2, MOST_BLOCKS)
+    blocks = min(max(len(rows) // 2, ENOUGH_BLOCKS), MOST_BLOCKS)
     found, left_out = leaving_out(powers, len(rows), blocks)
     half = half_width(jackknife_error(left_out), blocks)
     low, high = np.clip([found[0] - half[0], found[1] + half[1]], _LINEAR, 1 / _LINEAR).tolist()
