@@ -55,6 +55,7 @@ class Signals:
     stated_torque: Array | None = None  # Shape (time, 3), N m, body frame: torque of a log that has no rotor speeds.
     stated_thrust: Array | None = None  # Shape (time,), N: thrust of such a log.
     voltage: Array | None = None  # Shape (time,): as a fraction of the full battery.
+    full_voltage: float = 1.0  # V: what it is a fraction of; 1 where the log states fractions.
     ground_height_m: float = 0.0  # Height of the ground in the world frame.
     wind: Array | None = None  # Shape (3,), m/s, world frame: None for still air.
     # Shape (time, 6), N m and N, body frame: torque and force of a known model beyond the squares of its rotor speeds.

@@ -486,7 +486,7 @@ def largest_volts(signals: Signals, units: Mapping[str, str]) -> float:
 def of_full_battery(signals: Signals, units: Mapping[str, str], full: float) -> Signals:
     """Take a voltage in V as a share of that of a full battery."""
     volts = largest_volts(signals, units)
-    return replace(signals, voltage=np.asarray(signals.voltage) / full) if volts else signals
+    return replace(signals, voltage=np.asarray(signals.voltage) / full, full_voltage=full) if volts else signals
 
 
 @dataclass(frozen=True)

@@ -94,8 +94,8 @@ class PlaybackFlight:
     (time, rotor), and what it is between samples; without attitude or velocity rotation alone is played back; `wrench`:
     stated torque and force of a flight without rotor speeds, which are then 0, shape (time, 6), N m and N, body frame;
     `specific_force`: of an accelerometer, m/s^2, body frame; `setpoints`: those of `Signals` that are known in all
-    stretches; `group`: configuration of the vehicle that flew it, empty for the one of the config; `rotor_span_s`: of
-    `Signals`.
+    stretches; `group`: configuration of the vehicle that flew it, empty for the one of the config; `rotor_span_s`,
+    `commanded`: of `Signals`.
     """
 
     name: str
@@ -111,6 +111,7 @@ class PlaybackFlight:
     setpoints: Mapping[str, Array] = field(default_factory=dict)
     group: str = ""
     rotor_span_s: float = 0.0
+    commanded: bool = False
 
     def __len__(self) -> int:
         return len(self.speed)
@@ -243,6 +244,7 @@ def playback_flight(parts: Sequence[Signals], hold: Hold) -> PlaybackFlight:
             if all(name in part.setpoints for part in parts)
         },
         rotor_span_s=first.rotor_span_s,
+        commanded=first.commanded,
     )
 
 

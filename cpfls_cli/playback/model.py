@@ -198,6 +198,9 @@ class VehicleModel:
     hold: Hold | None = about(
         "what a command is between samples, where the response was found so: linear or previous", default=None
     )
+    full_voltage: float = about(
+        "what the voltages of its flights are shares of; 1 for shares alone", unit="V", least=0.0, default=1.0
+    )
     repairs: Audit | None = part(default=None)
     """Faults of the sensors, which are taken out of signals first."""
     gusts: Gusts | None = part(default=None)
@@ -304,6 +307,10 @@ class VehicleModel:
             signals = replace(signals, vehicle=self.vehicle)
         if any(self.wind):
             signals = replace(signals, wind=np.array(self.wind))
+        if signals.voltage is not None and {signals.full_voltage, self.full_voltage}.isdisjoint({1.0}):
+            # The fullest battery of other flights is another one.
+            share = signals.voltage * (signals.full_voltage / self.full_voltage)
+            signals = replace(signals, voltage=share, full_voltage=self.full_voltage)
         for one in self.filters:
             apply = one.effect.apply
             if apply is not None and not one.effect.missing(signals):

@@ -164,7 +164,8 @@ def made_ready(model: VehicleModel, flight: LoggedFlight) -> tuple[PlaybackFligh
     for part in repaired:
         model.require(part, flight.name)
     parts = [model.acting(part) for part in repaired]
-    filtered = any(not one.effect.missing(part) for one in model.filters for part in repaired)
+    slowed = (one for one in model.filters if one.effect.is_lag)
+    filtered = any(not one.effect.missing(part) for one in slowed for part in repaired)
     # What a filter leaves of a speed that stays until the next sample is nearer to a straight line.
     made = playback_flight(parts, "linear" if filtered else model.hold_of(parts[0], flight.hold))
     return replace(made, group=flight.group), player_of(model, made, parts)

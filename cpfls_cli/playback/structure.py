@@ -59,7 +59,8 @@ what is predicted near the bound is right within a tenth or two."""
 _PREDICTED = 1e-3
 """Share of the error that a further block is predicted to take away at least."""
 
-_ACTUATION = ("lag", "delay", "slow_actuation")
+_SLOW = "slow_actuation"
+_ACTUATION = ("lag", "delay", _SLOW)
 """Blocks between command and rotor, in whose numbers the error is far from quadratic: each leads to a minimum of its
 own, and what it gains is not predicted."""
 
@@ -381,7 +382,7 @@ def choose(
 _HELD = ("thrust_factor", "drag_factor", "thrust_law", INERTIA, PRODUCTS)
 """Blocks that make up for a body that is off, if they can."""
 
-_OF_A_LOOP = ("slow_actuation", *LEARNED)
+_OF_A_LOOP = (_SLOW, *LEARNED)
 """Blocks that explain what an autopilot does against gusts."""
 
 
@@ -504,11 +505,16 @@ def _judge_more(bench: _Bench, best: Judged, blocks: tuple[str, ...]) -> None:
 
 
 def _judge_other(bench: _Bench, choice: Judged, blocks: tuple[str, ...]) -> None:
-    """Judge the choice with other rules of what is learned, and with an effect in its place.
+    """Judge the choice with other rules of what is learned, with an effect in its place, and with a plain response.
 
-    What is learned can stand for several effects; none of them alone may then gain anything jointly with it.
+    What is learned can stand for several effects; none of them alone may then gain anything jointly with it. A slow
+    part that overshoots is what a lag and a delay are together, and neither may gain anything alone.
     """
     structure = choice.structure
+    plain = {*_ACTUATION} - {_SLOW}
+    if _SLOW in structure.blocks and plain <= {*blocks}:
+        kept = ({*structure.blocks} | plain) - {_SLOW}
+        bench.judge(structure._replace(blocks=tuple(block for block in blocks if block in kept)))
     absent = [block for block in blocks if needs_velocity(block) and block not in (*structure.blocks, *LEARNED)]
     for learned in (block for block in structure.blocks if block in LEARNED):
         named = [_with(_with(structure, learned, blocks), effect, blocks) for effect in absent]

@@ -10,19 +10,20 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from cpfls_cli.arrays import Array
-from cpfls_cli.blocks import half_width, jackknife_error
+from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.blocks import ENOUGH_BLOCKS, MOST_BLOCKS, contiguous, half_width, jackknife_error, leaving_out
 from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.inertia import FLAT, INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others, rescaled
 from cpfls_cli.playback.constants import Constants, UsedInstruments, find_constants
 from cpfls_cli.playback.disturbance import FoundGusts, find_gusts
 from cpfls_cli.playback.evaluation import OF_A_WEIGHT, Group, JointNumbers
 from cpfls_cli.playback.fit import BLOCKS, Fitted, Uncertainty, uncertainty
-from cpfls_cli.playback.flight import PlaybackFlight
+from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import ANY, LoopBounds, loop_and_plain
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import INERTIA, LAG, LAW, ROOM, Physical, needs_velocity
 from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import PlaybackSettings
@@ -52,6 +53,14 @@ _AT_BOUND = 1e-6
 _STEP = 1e-5
 """Of central differences, in natural sizes."""
 
+
+_SAG = "battery_sag"
+_CALIBRATED = 0.01
+"""Share of its weight that an accelerometer may be off by, as calibrated before a flight: 0.1 m/s^2."""
+_LINEAR = 0.5
+"""Power of squared commands with which thrust rises that goes with the commands themselves."""
+_PIECE_S = 2.0
+"""Length of pieces over which thrust carries the weight: gusts and climbs are shorter, a discharge is longer."""
 
 _SI = About("estimate", unit="SI")
 _LOW, _HIGH = (About(f"{end} end of the 95 % interval", unit="SI") for end in ("lower", "upper"))
@@ -147,14 +156,42 @@ class VehicleFit:
         return self.loop.misses and self.instruments is None
 
 
+class CommandedThrust(NamedTuple):
+    """How the thrust of commands goes with the voltage of the battery, and with the commands.
+
+    `numbers`: the power of the voltage, where one is known. `rises`: ends of the power of squared commands with which
+    it rises, 1 for a square, one half for a line.
+    """
+
+    numbers: tuple[FoundNumber, ...] = ()
+    rises: tuple[float, float] = (1.0, 1.0)
+
+    def whole(self, model: VehicleModel) -> VehicleModel:
+        """Let a model with known numbers take commands as they are logged."""
+        sags = (ModelEffect(_SAG, {own.name.partition(".")[2]: own.value}, np.zeros(0)) for own in self.numbers)
+        return replace(model, vehicle=replace(model.vehicle, unknown=()), effects=(*model.effects, *sags))
+
+    def acting(self, flight: LoggedFlight) -> PlaybackFlight:
+        """Give a flight whose commands count as with a full battery."""
+        acting = self.whole(VehicleModel(vehicle=flight.parts[0].vehicle)).acting
+        return replace(flight, parts=tuple(map(acting, flight.parts))).playback
+
+
+_AS_COMMANDED = CommandedThrust()
+
+
 def find_vehicle(
     vehicle: VehicleSettings,
     flights: Sequence[PlaybackFlight],
     settings: PlaybackSettings,
     progress: Progress,
     kept: Kept = MappingProxyType({}),
+    commands: CommandedThrust = _AS_COMMANDED,
 ) -> VehicleFit:
-    """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`."""
+    """Find structure and numbers of a vehicle in training flights, those of other configurations too; see `choose`.
+
+    `commands`: how the thrust of their commands goes; they are those of a full battery already.
+    """
     own = [flight for flight in flights if not flight.group]
     begun, sensed = carrying_weight(vehicle, own)
     flown = {flight.group for flight in flights}
@@ -181,16 +218,16 @@ def find_vehicle(
         tried = (*tried, choice.judge("held", solved, own, settings))
     else:
         solved, spread = fitted, uncertainty(fitted, windows)
-    model = replace(solved.model, vehicle=replace(solved.model.vehicle, unknown=()))
-    numbers = (*sensed, *bodily(begun, (*held.numbers, *found_numbers(solved, spread))))
+    model = commands.whole(solved.model)
+    of_fit = bodily(begun, (*held.numbers, *found_numbers(solved, spread)))
+    numbers = tuple(widened_by_law((*sensed, *commands.numbers, *of_fit), commands.rises))
     if constants is None:
         numbers = tuple(widened_by_loop(numbers, held.loop))
     gusts: FoundGusts | None = None
     if constants is not None or not loop.unexplained:
         determined = {number.name: number.determined for number in numbers}
         gusts = find_gusts(model, given, determined, identified=constants is not None)
-    shares, airspeed = _shares(model, own)
-    correlation = estimate_correlation(solved, spread)
+    (shares, airspeed), correlation = _shares(model, own), estimate_correlation(solved, spread)
     past = choice.complete and settings.history_s and not settings.quick
     return VehicleFit(
         model=replace(model, gusts=None if gusts is None else gusts.gusts),
@@ -199,7 +236,7 @@ def find_vehicle(
         airspeed_m_s=airspeed,
         trades=(*held.trades, *_trades(solved.free.physical(solved.values), correlation)),
         # What was sensed, or is held, goes with no number of the fit.
-        correlation=block_diag(np.eye(len(sensed)), held.correlation, correlation),
+        correlation=block_diag(np.eye(len((*sensed, *commands.numbers))), held.correlation, correlation),
         structures=tried,
         evaluated=choice.evaluated,
         complete=choice.complete,
@@ -209,11 +246,11 @@ def find_vehicle(
         differences=tuple(differences(fitted, uncertainty(fitted, windows))) if groups and not apart else (),
         loop=held.loop,
         instruments=None if constants is None else constants.used,
-        forecast=None if forecast is None else replace(forecast, vehicle=replace(forecast.vehicle, unknown=())),
+        forecast=None if forecast is None else commands.whole(forecast),
         disturbance=gusts,
         history=find_history(choice.chosen, fitted, own, settings) if past else None,
         sources=given,
-        others={group.name: fitted.free.at(fitted.values, group.name).model for group in groups},
+        others={group.name: commands.whole(fitted.free.at(fitted.values, group.name).model) for group in groups},
     )
 
 
@@ -311,23 +348,28 @@ def carrying_weight(
     """Replace the guess of the thrust factor by what carries the weight; a guessed drag factor scales with it.
 
     Where runs do not move, for want of velocity, the thrust factor follows from the accelerometer, and is then found
-    and returned: it is no longer unknown to the runs. Without one either, or where it feels no lift, nothing separates
-    thrust from weight, and the guess stays.
+    and returned: it is no longer unknown to the runs. So is one that is stated and that the accelerometer contradicts.
+    Without one either, or where it feels no lift, nothing separates thrust from weight, and the guess stays.
     """
-    if "thrust_factor" not in vehicle.unknown:
+    open_thrust, moves = "thrust_factor" in vehicle.unknown, all(flight.translates for flight in flights)
+    if not open_thrust and moves:
         return vehicle, ()
     squares = np.concatenate([(flight.speed**2).sum(axis=1) for flight in flights])
     if not squares.any():
         return vehicle, ()
-    moves = all(flight.translates for flight in flights)
     sensed = None if moves else _sensed_thrust_factor(vehicle, flights)
+    stated = float(np.mean([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors]))
+    if not open_thrust:
+        if sensed is None or sensed.low <= stated <= sensed.high:
+            return vehicle, ()
+        sensed = sensed._replace(stated=stated)
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     thrust = weight / float(np.mean(squares)) if sensed is None else sensed.value
-    factor = thrust / float(np.mean([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors]))
+    factor = thrust / stated
     rotors = tuple(
         replace(
             rotor,
-            thrust_factor_n_s2=thrust,
+            thrust_factor_n_s2=thrust if open_thrust else factor * rotor.thrust_factor_n_s2,
             drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * (factor if "drag_factor" in vehicle.unknown else 1.0),
         )
         for rotor in vehicle.rotors
@@ -352,12 +394,69 @@ def _sensed_thrust_factor(vehicle: VehicleSettings, flights: Sequence[PlaybackFl
     if not (left > 0).all():
         return None
     value = float(above.sum() / below.sum())
-    half = float(half_width(jackknife_error((above.sum() - above) / left), len(products)))
+    scatter = float(half_width(jackknife_error((above.sum() - above) / left), len(products)))
+    half = float(np.hypot(scatter, _CALIBRATED * value))
     # An accelerometer that is upside down, or noise, feels no lift.
     if value <= half:
         return None
     low, high = _interval(value, half, positive=True)
     return FoundNumber("thrust_factor", "N s^2", value, low, high, np.nan, high < KNOWN * low, False)
+
+
+def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
+    """Find how the thrust of commands goes with voltage and command, by what carries the weight.
+
+    Over short pieces, logarithms of what is carried, by velocity or else by accelerometer, and of the squared commands
+    are regressed on each other, and on that of the voltage where all flights know it. A loop that answers gusts leaves
+    the power of squared commands between the two (see `loop_bounds`).
+    """
+    parts = [part for flight in flights for part in flight.parts]
+    rows = np.array([row for part in parts if part.commanded for row in _carried(part)])
+    if len(rows) < ENOUGH_BLOCKS or not np.isfinite(rows[:, :2]).all():
+        return CommandedThrust()
+    known = np.isfinite(rows).all() and np.ptp(rows[:, 2]) > 0
+    carried, squares, volts = rows.T
+    apart = volts[:, None] if known else np.zeros((len(rows), 0))
+
+    def powers(kept: BoolArray) -> Array:
+        def slopes(of: Array, by: Array) -> list[float]:
+            columns = np.column_stack([np.ones(len(rows)), by, apart])[kept]
+            return [float(own) for own in np.linalg.lstsq(columns, of[kept])[0][1:]]
+
+        # A supply acts on the command; gusts that the loop answers blur what is carried less than what carries it.
+        lowest, (rise, *supply) = slopes(carried, squares)[0], slopes(squares, carried)
+        return np.array([lowest, 1 / max(rise, _LINEAR), *(-own for own in supply)])
+
+    blocks = min(max(len(rows) // 2, ENOUGH_BLOCKS), MOST_BLOCKS)
+    found, left_out = leaving_out(powers, len(rows), blocks)
+    half = half_width(jackknife_error(left_out), blocks)
+    low, high = np.clip([found[0] - half[0], found[1] + half[1]], _LINEAR, 1 / _LINEAR).tolist()
+    rises = min(low, 1.0), max(high, 1.0)
+    shape = CATALOGUE[_SAG].shapes[0]
+    if not known or not half[2] < found[2] <= shape.grid[-1]:
+        return CommandedThrust((), rises)
+    ends = (float(found[2]), float(found[2] - half[2]), float(found[2] + half[2]))
+    return CommandedThrust((FoundNumber(f"{_SAG}.{shape.name}", shape.unit, *ends, np.nan, True, False),), rises)
+
+
+def _carried(part: Signals) -> Iterator[tuple[float, float, float]]:
+    """Give by pieces logarithms: of what is carried, of the squared commands that carry it, of the voltage."""
+    squares = (part.speed**2).sum(axis=1) if part.rotor_speed is not None else np.zeros(len(part))
+    velocity, force = part.velocity, part.specific_force
+    volts = np.full(len(part), np.nan) if part.voltage is None else part.voltage
+    piece = contiguous(len(part), max(1, round(len(part) * part.period / _PIECE_S)))
+    for number in range(piece[-1] + 1):
+        own = np.flatnonzero(piece == number)
+        if part.attitude is not None and velocity is not None:
+            upward, lift = part.rotation[own, 2, 2], velocity[own[[0, -1]], 2]
+            needed = part.vehicle.gravity_m_s2 + (lift[1] - lift[0]) / (part.time[own[-1]] - part.time[own[0]])
+        elif force is not None:
+            upward, needed = np.ones(len(own)), force[own, 2].mean()
+        else:
+            return
+        carries = float((squares[own] * upward).mean())
+        with np.errstate(invalid="ignore", divide="ignore"):
+            yield float(np.log(needed)), float(np.log(carries)), float(np.log(volts[own].mean()))
 
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
@@ -442,6 +541,7 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}
     factors["drag_factor"] = [1 / high[2], 1 / low[2]]
     carries = {"thrust_factor"} if LAW not in {number.name for number in numbers} else set[str]()
+    carries |= {number.name for number in numbers if number.name.startswith(_SAG)}
     for number in numbers:
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above
@@ -451,6 +551,19 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
         known = ends[1] <= KNOWN * ends[0] if number.name in factors else not loop.misses
         identified = number.name in carries or (known and not loop.shows_loop)
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and identified)
+
+
+def widened_by_law(numbers: Sequence[FoundNumber], rises: tuple[float, float]) -> Iterator[FoundNumber]:
+    """Widen the intervals of the inertia by what is not known of the thrust of commands where no law was found.
+
+    Weight shows the thrust that carries it, and rotation how it changes over the moments of inertia.
+    """
+    lawless = LAW not in {number.name for number in numbers}
+    for number in numbers:
+        widened = lawless and number.name.startswith("inertia.")
+        low, high = (number.low * rises[0], number.high * rises[1]) if widened else number[3:5]
+        known = not widened or high <= KNOWN * low
+        yield number._replace(low=low, high=high, determined=number.determined and known)
 
 
 def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:

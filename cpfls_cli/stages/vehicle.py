@@ -63,7 +63,7 @@ from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
-from cpfls_cli.playback.vehicle import Share, VehicleFit, find_vehicle
+from cpfls_cli.playback.vehicle import Share, VehicleFit, commanded_thrust, find_vehicle
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, legend_over, line, style_of
 from cpfls_cli.report.content import percent
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses
@@ -410,9 +410,10 @@ def _found(
         if stop:
             raise SearchStoppedError
 
-    along = [flight.playback for flight in flights]
+    commands = commanded_thrust([flight for flight in flights if not flight.group])
+    along = [commands.acting(flight) for flight in flights]
     with settings_of("playback", study), watch.deferring():
-        vehicle = find_vehicle(study.vehicle, along, settings, progress, kept)
+        vehicle = find_vehicle(study.vehicle, along, settings, progress, kept, commands)
     return vehicle, watch.signal
 
 
@@ -429,7 +430,8 @@ def _judged(
     behind = any(flight.parts[0].commanded for flight in training)
     shares = any(flight.shares for flight in training)
     own = {each.name: getattr(found, each.name) for each in fields(found)}
-    own |= {name: replace(own[name], commanded=behind) for name in ("model", "forecast") if own[name] is not None}
+    known = {"commanded": behind, "full_voltage": flights[0].parts[0].full_voltage}
+    own |= {name: replace(own[name], **known) for name in ("model", "forecast") if own[name] is not None}
     responses = mismatches(_responses(found, training), instrumented=found.instruments is not None)
     return Vehicle(
         **own,

@@ -174,14 +174,14 @@ def interrupt_at(monkeypatch):
 
         find = vehicle.find_vehicle
 
-        def finding(stated, flights, settings, progress, kept):
+        def finding(stated, flights, settings, progress, *others):
             def summary(judged, total):
                 evaluated.append(len(judged))
                 if len(judged) == number:
                     os.kill(os.getpid(), signal.SIGINT)
                 progress(judged, total)
 
-            return find(stated, flights, settings, summary, kept)
+            return find(stated, flights, settings, summary, *others)
 
         evaluated = []
         monkeypatch.setattr(vehicle, "find_vehicle", finding)

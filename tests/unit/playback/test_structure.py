@@ -12,7 +12,9 @@ from cpfls_cli.errors import InputError
 from cpfls_cli.playback import structure
 from cpfls_cli.playback.fit import WindowSet, WindowSums, fit, parts_of
 from cpfls_cli.playback.flight import motion_at
+from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import Rules, blocks_of
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import SearchStoppedError, Structure, choose, tried_blocks
 from cpfls_cli.playback.windows import Loss
@@ -290,3 +292,18 @@ def test_flights_that_are_logged_fast_are_flown_in_steps_of_several_samples():
     coarse, fine = (own.errors(found.free, found.values) for own in sets)
     assert np.concatenate(coarse) == pytest.approx(np.concatenate(fine), rel=0.05)
     assert np.concatenate(coarse).mean() == pytest.approx(np.concatenate(fine).mean(), rel=0.005)
+
+
+def test_a_lag_and_a_delay_are_not_a_slow_part_that_overshoots():
+    """A share above 1 of a slow part answers against the command first, as a delay seems to."""
+    late = VehicleModel(vehicle=STATED, response=RotorResponse(lag_s=0.03, delay_s=0.03))
+    tried = ("lag", "delay", "slow_actuation")
+    left_out = tuple(block for block in blocks_of(STATED) if block not in tried)
+    found = chosen(
+        flown(late, ("figure", "steps"), duration_s=6.0, noise=MIDDLING, seed=1),
+        settings=replace(QUICK, leave_out=left_out),
+    ).chosen
+    values = found.fit.free.named(found.fit.values)
+    assert found.structure.blocks == ("lag", "delay")
+    assert values["lag.time_constant_s"] == pytest.approx(0.03, abs=0.004)
+    assert values["delay.delay_s"] == pytest.approx(0.03, abs=0.004)

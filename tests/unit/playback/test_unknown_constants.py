@@ -4,18 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from cpfls_cli.config.load import validate
+from cpfls_cli.effects.signals import Signals
 from cpfls_cli.playback.fit import Fitted
+from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.loop import LoopBounds, _explained, _factors
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.vehicle import (
+    CommandedThrust,
     FoundNumber,
     bodily,
     carrying_weight,
+    commanded_thrust,
     find_vehicle,
     held_by_bounds,
+    widened_by_law,
     widened_by_loop,
 )
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
@@ -104,6 +110,92 @@ def test_an_accelerometer_that_feels_no_lift_leaves_the_thrust_factor_open(sense
     for rotor in vehicle.rotors:
         weight = STATED.mass_kg * STATED.gravity_m_s2
         assert rotor.thrust_factor_n_s2 * squares.mean() == pytest.approx(weight)
+
+
+@pytest.mark.parametrize("off", [0.75, 1.3, 1.005])
+def test_a_stated_thrust_factor_gives_way_to_an_accelerometer_that_contradicts_it(off):
+    flights = without_velocity(flown(TRUE, noise=MIDDLING, seed=2, hold="linear"), accelerometer=True)
+    true = TRUE.vehicle.rotors[0].thrust_factor_n_s2
+    vehicle, sensed = carrying_weight(replace(TRUE.vehicle, rotors=with_thrust(off * true)), flights)
+    if abs(off - 1) < 0.01:
+        assert sensed == ()
+    else:
+        (number,) = sensed
+        assert number.stated == pytest.approx(off * true)
+        assert number.value == pytest.approx(true, rel=0.02)
+    assert vehicle.rotors[0].thrust_factor_n_s2 == pytest.approx(off * true if sensed == () else true, rel=0.02)
+
+
+def with_thrust(factor):
+    return tuple(replace(rotor, thrust_factor_n_s2=factor) for rotor in TRUE.vehicle.rotors)
+
+
+def memory(rng, size, seconds, period, samples):
+    """Noise that is forgotten in so many seconds."""
+    keep = np.exp(-period / seconds)
+    return lfilter([size * np.sqrt(1 - keep**2)], [1.0, -keep], rng.standard_normal(samples))
+
+
+def emptying(*, power=2.0, linear=0.3, gust=0.5, sensor="velocity", voltage=True, commanded=True, seed=0):
+    """A vehicle that climbs and descends by commands while its battery empties, in gusts that its autopilot answers."""
+    rng, period, samples = np.random.default_rng(seed), 0.02, 3000
+    own = STATED.gravity_m_s2
+    blown, asked = (memory(rng, size, 1.0, period, samples) for size in (gust, 0.8))
+    answered = lfilter([0.05], [1.0, -0.95], blown)
+    pulled = own + asked - 0.7 * answered
+    volts = np.linspace(1.0, 0.88, samples)
+    most = STATED.rotor_speed_max_rad_s
+    # Of thrust that is linear and square in the command, at 40 % in hover; each rotor carries as much.
+    share = pulled / own * (linear * 0.4 + (1 - linear) * 0.16)
+    command = (-linear + np.sqrt(linear**2 + 4 * (1 - linear) * share)) / (2 * (1 - linear)) * volts ** (-power / 2)
+    speed = most * command[:, None] * (1 + rng.normal(0.0, 0.003, (samples, 4)))
+    climb = np.cumsum(asked + blown - 0.7 * answered) * period + rng.normal(0.0, 0.02, samples)
+    zero = np.zeros((samples, 3))
+    known = {"velocity": np.column_stack([zero[:, :2], climb]), "attitude": zero}
+    if sensor == "accelerometer":
+        # What a gust pushes is felt, too.
+        known = {"specific_force": np.column_stack([zero[:, :2], pulled + blown + rng.normal(0.02, 0.3, samples)])}
+    signals = Signals(
+        time=period * np.arange(samples),
+        body_rate=zero + rng.normal(0.0, 0.02, (samples, 3)),
+        vehicle=STATED,
+        rotor_speed=speed,
+        commanded=commanded,
+        voltage=volts + rng.normal(0.0, 0.002, samples) if voltage else None,
+        **known,
+    )
+    return LoggedFlight.of(signals)
+
+
+@pytest.mark.parametrize("sensor", ["velocity", "accelerometer"])
+@pytest.mark.parametrize(("power", "gust"), [(1.6, 0.0), (2.0, 0.5), (2.4, 0.5)])
+def test_what_carries_the_weight_shows_how_commands_go_with_the_voltage(power, gust, sensor):
+    found = commanded_thrust([emptying(power=power, gust=gust, sensor=sensor)])
+    (number,) = found.numbers
+    assert number.low <= power <= number.high
+    assert number.high - number.low < (0.1 if gust == 0.0 else 1.2)
+    # A square that is 30 % linear, at 40 % of the largest command.
+    low, high = found.rises
+    assert low - 0.01 <= (0.5 * 0.3 + 0.7 * 0.4) / (0.3 + 0.7 * 0.4) <= high
+    flight = emptying(power=power, gust=gust, sensor=sensor)
+    full = flight.parts[0].voltage[:, None] ** (number.value / 2) * flight.playback.speed
+    np.testing.assert_allclose(found.acting(flight).speed, full)
+
+
+def test_where_speeds_are_measured_or_no_voltage_is_known_commands_count_as_they_are():
+    assert commanded_thrust([emptying(commanded=False)]) == CommandedThrust()
+    assert commanded_thrust([emptying(voltage=False)]).numbers == ()
+    assert commanded_thrust([emptying(power=0.0)]).numbers == ()
+
+
+def test_an_inertia_of_commands_is_as_open_as_their_law():
+    numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in ("inertia.Ixx", "thrust_factor")]
+    inertia, thrust = widened_by_law(numbers, (0.8, 1.0))
+    assert (inertia.low, inertia.high, inertia.determined) == (pytest.approx(0.72), 1.1, True)
+    assert thrust == numbers[1]
+    assert not next(widened_by_law(numbers, (0.5, 1.0))).determined
+    law = FoundNumber("thrust_law.linear", "", 0.3, 0.2, 0.4, np.nan, True, False)
+    assert next(widened_by_law([*numbers, law], (0.5, 1.0))) == numbers[0]
 
 
 def test_rotors_that_stand_or_turn_for_a_moment_tell_no_thrust():
