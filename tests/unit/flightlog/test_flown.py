@@ -31,8 +31,7 @@ def test_a_log_that_flies_from_first_to_last_is_not_cut():
 
 
 def test_standing_and_idling_rotors_are_cut_with_a_margin():
-    level = between(5, 10, 0.1) + between(10, 30, 0.5)
-    flown = flown_by(level, None, turning(10, 30))
+    flown = flown_by(between(5, 10, 0.1) + between(10, 30, 0.5), None, turning(10, 30))
     assert flown.span_s == (pytest.approx(10.5, abs=0.1), pytest.approx(29.5, abs=0.1))
     assert flown.reasons[0].startswith("the first 10.5 s are cut: ")
     assert flown.reasons[1].endswith(" s are cut: the rotors stand still or idle")
@@ -237,8 +236,7 @@ def test_a_cut_throttle_in_free_fall_is_part_of_the_flight():
 
 
 def test_rotors_that_rise_on_the_ground_do_not_fly_before_it_moves():
-    flown = flown_by(between(5, 35, 0.5), None, turning(20, 35))
-    assert flown.stretches_s[0][0] == pytest.approx(20.5, abs=0.4)
+    assert flown_by(between(5, 35, 0.5), None, turning(20, 35)).stretches_s[0][0] == pytest.approx(20.5, abs=0.4)
 
 
 def test_who_mostly_climbs_hovers_below_the_usual_level():
@@ -247,8 +245,7 @@ def test_who_mostly_climbs_hovers_below_the_usual_level():
     level = np.where(climbs, 0.8, between(2, 38, 0.26))
     rate = np.column_stack([turning(2, 30, 4.0) + turning(30, 38, 0.15), 0 * TIME, 0 * TIME])
     force = np.column_stack([0 * TIME, 0 * TIME, np.where(climbs, 9.4, 1.0)])
-    rotors = np.repeat(level[:, None], 4, axis=1)
-    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=force))
+    flown = find_flown(Signs(time=TIME, rotors=np.repeat(level[:, None], 4, axis=1), body_rate=rate, force=force))
     assert flown.span_s == (pytest.approx(2.5, abs=0.1), pytest.approx(37.5, abs=0.1))
 
 
@@ -364,8 +361,7 @@ def acrobatics(*known, idle=0.06, noise=0.0, hand=0.0):
         flies = inside(time, 3, 30, 1) + inside(time, 50, 77, 1) > 0
         force = np.outer(np.where(flies, 1 + 0.8 * np.sin(2 * time), 1.0), UP)
         signs = {"force": force, "height": np.convolve(np.where(flies, 5.0, 0.0), np.ones(100) / 100, "same")}
-        level = np.where(flies, 0.5, idle)
-        return {"rotors": level, "rate": np.where(flies, 3.0, hand), "noise": noise} | {
+        return {"rotors": np.where(flies, 0.5, idle), "rate": np.where(flies, 3.0, hand), "noise": noise} | {
             name: signs[name] for name in known
         }
 
@@ -376,8 +372,7 @@ def profile(drag):
     """Up at 10 m/s and down at 8 m/s by turns, with a drag so large, 1/m."""
 
     def made(time):
-        asked = np.where(time % 150 < 75, 10.0, -8.0)
-        speed = lfilter([0.01], [1, -0.99], asked)
+        speed = lfilter([0.01], [1, -0.99], np.where(time % 150 < 75, 10.0, -8.0))
         felt = 1 + np.gradient(speed, time) / 9.81
         level = 0.4 * np.sqrt(np.maximum(felt + drag * speed * np.abs(speed) / 9.81, 0.05))
         height = 100 + 0.01 * np.cumsum(speed)
