@@ -37,6 +37,7 @@ from cpfls_cli.logs.formats import (
 from tests.builders import blackbox_logs, ulogs
 from tests.builders.dataflash_logs import dataflash
 from tests.builders.ros_bags import BEGIN_NS, imu, write_bag
+from tests.builders.studies import put_file
 from tests.builders.unknown_logs import flight, named
 
 
@@ -45,17 +46,14 @@ def listed(contents):
 
 
 def test_a_csv_is_one_topic_of_all_its_numbers(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text("t,roll,mode,pitch\n0,1,hover,\n1,2,land,5\n")
-    contents = log_contents(path)
+    contents = log_contents(put_file(tmp_path / "log.csv", "t,roll,mode,pitch\n0,1,hover,\n1,2,land,5\n"))
     np.testing.assert_equal(listed(contents), {"": {"t": [0, 1], "roll": [1, 2], "pitch": [np.nan, 5]}})
     assert contents.warnings == ("columns that hold text are left out: mode",)
     assert (contents.units, contents.parameters, contents.system) == ({}, {}, "")
 
 
 def test_of_a_csv_only_what_is_wanted_is_read(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text("t,roll,mode\n0,1,hover\n1,2,land\n")
+    path = put_file(tmp_path / "log.csv", "t,roll,mode\n0,1,hover\n1,2,land\n")
     assert listed(log_contents(path, ["roll"])) == {"": {"t": [], "roll": [1, 2], "mode": []}}
     with pytest.raises(InputError, match=r"log\.csv:2: column 'mode' = 'hover': not a number"):
         log_contents(path, ["mode"])
@@ -70,8 +68,7 @@ def test_columns_without_names_that_a_spreadsheet_adds_are_none(tmp_path):
 
 
 def test_of_columns_with_one_name_each_has_a_number(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text("T,roll,T,motor,motor\n0,1,20,5,6\n1,2,30,7,8\n")
+    path = put_file(tmp_path / "log.csv", "T,roll,T,motor,motor\n0,1,20,5,6\n1,2,30,7,8\n")
     held = {"T[0]": [0, 1], "roll": [1, 2], "T[1]": [20, 30], "motor[0]": [5, 7], "motor[1]": [6, 8]}
     assert listed(log_contents(path)) == {"": held}
     assert listed(log_contents(path, ["T[1]"]))[""]["T[1]"] == [20, 30]
@@ -145,19 +142,51 @@ def test_a_ulog_holds_topics_and_what_px4_knows_of_the_vehicle(tmp_path):
     assert contents.system == "PX4 1.14.0"
 
 
-@pytest.mark.parametrize(
-    "formats",
-    [
-        {"a": "uint64_t timestamp;float[100000000] x"},
-        {"a": "uint64_t timestamp;b[1000] x", "b": "c[1000] x", "c": "float[1000] x"},
-    ],
-    ids=["array", "nested"],
-)
-def test_a_message_of_a_ulog_that_is_longer_than_any_is_refused_before_it_is_listed(tmp_path, formats):
-    path = tmp_path / "log.ulg"
-    path.write_bytes(ulogs.ulog([(0, 0, [1.0])], formats))
-    with pytest.raises(InputError, match=r"log\.ulg: a broken ULog file: its message 'a' would take more than 65535"):
-        log_contents(path)
+LONG = "a broken ULog file: its message 'a' would take more than 65535"
+MATLAB = b"MATLAB 5.0 MAT-file".ljust(126)
+REFUSED = {
+    # Before they are listed.
+    "ulog, a long array": (
+        "log.ulg", ulogs.ulog([(0, 0, [1.0])], {"a": "uint64_t timestamp;float[100000000] x"}), LONG,
+    ),
+    "ulog, long by nesting": (
+        "log.ulg",
+        ulogs.ulog([(0, 0, [1.0])], {"a": "uint64_t timestamp;b[1000] x", "b": "c[1000] x", "c": "float[1000] x"}),
+        LONG,
+    ),
+    "ulog, within itself": (
+        "log.ulg",
+        ulogs.ulog([(0, 0, [1.0])], {"a": "uint64_t timestamp;a x"}),
+        "a broken ULog file: one of its messages contains itself",
+    ),
+    "ulog, header cut": ("log.ulg", ulogs.header()[:10], "a broken ULog file: "),
+    "ulog, header alone": (
+        "log.ulg", ulogs.header(), "a ULog file without samples: was the logger stopped at once, or the file cut off?",
+    ),
+    "ulog, no data": (
+        "log.ulg", ulogs.header() + ulogs.definitions({"a": "uint64_t timestamp"}), "a ULog file without samples: ",
+    ),
+    "ulog, unknown flag": (
+        "log.ulg", ulogs.header() + ulogs.message("B", bytes(8) + b"\x80" + bytes(31)), "a broken ULog file: ",
+    ),
+    "ulog, encrypted": (
+        "log.ulg",
+        b"ULogEnc\x01" + bytes(100),
+        "is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does",
+    ),
+    "matlab, empty": ("log.mat", b"", "an empty file: nothing was logged, or the copy failed"),
+    "matlab, broken": ("log.mat", MATLAB + b"IM" + b"\x0f\0\0\0\xff\xff\0\0broken", "cannot be read as MATLAB: "),
+    "hdf5, cut": ("log.h5", b"\x89HDF\r\n\x1a\n" + bytes(30), "cannot be read as HDF5: "),
+    "matlab, under another ending": ("log.h5", MATLAB, "cannot be read as MATLAB: "),
+    "numpy, no archive": ("log.npz", b"broken", "cannot be read as NumPy: "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "content", "message"), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_read_is_refused(tmp_path, name, content, message):
+    with pytest.raises(InputError) as caught:
+        log_contents(put_file(tmp_path / name, content))
+    assert str(caught.value).startswith(f"{tmp_path / name}: {message}")
 
 
 def test_a_ulog_whose_last_message_is_longer_than_the_file_is_refused_in_time(tmp_path):
@@ -169,32 +198,6 @@ def test_a_ulog_whose_last_message_is_longer_than_the_file_is_refused_in_time(tm
     run = [sys.executable, "-m", "cpfls_cli", "look", str(path)]
     said = subprocess.run(run, capture_output=True, text=True, check=False, timeout=60)
     assert "a ULog file without samples: was the logger stopped at once, or the file cut off?" in said.stderr
-
-
-def test_a_message_of_a_ulog_within_itself_is_refused(tmp_path):
-    path = tmp_path / "log.ulg"
-    path.write_bytes(ulogs.ulog([(0, 0, [1.0])], {"a": "uint64_t timestamp;a x"}))
-    with pytest.raises(InputError, match=r"log\.ulg: a broken ULog file: one of its messages contains itself"):
-        log_contents(path)
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (ulogs.header()[:10], "a broken ULog file: "),
-        (ulogs.header(), "a ULog file without samples: was the logger stopped at once, or the file cut off?"),
-        (ulogs.header() + ulogs.definitions({"a": "uint64_t timestamp"}), "a ULog file without samples: "),
-        (ulogs.header() + ulogs.message("B", bytes(8) + b"\x80" + bytes(31)), "a broken ULog file: "),
-        (b"ULogEnc\x01" + bytes(100), "is encrypted: decrypt it first, as PX4's Tools/decrypt_ulog.py does"),
-    ],
-    ids=["header-cut", "header-only", "no-data", "unknown-flag", "encrypted"],
-)
-def test_what_is_no_ulog(tmp_path, content, said):
-    path = tmp_path / "log.ulg"
-    path.write_bytes(content)
-    with pytest.raises(InputError) as caught:
-        log_contents(path)
-    assert str(caught.value).startswith(f"{path}: {said}")
 
 
 def test_what_a_small_file_cannot_hold_is_refused_before_it_is_read(tmp_path, monkeypatch):
@@ -413,16 +416,14 @@ def test_lists_of_numbers_in_fields_are_columns(tmp_path: Path) -> None:
 def test_a_list_of_another_length_is_absent_and_moves_no_other_one(tmp_path: Path, odd: str) -> None:
     own = contents(_written(tmp_path / "log.csv", f't,p,q\n0,"[1, 2]","[3, 4]"\n1,{odd},"[5, 6]"\n2,"[7, 8]",{odd}\n'))
     values = np.column_stack(list(own.topics[""].values()))
-    expected = [[0, 1, 2, 3, 4], [1, np.nan, np.nan, 5, 6], [2, 7, 8, np.nan, np.nan]]
-    np.testing.assert_array_equal(values, expected)
+    np.testing.assert_array_equal(values, [[0, 1, 2, 3, 4], [1, np.nan, np.nan, 5, 6], [2, 7, 8, np.nan, np.nan]])
 
 
 @pytest.mark.parametrize(
     "words", ["[INFO] armed", "[2024-01-01 10:00:00]", '"[1, None]"', f'"[{", ".join(51 * "1")}]"']
 )
 def test_text_in_brackets_and_scans_are_no_columns(tmp_path: Path, words: str) -> None:
-    own = contents(_written(tmp_path / "log.csv", f"t,p\n0,{words}\n1,{words}\n"))
-    assert list(own.topics[""]) == ["t"]
+    assert list(contents(_written(tmp_path / "log.csv", f"t,p\n0,{words}\n1,{words}\n")).topics[""]) == ["t"]
 
 
 def test_lists_between_numbers_with_decimal_commas_are_read(tmp_path: Path) -> None:
@@ -463,19 +464,18 @@ def test_what_comes_behind_a_slash_names_a_clock_in_a_group_alone() -> None:
     assert LogTable({"": {"T[0]": time, "roll": np.cos(time), "T[1]": 3 * time}}, {}).time_column == "T[0]"
 
 
-def test_lines_are_counted_past_remarks_and_empty_lines(tmp_path: Path) -> None:
-    path = _written(tmp_path / "log.csv", "# remark\ntime,p\n0,1\n\n1,2\n")
-    assert row_lines(path) == [3, 5]
-    path.write_text("# remark\ntime,p\n0,1\n\n1,x\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"log\.csv:5: column 'p' = 'x': not a number"):
-        contents(path, {"time", "p"})
-
-
-def test_lines_are_counted_past_fields_of_several_lines(tmp_path: Path) -> None:
-    path = _written(tmp_path / "log.csv", 'time,p,q\n0,1,"[1\n2]"\n1,2,"[3\n4]"\n2,x,"[5\n6]"\n')
-    assert row_lines(path) == [2, 4, 6]
-    with pytest.raises(InputError, match=r"log\.csv:6: column 'p' = 'x': not a number"):
-        contents(path, {"time", "p"})
+@pytest.mark.parametrize(
+    ("text", "lines", "wrong"),
+    [
+        ("# remark\ntime,p\n0,1\n\n1,{}\n", [3, 5], 5),
+        ('time,p,q\n0,1,"[1\n2]"\n1,2,"[3\n4]"\n2,{},"[5\n6]"\n', [2, 4, 6], 6),
+    ],
+    ids=["remarks and empty lines", "fields of several lines"],
+)
+def test_lines_are_counted_past_what_is_no_row(tmp_path: Path, text: str, lines: list[int], wrong: int) -> None:
+    assert row_lines(_written(tmp_path / "log.csv", text.format(2))) == lines
+    with pytest.raises(InputError, match=rf"log\.csv:{wrong}: column 'p' = 'x': not a number"):
+        contents(_written(tmp_path / "log.csv", text.format("x")), {"time", "p"})
 
 
 AT = 1_683_108_000.0
@@ -485,9 +485,7 @@ AT = 1_683_108_000.0
 @pytest.fixture
 def flown(tmp_path):
     def call(name, content):
-        path = tmp_path / name
-        path.write_bytes(content)
-        return log_contents(path).flown_at
+        return log_contents(put_file(tmp_path / name, content)).flown_at
 
     return call
 
@@ -512,16 +510,15 @@ def test_of_ardupilot_by_weeks_of_gps(flown, names):
     assert flown("log.bin", dataflash({"GPS": (letters, columns)}, rows)) == pytest.approx(AT, abs=1e-5)
 
 
-@pytest.mark.parametrize("said", ["2023-05-03T10:00:00.000+00:00", "2023-05-03T12:00:00.000+02:00", "2023-05-03T10:00"])
-def test_of_betaflight_by_its_header(flown, said):
-    lines = blackbox_logs.header() + f"H Log start datetime:{said}\n".encode()
-    assert flown("log.bbl", lines + b"".join(blackbox_logs.frames(blackbox_logs.flight()))) == AT
+SAID = ["2023-05-03T10:00:00.000+00:00", "2023-05-03T12:00:00.000+02:00", "2023-05-03T10:00"]
+UNSET = ["0000-01-01T00:00:00.000+00:00", "1970-01-01T00:00:00.000+00:00", "soon"]
 
 
-@pytest.mark.parametrize("said", ["0000-01-01T00:00:00.000+00:00", "1970-01-01T00:00:00.000+00:00", "soon"])
-def test_a_clock_that_was_never_set_shows_none(flown, said):
+@pytest.mark.parametrize(("said", "at"), [*((said, AT) for said in SAID), *((said, np.nan) for said in UNSET)])
+def test_of_betaflight_by_its_header_unless_its_clock_was_never_set(flown, said, at):
     lines = blackbox_logs.header() + f"H Log start datetime:{said}\n".encode()
-    assert isnan(flown("log.bbl", lines + b"".join(blackbox_logs.frames(blackbox_logs.flight()))))
+    frames = b"".join(blackbox_logs.frames(blackbox_logs.flight()))
+    assert flown("log.bbl", lines + frames) == pytest.approx(at, abs=0, nan_ok=True)
 
 
 def test_of_a_bag_by_the_recorder(tmp_path):
@@ -622,7 +619,6 @@ def test_structures_with_stamps_of_their_own_are_topics(tmp_path):
 def test_stamps_of_structures_are_on_one_clock(tmp_path):
     own = flight(seconds=20.0)
     fast, x = 5000 + 0.01 * np.arange(6000.0), np.sin(np.arange(6000.0))
-    gap = np.where(np.arange(3000) == 7, np.nan, fast[::2])
     data = {
         # Another clock under the name of the stamps of topics.
         "att": {"time": fast, "roll": x, "timestamp": 1e15 + 1e6 * fast},
@@ -630,7 +626,7 @@ def test_stamps_of_structures_are_on_one_clock(tmp_path):
         # Seconds, whose steps are those of milliseconds.
         "bat": {"time": fast[::100], "v": x[::100]},
         "gps": {"time": fast[::200], "h": x[::200]},
-        "baro": {"time": gap, "p": x[::2]},
+        "baro": {"time": np.where(np.arange(3000) == 7, np.nan, fast[::2]), "p": x[::2]},
         # Whose first row is at no known time.
         "own": named(np.hstack([own.rate, own.angles]), "gyro_x", "gyro_y", "gyro_z", "roll", "pitch", "yaw"),
         "seq": {"number": 0.5 * np.arange(6000.0), "c1": x},
@@ -736,28 +732,6 @@ def test_matlab_of_version_7_3_is_hdf5_behind_a_line_of_text(tmp_path):
     with path.open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
     assert columns_of(log_contents(path))["imu/rate[2]"] == RATE[:, 2].tolist()
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("log.mat", b"", "an empty file: nothing was logged, or the copy failed"),
-        (
-            "log.mat",
-            b"MATLAB 5.0 MAT-file".ljust(126) + b"IM" + b"\x0f\0\0\0\xff\xff\0\0broken",
-            "cannot be read as MATLAB: ",
-        ),
-        ("log.h5", b"\x89HDF\r\n\x1a\n" + bytes(30), "cannot be read as HDF5: "),
-        ("log.h5", b"MATLAB 5.0 MAT-file".ljust(126), "cannot be read as MATLAB: "),
-        ("log.npz", b"broken", "cannot be read as NumPy: "),
-    ],
-    ids=["empty", "broken", "cut", "under another ending", "no archive"],
-)
-def test_what_cannot_be_read(tmp_path, name, content, message):
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(InputError) as caught:
-        log_contents(tmp_path / name)
-    assert f"{name}: {message}" in str(caught.value)
 
 
 def test_what_keeps_hdf5_busy_for_ever(tmp_path, monkeypatch):
@@ -940,8 +914,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
     ],
 )
 def test_a_file_that_is_no_log_is_named_with_the_way_to_one(tmp_path, name, content, what, way):
-    path = tmp_path / name
-    path.write_bytes(content)
+    path = put_file(tmp_path / name, content)
     with pytest.raises(InputError) as caught:
         log_contents(path)
     said = str(caught.value)
@@ -952,8 +925,7 @@ def test_a_file_that_is_no_log_is_named_with_the_way_to_one(tmp_path, name, cont
 @pytest.mark.parametrize("begins", [b"1, 2, 3, ", b"x= 1, y= 2", b"1 2", b"(1, 2, 3)", b"1\t, 2", 300 * b"1 "])
 def test_what_begins_as_numbers_and_goes_on_otherwise_is_said_at_once(tmp_path, begins):
     """Some of these took four seconds and more."""
-    path = tmp_path / "a.txt"
-    path.write_bytes(begins.ljust(1000) + b"?")
+    path = put_file(tmp_path / "a.txt", begins.ljust(1000) + b"?")
     begun = time.process_time()
     assert foreign_file(path) is None
     assert time.process_time() - begun < 0.5
@@ -961,6 +933,4 @@ def test_what_begins_as_numbers_and_goes_on_otherwise_is_said_at_once(tmp_path, 
 
 @pytest.mark.parametrize("line", ["t,x\n0,1\n", "2025-08-14 15:48:34.1,0.1\n", "2025-08-14 15:48:34 UTC,0.1\n"])
 def test_a_log_is_no_foreign_file(tmp_path, line):
-    path = tmp_path / "a.csv"
-    path.write_text(line)
-    assert foreign_file(path) is None
+    assert foreign_file(put_file(tmp_path / "a.csv", line)) is None

@@ -7,6 +7,7 @@ import scipy.io
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import log_contents
 from tests.builders.dataflash_logs import HEAD, dataflash
+from tests.builders.studies import put_file
 
 KINDS = {
     "IMU": ("QBff", "TimeUS,I,GyrX,AccX"),
@@ -35,9 +36,7 @@ def log(rows=ROWS, units=UNITS, said=("ArduCopter V4.5.7 (2a3dc4b7)",), *, text=
 @pytest.fixture
 def read(tmp_path):
     def call(content):
-        path = tmp_path / "log.bin"
-        path.write_bytes(content)
-        return log_contents(path)
+        return log_contents(put_file(tmp_path / "log.bin", content))
 
     return call
 
@@ -73,8 +72,7 @@ def test_what_the_log_says_of_units_parameters_and_program(read):
 
 
 def test_a_parameter_that_is_changed_in_flight_counts_as_it_was_at_the_beginning(read):
-    rows = [*ROWS, ("PARM", (9_000_000, b"FRAME_CLASS", 7.0))]
-    assert read(log(rows)).parameters == PARAMETERS
+    assert read(log([*ROWS, ("PARM", (9_000_000, b"FRAME_CLASS", 7.0))])).parameters == PARAMETERS
 
 
 def test_a_log_that_was_cut_off_is_read_up_to_there(read):

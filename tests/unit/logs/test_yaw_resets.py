@@ -36,8 +36,7 @@ def apart(one, other):
 def of_px4(path, counts=(1, 1, 1), asked="float[4] q_d"):
     """Write what PX4 logs: the stated quaternion is that of the turn, or its negative, which is the same one."""
     true = Rotation.from_euler("ZYX", angles(TIME)[:, ::-1])
-    turned = Rotation.from_rotvec(off(TIME)[:, None] * [0, 0, 1])
-    logged = (turned * true).as_quat()[:, [3, 0, 1, 2]]
+    logged = (Rotation.from_rotvec(off(TIME)[:, None] * [0, 0, 1]) * true).as_quat()[:, [3, 0, 1, 2]]
     counted, stated = np.full(len(TIME), 250.0), np.zeros((len(TIME), 2))
     for (at, turn), count, sign in zip(RESETS, counts, (1, -1, 1), strict=True):
         half = np.radians(turn) / 2
@@ -87,8 +86,7 @@ def of_ardupilot(events, turns=RESETS, noise_rad_s=0.0):
     """Write what ArduCopter logs: an attitude in hundredths of a degree, a gyroscope faster, and events."""
     fast = np.arange(0.0, 60.0, 0.04)
     true = angles(fast)
-    slopes = np.gradient(true, fast, axis=0)
-    (roll, pitch, _), (d_roll, d_pitch, d_yaw) = true.T, slopes.T
+    (roll, pitch, _), (d_roll, d_pitch, d_yaw) = true.T, np.gradient(true, fast, axis=0).T
     rate = np.column_stack(
         [
             d_roll - np.sin(pitch) * d_yaw,
@@ -136,8 +134,7 @@ def test_of_ardupilot_s_resets_near_each_other_each_is_undone(tmp_path, first, s
 
 
 def test_an_event_of_ardupilot_is_of_one_turn(tmp_path):
-    resets = np.array([[20.0, 20.0], [20.3, 12.0]])
-    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, (20.1, 62)], resets))
+    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, (20.1, 62)], np.array([[20.0, 20.0], [20.3, 12.0]])))
     assert log_contents(tmp_path / "log.bin").topics[YAW_RESETS][STAMP] == pytest.approx([20.0])
 
 
