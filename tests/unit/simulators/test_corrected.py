@@ -164,8 +164,7 @@ def test_numbers_that_instruments_do_not_identify_stay(mine):
 
 
 def test_a_yaw_torque_is_corrected_once(mine):
-    wrong = effect("drag_factor_error", error=0.2), effect("parameter_error", inertia_z=0.8)
-    said, new = correct(mine, *wrong)
+    said, new = correct(mine, *(effect("drag_factor_error", error=0.2), effect("parameter_error", inertia_z=0.8)))
     assert [each.element for each in said.changes] == ["momentConstant"]
     assert new.rotors[0].drag_factor == pytest.approx(1.2 / 1.8 * SMALL.drag_factor, rel=1e-3)
 
@@ -360,8 +359,7 @@ MJCF = """<mujoco model="cf2">
 
 def test_inertia_and_centre_of_mjcf(tmp_path):
     """Its controls are thrusts: what the flights say of them has no place in the file, and is listed."""
-    path = put_file(tmp_path / "cf2.xml", MJCF)
-    of, vehicle = of_log(read_model(path), None, None), SMALL.vehicle
+    of, vehicle = of_log(read_model(put_file(tmp_path / "cf2.xml", MJCF)), None, None), SMALL.vehicle
     effects = (
         effect("parameter_error", inertia_x=0.445, thrust_scale=-0.17),
         effect("com_offset", c_x=(0.002, 1e-4), c_y=(0.0, 1e-4)),
@@ -495,8 +493,7 @@ def test_each_file_says_its_own_changes(tmp_path):
     whole = (
         "<sdf version='1.9'><model name='w'><include merge='true'><uri>model://base</uri></include>\n{}</model></sdf>"
     )
-    path = put_file(tmp_path / "whole" / "model.sdf", whole.format("".join(plugins)))
-    of = of_log(read_model(path), None, None)
+    of = of_log(read_model(put_file(tmp_path / "whole" / "model.sdf", whole.format("".join(plugins)))), None, None)
     found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
                             effects=(effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17),))  # fmt: skip
     _, files = corrected(of, SMALL.vehicle, found, [ONE])
@@ -510,8 +507,7 @@ def test_each_file_says_its_own_changes(tmp_path):
 
 def test_files_of_one_name_are_numbered():
     files = [Path("w/model.sdf"), Path("a/base/model.sdf"), Path("b/base/model.sdf"), Path("c/base2-model.sdf")]
-    model = SimulatorModel("m", "sdf", (), (), (), (), tuple(files))
-    assert list(model.output_names.values()) == [
+    assert list(SimulatorModel("m", "sdf", (), (), (), (), tuple(files)).output_names.values()) == [
         "model.sdf", "base-model.sdf", "base2-model.sdf", "c-base2-model.sdf"
     ]  # fmt: skip
 
@@ -534,8 +530,7 @@ def test_python_is_corrected_in_place(tmp_path):
         effect("rotor_drag", k_d=(2e-7, 1e-8)),
         effect("motor_lag", time_constant_s=(0.05, 0.002)),
     )
-    changes = {change.element: change.after for change in said.changes}
-    assert changes == {
+    assert {change.element: change.after for change in said.changes} == {
         "quad_params.k_eta": 1.66e-8,
         "quad_params.Ixx": float(f"{1.5 * 0.83 * 3.7e-5:.4g}"),
         "quad_params.k_d": 2e-7,
@@ -629,8 +624,7 @@ def test_rotors_of_rotorpy_move_around_its_centre(tmp_path):
     for own in (path, path.parent / "new" / path.name):
         names: dict = {}
         exec(own.read_text(), names)
-        vehicle = multirotor(names["quad_params"])
-        wrenches.append(vehicle.compute_body_wrench(rate, speeds, air))
+        wrenches.append(multirotor(names["quad_params"]).compute_body_wrench(rate, speeds, air))
     (force, torque), (after, moved) = wrenches
     np.testing.assert_allclose(after, force, rtol=1e-12)
     thrusts = before.rotors[0].thrust.value * (speeds**2).sum()
@@ -640,8 +634,7 @@ def test_rotors_of_rotorpy_move_around_its_centre(tmp_path):
 
 def test_rotors_of_crazyflow_move_in_its_plane(tmp_path):
     """Its mixing matrix times L has the levers of thrust, and none of heights."""
-    path = put_file(tmp_path / "params.toml", SECTION.format(name="a"))
-    said, new, before = shifted(path)
+    said, new, before = shifted(put_file(tmp_path / "params.toml", SECTION.format(name="a")))
     np.testing.assert_allclose(new.hubs[:, :2], before.hubs[:, :2] - SHIFT[:2], rtol=0, atol=3e-5)
     entries = {f"a.mixing_matrix[{row}][{rotor}]" for row in (0, 1) for rotor in range(4)}
     assert {change.element for change in said.changes} == entries
