@@ -349,12 +349,6 @@ def test_a_rotation_that_is_asked_for_is_no_command_of_rotors(own, name):
     assert seen(flat_log(own, speed={**nine, **pulses})).signal("rotor_command").columns.columns == tuple(pulses)
 
 
-def test_two_guesses_that_the_data_cannot_part_are_both_listed(own):
-    speed = named(own.speed, "rotor1", "rotor2", "rotor3", "rotor4")
-    guess = seen(flat_log(own, speed=speed)).signal("rotor_speed")
-    assert (guess.sure, [rival.text for rival in guess.rivals]) == ("guess", ["unit: rpm"])
-
-
 def test_outputs_without_a_motor_are_left_out(own):
     idle = np.full((len(own.time), 2), 1500.0)
     names = [f"motor{number}_pwm" for number in range(1, 7)]
@@ -466,14 +460,6 @@ def test_rows_without_stamps_come_as_often_as_the_attitude_turns_as_the_gyroscop
 def test_rows_without_stamps_are_not_timed_by_a_gyroscope_whose_unit_or_rows_are_in_doubt(changed):
     with pytest.raises(InputError, match="no column of time stamps is recognised"):
         seen(flat_log(LONG, t=None, **changed))
-
-
-def test_time_on_the_ground_and_idling_is_cut(own):
-    recognition = seen(flat_log(with_ground(own)))
-    begin, end = recognition.flown.span_s
-    assert begin == pytest.approx(5.5, abs=0.1)
-    assert end == pytest.approx(24.5, abs=0.1)
-    assert len(recognition.flown.reasons) == 2
 
 
 @pytest.mark.parametrize(
