@@ -45,8 +45,7 @@ def then(own, seconds, *, rate=0.0, felt=(0.0, 0.0, GRAVITY), rotors=0.0, roll=N
 def joined(first, second):
     """One flight after another."""
     longer = type(first)(**vars(first))
-    step = first.time[1] - first.time[0]
-    longer.time = step * np.arange(len(first.time) + len(second.time))
+    longer.time = (first.time[1] - first.time[0]) * np.arange(len(first.time) + len(second.time))
     for name in _FIELDS:
         setattr(longer, name, np.vstack([getattr(first, name), getattr(second, name)]))
     longer.rotation = Rotation.from_euler("ZYX", longer.angles[:, ::-1])
@@ -74,10 +73,9 @@ def tumbles(own):
 def gives_way(own):
     """Lean more and more with two rotors at full, swing, and hit the ground three seconds later."""
     leans = then(own, 1.5, rate=0.8, felt=(0.0, 0.0, 9.0), rotors=(2.5, 0.9, 2.5, 0.9))
-    swings = then(
-        then(leans, 0.75, rate=-3.0, rotors=(2.5, 0.9, 1.2, 0.9)), 0.75, rate=3.0, rotors=(0.9, 0.9, 2.5, 1.0)
+    return hits(
+        then(then(leans, 0.75, rate=-3.0, rotors=(2.5, 0.9, 1.2, 0.9)), 0.75, rate=3.0, rotors=(0.9, 0.9, 2.5, 1.0))
     )
-    return hits(swings)
 
 
 def falls_and_hits(own):
@@ -93,9 +91,7 @@ def turns_over(own):
 
 def stops_in_the_air(own):
     """Lose all rotors, fall and hit the ground on the feet."""
-    falls = then(own, 1.2, felt=(0.0, 0.0, 0.0), falls=9.8)
-    struck = then(falls, 0.04, rate=2.0, felt=(0.0, 0.0, 100.0))
-    return then(struck, 6.0)
+    return then(then(then(own, 1.2, felt=(0.0, 0.0, 0.0), falls=9.8), 0.04, rate=2.0, felt=(0.0, 0.0, 100.0)), 6.0)
 
 
 def held(own):
