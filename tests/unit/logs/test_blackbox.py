@@ -26,15 +26,8 @@ from tests.builders.blackbox_logs import (
     three,
     unsigned,
 )
-from tests.builders.studies import put_file
 
-
-@pytest.fixture
-def read(tmp_path):
-    def call(content):
-        return log_contents(put_file(tmp_path / "LOG00001.TXT", content))
-
-    return call
+NAME = "LOG00001.TXT"
 
 
 FACTORS = {"gyroADC[0]": 1.0, "accSmooth[2]": 1 / 2048, "vbatLatest": 0.01, "eRPM[0]": 200 / 14}
@@ -286,7 +279,7 @@ def test_what_the_log_viewer_exports_is_read_as_the_log(read, tmp_path):
     text += ",".join(f'"{name}"' for name in (*NAMES, "flightModeFlags", "heading[0]")) + "\n"
     for number, row in enumerate(rows.tolist()):
         text += ",".join(map(str, [*row, "NaN" if number < 3 else 1, 0.25])) + "\n"
-    exported = log_contents(put_file(tmp_path / "log.bbl.csv", text))
+    exported = read(text, "log.bbl.csv")
     for name, values in log.topics[""].items():
         np.testing.assert_allclose(exported.topics[""][name], values, rtol=1e-6, atol=1e-9, err_msg=name)
     assert exported.topics[""]["flightModeFlags"].tolist() == [1.0] * len(rows)
@@ -320,16 +313,14 @@ def test_an_export_that_is_broken_is_refused(tmp_path, line, names, what):
         log_contents(tmp_path / "log.csv")
 
 
-def test_what_an_export_never_knows_is_no_column(tmp_path):
+def test_what_an_export_never_knows_is_no_column(read):
     rows = "".join(f"{row},{1000 * row},{row % 3},NaN\n" for row in range(40))
     text = f'"Product","{PRODUCT}"\n"acc_1G",2048\nloopIteration,time,motor[0],flightModeFlags\n{rows}'
-    (tmp_path / "log.csv").write_text(text)
-    assert log_contents(tmp_path / "log.csv").topics[""].keys() == {"time", "motor[0]"}
+    assert read(text, "log.csv").topics[""].keys() == {"time", "motor[0]"}
 
 
-def test_rows_that_an_export_holds_twice_are_said_and_nothing_is_called_missing(tmp_path):
+def test_rows_that_an_export_holds_twice_are_said_and_nothing_is_called_missing(read):
     rows = "".join((1 + (row % 10 == 0)) * f"{row},{1000 * row},{row % 3}\n" for row in range(40))
-    (tmp_path / "log.csv").write_text(f'"Product","{PRODUCT}"\n"acc_1G",2048\nloopIteration,time,motor[0]\n{rows}')
-    contents = log_contents(tmp_path / "log.csv")
+    contents = read(f'"Product","{PRODUCT}"\n"acc_1G",2048\nloopIteration,time,motor[0]\n{rows}', "log.csv")
     assert contents.topics[""]["motor[0]"].tolist() == [float(row % 3) for row in range(40)]
     assert contents.warnings == ("4 rows repeat the stamp of the one before: the first of each is used",)

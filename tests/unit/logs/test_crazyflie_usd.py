@@ -19,12 +19,7 @@ def log(version=2, whole=True):
     return usd({"fixedFrequency": VARIABLES, "tick": {}}, SAMPLES, version, whole)
 
 
-@pytest.fixture
-def read(tmp_path):
-    def call(content):
-        return log_contents(put_file(tmp_path / "log00", content))
-
-    return call
+NAME = "log00"
 
 
 @pytest.mark.parametrize(("version", "step"), [(1, 2.0), (2, 0.002)])
