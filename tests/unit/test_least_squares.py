@@ -157,12 +157,10 @@ def test_penalised_system_is_solved_with_its_penalty(condition):
 
 def test_losing_rank_never_improves_the_conditioning():
     """Systems whose last singular value falls through the tolerance: conditioning only rises."""
-    tolerance = 1e-6
-    found = [
-        solved(columns([8.0, 4.0, third, last])[0], np.ones(200), rank_tolerance=tolerance).conditioning
+    assert [
+        solved(columns([8.0, 4.0, third, last])[0], np.ones(200), rank_tolerance=1e-6).conditioning
         for third, last in ((2, 1), (2, 1e-9), (0, 0))
-    ]
-    assert found == pytest.approx([8, 2e6, 3e6])
+    ] == pytest.approx([8, 2e6, 3e6])
 
 
 @pytest.mark.usefixtures("each_way")
