@@ -130,12 +130,13 @@ def imported_tests(path):
 
 def test_tests_import_from_shared_builders_alone():
     """What tests of several packages build stands in `tests/builders`, which holds no tests."""
-    assert [
+    wrong = [
         f"{path.relative_to(TESTS)}: {name}"
         for path in sorted(TESTS.rglob("*.py"))
         for name in imported_tests(path)
         if not f"{name}.".startswith("tests.builders.")
-    ] == []
+    ]
+    assert wrong == []
     assert [path.name for path in TESTS.glob("builders/test_*.py")] == []
 
 

@@ -196,12 +196,13 @@ def test_texts_mention_effects_only_as_examples():
 
 def test_only_the_numbers_of_the_vehicle_are_imported_from_the_catalogue():
     prefix = "cpfls_cli.effects.catalogue"
-    assert {
+    imported = {
         module.removeprefix(f"{prefix}.")
         for path in ELSEWHERE
         for module in read(path)[1]
         if module.startswith(f"{prefix}.")
-    } == IMPORTED
+    }
+    assert imported == IMPORTED
 
 
 @pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))

@@ -133,9 +133,8 @@ def test_of_ardupilot_s_resets_near_each_other_each_is_undone(read, first, secon
 
 
 def test_an_event_of_ardupilot_is_of_one_turn(read):
-    assert read(of_ardupilot([*FLIES, (20.1, 62)], np.array([[20.0, 20.0], [20.3, 12.0]]))).topics[YAW_RESETS][
-        STAMP
-    ] == pytest.approx([20.0])
+    topics = read(of_ardupilot([*FLIES, (20.1, 62)], np.array([[20.0, 20.0], [20.3, 12.0]]))).topics
+    assert topics[YAW_RESETS][STAMP] == pytest.approx([20.0])
 
 
 def test_ardupilot_s_reset_that_is_as_small_as_what_vibration_makes_is_none(read):
