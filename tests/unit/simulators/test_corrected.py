@@ -50,7 +50,13 @@ def effect(name, **values):
     return named_effect(name, numbers=[number(key, *np.atleast_1d(value)) for key, value in values.items()])
 
 
-def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(), hidden=(), vehicle=None):
+def files_of(of, *effects, vehicle=SMALL.vehicle, flights=(ONE,), **found):
+    """What is said of a file and the corrected ones, where flights were compared with a vehicle."""
+    usual = {"verdict": "NAMED", "contradictions": (), "rivals": {}, "not_excited": ()}
+    return corrected(of, vehicle, SimpleNamespace(effects=effects, **(usual | found)), list(flights))
+
+
+def correct(path, *effects, alternatives=(), hidden=(), vehicle=None, **found):
     of = of_log(read_model(path), None, None)
     vehicle = vehicle or VehicleSettings(
         mass_kg=of.mass_kg,
@@ -68,10 +74,8 @@ def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(),
     rivals = {}
     for each in alternatives:
         rivals.setdefault(each.instead_of, []).append(each)
-    found = SimpleNamespace(
-        verdict=verdict, contradictions=contradictions, rivals=rivals, effects=effects, not_excited=hidden
-    )
-    said, files = corrected(of, vehicle, found, [ONE, TWO])
+    found |= {"rivals": rivals, "not_excited": hidden}
+    said, files = files_of(of, *effects, vehicle=vehicle, flights=(ONE, TWO), **found)
     (path.parent / "new").mkdir(exist_ok=True)
     for name, content in files.items():
         (path.parent / "new" / name).write_bytes(content)
@@ -359,14 +363,12 @@ MJCF = """<mujoco model="cf2">
 
 def test_inertia_and_centre_of_mjcf(tmp_path):
     """Its controls are thrusts: what the flights say of them has no place in the file, and is listed."""
-    of, vehicle = of_log(read_model(put_file(tmp_path / "cf2.xml", MJCF)), None, None), SMALL.vehicle
-    effects = (
+    said, files = files_of(
+        of_log(read_model(put_file(tmp_path / "cf2.xml", MJCF)), None, None),
         effect("parameter_error", inertia_x=0.445, thrust_scale=-0.17),
         effect("com_offset", c_x=(0.002, 1e-4), c_y=(0.0, 1e-4)),
         effect("rotor_drag", k_d=(1e-5, 1e-6)),
     )
-    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, effects=effects, not_excited=())
-    said, files = corrected(of, vehicle, found, [ONE])
     (new,) = files.values()
     assert b'pos="0.002 0 0" mass="0.045" diaginertia="4.438e-05 4.2e-5 6.6e-5"/> <!-- by CAD -->' in new
     assert [each.element for each in said.changes] == ["ixx", "pose x"]
@@ -434,8 +436,7 @@ def test_thrusts_as_controls_are_not_what_flights_were_compared_with(tmp_path):
     path.write_text(text.replace(".006", ".0045"))
     of = of_log(read_model(path), None, None)
     effects = (effect("drag_factor_error", error=0.25), effect("rotor_mismatch", difference_1=(0.1, 0.001)))
-    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, effects=effects, not_excited=())
-    said, files = corrected(of, SMALL.vehicle, found, [ONE])
+    said, files = files_of(of, *effects)
     assert files["cf2.xml"] == path.read_bytes()
     assert said.elsewhere[0].startswith(
         "thrust, as a factor on that which flights were compared with: M1 1.05 [1.05, 1.05], M3 0.95 [0.9495, 0.9505]; "
@@ -471,9 +472,7 @@ def test_a_first_link_without_mass_leaves_the_heaviest(tmp_path):
 @pytest.mark.parametrize("name", ["a--b---.csv", "\u00fc--.csv", "-->.csv", "line\nbreak.csv"])
 def test_no_name_of_a_log_ends_the_comment(mine, name):
     of = of_log(read_model(mine), None, None)
-    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
-                            effects=(effect("drag_factor_error", error=0.25),))  # fmt: skip
-    _, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name=name)])
+    _, files = files_of(of, effect("drag_factor_error", error=0.25), flights=[SimpleNamespace(name=name)])
     comment = files["mine.sdf"].decode("ascii").partition("<!-- Corrected")[2].partition("-->")[0]
     assert "--" not in comment
     assert comment.endswith(" ")
@@ -494,9 +493,7 @@ def test_each_file_says_its_own_changes(tmp_path):
         "<sdf version='1.9'><model name='w'><include merge='true'><uri>model://base</uri></include>\n{}</model></sdf>"
     )
     of = of_log(read_model(put_file(tmp_path / "whole" / "model.sdf", whole.format("".join(plugins)))), None, None)
-    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
-                            effects=(effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17),))  # fmt: skip
-    _, files = corrected(of, SMALL.vehicle, found, [ONE])
+    _, files = files_of(of, effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17))
     assert list(files) == ["model.sdf", "base-model.sdf"]
     own, base = (text.decode().partition("<!-- Corrected")[2].partition("-->")[0] for text in files.values())
     assert "motorConstant" in own
@@ -592,8 +589,7 @@ def test_thrust_of_ardupilot_is_the_reciprocal_of_its_hover_throttle(tmp_path, c
 def test_a_direction_that_no_flight_shows_stays(mine):
     """The log states another one, and its flight has no speeds of rotors."""
     of = replace(of_log(read_model(mine), None, None), spins=(-1, 1, -1, -1))
-    found = SimpleNamespace(verdict="NO_GAP", contradictions=(), rivals={}, effects=(), not_excited=())
-    said, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name="one.csv", rotor_speed=None)])
+    said, files = files_of(of, verdict="NO_GAP", flights=[SimpleNamespace(name="one.csv", rotor_speed=None)])
     assert files["mine.sdf"] == mine.read_bytes()
     assert said.unchanged[0].startswith("directions of rotors: no flight of more than 5 s")
 
