@@ -11,7 +11,7 @@ from tests.builders import ended_flights as ended
 from tests.builders.topic_logs import ardupilot, proposed
 from tests.builders.unknown_logs import flight
 
-HIGH = np.array([0.0, 0.0, 30.0])
+HIGH, WEIGHT = np.array([0.0, 0.0, 30.0]), np.array([0.0, 0.0, 9.81])
 ALL = ("height", "upright", "force")
 
 
@@ -178,8 +178,7 @@ def test_flips_are_flight_also_where_the_log_ends_in_them(own, known):
 
 def test_a_push_before_the_end_of_a_log_that_is_flown_out_of_is_no_loss_of_control(own):
     """Such as the wake of another vehicle: its rotors do not turn it, and it flies on as before."""
-    pushed = type(own)(**vars(own))
-    pushed.rate, pushed.angles = own.rate.copy(), own.angles.copy()
+    pushed = ended.changed(own, rate=own.rate.copy(), angles=own.angles.copy())
     begin = own.time[-1] - 1.3
     turn = (own.time >= begin) & (own.time < begin + 0.4)
     phase = 2 * np.pi * (own.time[turn] - begin) / 0.4
@@ -187,8 +186,7 @@ def test_a_push_before_the_end_of_a_log_that_is_flown_out_of_is_no_loss_of_contr
     pushed.angles[turn, 0] += 12.0 * 0.4 / (2 * np.pi) * (1 - np.cos(phase))
     assert flown(pushed, ("height", "upright")).ended == ""
     # What does not move at all has come down.
-    lies = type(own)(**vars(pushed))
-    lies.rate = np.where((own.time > begin + 0.6)[:, None], 0.0, pushed.rate)
+    lies = ended.changed(pushed, rate=np.where((own.time > begin + 0.6)[:, None], 0.0, pushed.rate))
     assert flown(lies, ("height", "upright")).ended.startswith("loss of control at ")
     still = own.time < begin + 0.35
     for name in ("time", "rate", "angles", "position", "specific_force", "speed"):
@@ -204,10 +202,8 @@ def test_a_vehicle_that_is_carried_home_by_hand_is_said_to(own):
 @pytest.mark.parametrize("known", [ALL, ("force",), ()])
 def test_what_only_shakes_on_a_bench_does_not_fly(own, known):
     rng = np.random.default_rng(1)
-    bench = type(own)(**vars(own))
-    bench.rate = 0.1 * rng.standard_normal(own.rate.shape)
-    bench.angles, bench.position = 0.001 * rng.standard_normal(own.rate.shape), 0 * own.position
-    bench.specific_force = np.array([0.0, 0.0, 9.81]) + 0.5 * rng.standard_normal(own.rate.shape)
+    rate, angles, force = np.array([[[0.1]], [[0.001]], [[0.5]]]) * rng.standard_normal((3, *own.rate.shape))
+    bench = ended.changed(own, rate=rate, angles=angles, position=0 * own.position, specific_force=WEIGHT + force)
     found = flown(bench, known)
     assert (found.flies, found.reasons) == (False, ("no flight in it: the vehicle neither turns nor moves",))
 
@@ -224,40 +220,30 @@ def test_height_of_an_autopilot_that_counts_downward(own):
 
 @pytest.mark.parametrize("known", [("height",), ("force",), ("upright",)])
 def test_dead_rates_deny_no_flight_that_leans_is_pushed_or_climbs(own, known):
-    dead = type(own)(**vars(own))
-    dead.position = own.position + np.outer(own.time, [0.0, 0.0, 1.0])
-    dead.rate, dead.specific_force = (
-        0.001 * own.rate,
-        own.specific_force * np.linspace(0.6, 1.4, len(own.time))[:, None],
-    )
-    assert flown(dead, known).flies
+    climbs = own.position + np.outer(own.time, [0.0, 0.0, 1.0])
+    felt = own.specific_force * np.linspace(0.6, 1.4, len(own.time))[:, None]
+    assert flown(ended.changed(own, position=climbs, rate=0.001 * own.rate, specific_force=felt), known).flies
 
 
 def test_an_estimate_of_height_that_drifts_on_the_ground_is_no_flight(own):
     rng = np.random.default_rng(1)
-    stands = type(own)(**vars(own))
-    stands.rate = 0.006 * rng.standard_normal(own.rate.shape)
-    stands.angles = 0.001 * rng.standard_normal(own.rate.shape)
-    stands.specific_force = np.array([0.0, 0.0, 9.81]) + 0.05 * rng.standard_normal(own.rate.shape)
-    stands.rate += 0.01 * np.sin(own.time)[:, None]
-    stands.position = np.outer(0.4 * np.sin(0.2 * own.time), [0.0, 0.0, 1.0])
-    found = flown(stands, ALL)
+    rate, angles, force = np.array([[[0.006]], [[0.001]], [[0.05]]]) * rng.standard_normal((3, *own.rate.shape))
+    rate += 0.01 * np.sin(own.time)[:, None]
+    drifts = np.outer(0.4 * np.sin(0.2 * own.time), [0.0, 0.0, 1.0])
+    found = flown(ended.changed(own, rate=rate, angles=angles, specific_force=WEIGHT + force, position=drifts), ALL)
     assert (found.flies, found.reasons) == (False, ("no flight in it: the vehicle neither turns nor moves",))
 
 
 def test_a_climb_that_neither_turns_nor_leans_is_a_flight(own):
-    climbs = type(own)(**vars(own))
-    climbs.rate, climbs.angles = 0.006 * np.random.default_rng(1).standard_normal(own.rate.shape), 0 * own.angles
-    assert flown(climbs).flies
+    rate = 0.006 * np.random.default_rng(1).standard_normal(own.rate.shape)
+    assert flown(ended.changed(own, rate=rate, angles=0 * own.angles)).flies
 
 
 def test_a_hover_without_gyroscope_that_leans_is_a_flight(own):
-    hovers = type(own)(**vars(own))
-    hovers.position = 0.05 * np.sin(own.time)[:, None] + 0 * own.position
     signs = Signs(
         time=own.time,
         rotors=rotor_shares(own.speed, shares=False),
-        height=hovers.position[:, 2],
+        height=0.05 * np.sin(own.time),
         upright=upright_of(own.angles, None, "wxyz"),
     )
     assert find_flown(signs).flies
@@ -275,10 +261,8 @@ def test_a_flip_before_landing_is_no_crash(own, known):
 
 
 def test_an_attitude_that_turns_over_while_weight_stays_is_no_flight(own):
-    bench = type(own)(**vars(own))
-    bench.angles, bench.rate = own.angles.copy(), own.rate.copy()
+    bench = ended.changed(own, angles=own.angles.copy(), rate=own.rate.copy(), specific_force=WEIGHT + 0 * own.rate)
     bench.angles[:, 0], bench.rate[:, 0] = 0.6 * own.time, 0.6
-    bench.specific_force = np.tile([0.0, 0.0, 9.81], (len(own.time), 1))
     found = flown(bench, ("force", "upright"))
     assert not found.flies
     assert found.reasons[0].startswith("no flight in it: by its attitude it lies on its back for seconds")
@@ -286,10 +270,9 @@ def test_an_attitude_that_turns_over_while_weight_stays_is_no_flight(own):
 
 def test_a_long_turn_pushed_along_its_side_is_no_rest(own):
     """Air that is as strong as the weight, as a dive has it, while the vehicle turns slowly all the time."""
-    dives = type(own)(**vars(own))
-    inside = (own.time > 15) & (own.time < 20)
-    dives.rate = np.where(inside[:, None], [0.35, 0.0, 0.3], own.rate)
-    dives.specific_force = np.where(inside[:, None], [9.0, 1.0, 0.0], own.specific_force)
+    inside = ((own.time > 15) & (own.time < 20))[:, None]
+    dives = ended.changed(own, specific_force=np.where(inside, [9.0, 1.0, 0.0], own.specific_force))
+    dives.rate = np.where(inside, [0.35, 0.0, 0.3], own.rate)
     assert flown(dives, ("force",)).ended == ""
-    dives.rate = np.where(inside[:, None], np.median(own.rate, axis=0), own.rate)
+    dives.rate = np.where(inside, np.median(own.rate, axis=0), own.rate)
     assert "rests on something" in flown(dives, ("force",)).ended
