@@ -43,8 +43,7 @@ def flown():
     rng = np.random.default_rng(4)
     hidden = [make(f"none-{name}", "none", name, (), rng) for name in VEHICLES]
     hidden += [make(effect, "single", "sixkg", (effect,), rng, level=0.5) for effect in EFFECTS]
-    flights = generator.simulate_many(hidden, 7, duration=2.0, lead_in=1.0)
-    return {group.case.name: group for group in flights}
+    return {group.case.name: group for group in generator.simulate_many(hidden, 7, duration=2.0, lead_in=1.0)}
 
 
 def alone(vehicle, plant, hidden):
@@ -72,8 +71,7 @@ def turned(y):
 
 
 def rigid_energy(fleet, y):
-    inertia = fleet.inertia[:, :, 0]
-    return 3.0 * (y[3:6] ** 2).sum() + 0.5 * y[10:13, 0] @ inertia @ y[10:13, 0] + 6 * 9.81 * y[2, 0]
+    return 3.0 * (y[3:6] ** 2).sum() + 0.5 * y[10:13, 0] @ fleet.inertia[:, :, 0] @ y[10:13, 0] + 6 * 9.81 * y[2, 0]
 
 
 def test_generator_does_not_import_the_package_it_judges():
@@ -237,8 +235,7 @@ def test_noise_has_its_stated_size(flown, kind):
     long = np.tile(flown["none-sixkg"].flights[0].table, (40, 1))
     noisy = generator.disturb(long, SIXKG, "mid", kind, np.random.default_rng(2))
     spread = (noisy - long)[:, [1, 4, 7, 10, 13, 16]].std(axis=0)
-    stated = [np.radians(0.2), 0.005, 0.02, 0.05, 0.05, 1.0]
-    np.testing.assert_allclose(spread, stated, rtol=0.1)
+    np.testing.assert_allclose(spread, [np.radians(0.2), 0.005, 0.02, 0.05, 0.05, 1.0], rtol=0.1)
 
 
 def test_written_logs_hold_no_key(flown, tmp_path):
@@ -256,8 +253,7 @@ def test_written_logs_hold_no_key(flown, tmp_path):
 
 
 def test_arms_on_springs_keep_the_angular_momentum():
-    hidden = {"flexible_arm": {"share": 0.3, "frequency": 3.0, "damping": 0.05}}
-    fleet = alone(SIXKG, nominal(SIXKG), hidden)
+    fleet = alone(SIXKG, nominal(SIXKG), {"flexible_arm": {"share": 0.3, "frequency": 3.0, "damping": 0.05}})
     # About one axis: the turning of the arms is written for small angles.
     fleet.y[12], fleet.with_state[0].state[2] = 0.8, 0.1
     drive, momentum, angle = StillRotors(1), [], []

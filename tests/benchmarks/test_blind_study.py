@@ -109,14 +109,13 @@ def test_answers_are_distinguished(truth, verdict, names, expected):
         "only": "",
         "residual_rms_n_m": {"held_out_1": [torque, 0.0, 0.0], "train_1": [9.0, 9.0, 9.0]},
     }
-    rivals = [
-        {"name": "com_offset", "instead_of": "inflow"},
-        {"name": "motor_lag", "instead_of": "low_pass_filter", "jointly_with": "command_delay"},
-    ]
     said = {
         "verdict": verdict,
         "effects": [{"name": name} for name in names],
-        "alternatives": rivals,
+        "alternatives": [
+            {"name": "com_offset", "instead_of": "inflow"},
+            {"name": "motor_lag", "instead_of": "low_pass_filter", "jointly_with": "command_delay"},
+        ],
         "floor": [0.1] * 6,
     }
     assert outcome(key, said) == expected

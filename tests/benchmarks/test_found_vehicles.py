@@ -5,8 +5,7 @@ from tests.builders.playback_flights import MIDDLING, STATED, flown, truth
 
 
 def test_a_vehicle_is_found_with_the_baselines_of_its_choice(capsys):
-    flights = flown(truth(), ("figure", "steps"), duration_s=4.0, noise=MIDDLING, seed=2)
-    models = learned(STATED, flights)
+    models = learned(STATED, flown(truth(), ("figure", "steps"), duration_s=4.0, noise=MIDDLING, seed=2))
     said = capsys.readouterr().out
     assert [name.partition(",")[0] for name in models] == ["vehicle", "added", "everything"]
     for name in ("chosen", "best", "added", "everything", "nothing"):

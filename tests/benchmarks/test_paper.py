@@ -260,8 +260,7 @@ def test_a_search_has_converged_where_its_last_fifth_brings_nothing():
     assert verdict(CONVERGENCE_CLAIM, *early) == ClaimVerdict.PASS
     assert verdict(CONVERGENCE_CLAIM, with_runs(small, settled=21), early[1]) == ClaimVerdict.FAIL
     assert verdict(CONVERGENCE_CLAIM, setting_of(NOISE)) == ClaimVerdict.NOT_MEASURED
-    at_once = CONVERGENCE_CLAIM.of_searches([[with_runs(small, settled=0)]])
-    assert "The random start is there already" in at_once.why
+    assert "The random start is there already" in CONVERGENCE_CLAIM.of_searches([[with_runs(small, settled=0)]]).why
 
 
 def test_ranking_by_quantity_next_to_a_classical_one():
@@ -277,16 +276,14 @@ def test_torque_goes_on_across_a_full_turn(torque, passes):
     functions = SimpleNamespace(torque=lambda motion: torque(motion.attitude))
     record = SimpleNamespace(functions=functions)
     model = SimpleNamespace(record=record, label="m.h5", config={"identification": {"structure": "cpfls"}})
-    measured = CONTINUITY_CLAIM.measure(SimpleNamespace(models=[model]))
-    assert (measured.verdict == ClaimVerdict.PASS) == passes
+    assert (CONTINUITY_CLAIM.measure(SimpleNamespace(models=[model])).verdict == ClaimVerdict.PASS) == passes
     assert CONTINUITY_CLAIM.measure(SimpleNamespace(models=[])).verdict == ClaimVerdict.NOT_MEASURED
 
 
 def chosen(criterion, judged_on, factor, condition, size=(20, 5)):
     ours = setting_of(factor * NOISE, samples=685, size=size)
     ours = with_runs(ours, **{f"learned_{name}": 0.1 * NOISE for name in ("mse", "max_error", "relative_error")})
-    reading = {"criterion": criterion, "judged_on": judged_on}
-    return replace(ours, uniform_condition_number=condition, **reading)
+    return replace(ours, uniform_condition_number=condition, criterion=criterion, judged_on=judged_on)
 
 
 def reading_sources(*flights):
@@ -349,8 +346,7 @@ def test_of_one_reading_in_two_sweeps_the_larger_search_stands():
 
 
 def test_a_report_of_one_reading_compares_none():
-    given = reading_sources((0.0, [FULL, chosen("D", "training", 1.0, 9.0)]))
-    assert readings_blocks(given, CLAIMS) == ([], [])
+    assert readings_blocks(reading_sources((0.0, [FULL, chosen("D", "training", 1.0, 9.0)])), CLAIMS) == ([], [])
 
 
 @pytest.mark.usefixtures("drawn")

@@ -62,8 +62,7 @@ def flown_margins(
     time = np.arange((periods + 1) * count + 1) / law.rate_hz
     added = np.zeros((len(time), 3))
     added[:, axis] = np.resize(one, len(time))
-    level = np.zeros((len(time), 3))
-    flight = _flown(autopilot, values, vehicle, lag, time, level, gusts, noise, seed, added)
+    flight = _flown(autopilot, values, vehicle, lag, time, np.zeros((len(time), 3)), gusts, noise, seed, added)
     motors = Motors.of(law.mixer, law.curve, vehicle)
     sent = (np.linalg.pinv(motors.mix) @ motors.curve.thrust(flight.command / motors.speed_max).T)[1 + axis]
     # A command acts a step late and is logged as the mean of two: so is what was added.

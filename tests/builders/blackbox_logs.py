@@ -111,12 +111,11 @@ SINGLE = {0: signed, 1: unsigned, 3: lambda value: unsigned(-value & 0x3FFF), 9:
 
 def predicted(how, place, row, before):
     last, other = before
-    total = last[place] + other[place]
     return {
         0: 0,
         1: last[place],
         2: 2 * last[place] - other[place],
-        3: int(total / 2),
+        3: int((last[place] + other[place]) / 2),
         4: MINIMUM,
         5: row[NAMES.index("motor[0]")],
         6: row[place],

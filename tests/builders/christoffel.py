@@ -11,6 +11,4 @@ def torque(attitude, attitude_rate, attitude_acceleration, inertia):
     qd = attitude_rate
     dJ = inertia_matrix_gradient(attitude, inertia)
     inertial = rotations.multiply(inertia_matrix(attitude, inertia), attitude_acceleration)
-    turning = np.einsum("nkij,nk,nj->ni", dJ, qd, qd)
-    energy_gradient = 0.5 * np.einsum("nkij,ni,nj->nk", dJ, qd, qd)
-    return inertial + turning - energy_gradient
+    return inertial + np.einsum("nkij,nk,nj->ni", dJ, qd, qd) - 0.5 * np.einsum("nkij,ni,nj->nk", dJ, qd, qd)

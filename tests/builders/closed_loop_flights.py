@@ -52,14 +52,13 @@ def flown(duration=3.0, seed=1, vehicle=VEHICLE, noise=None, relative_noise=None
 def signals_of(flight):
     logged = flight.signals
     hidden = "rotor_speed" not in logged
-    names = ("attitude", "body_rate", "position", "velocity", "acceleration")
     return Signals(
         time=PERIOD * np.arange(len(logged["attitude"])),
         vehicle=VEHICLE,
         rotor_speed=logged["rotor_command" if hidden else "rotor_speed"],
         commanded=hidden,
         voltage=logged.get("voltage"),
-        **{name: logged[name] for name in names},
+        **{name: logged[name] for name in ("attitude", "body_rate", "position", "velocity", "acceleration")},
     )
 
 

@@ -9,6 +9,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
+from tests.builders.studies import put_file
+
 STRICT = ["-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Wstrict-prototypes"]
 WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", *STRICT]
 CHECKS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
@@ -59,8 +61,7 @@ def why_not():
     if shutil.which("gcc") is None:
         return "no gcc on this machine"
     with TemporaryDirectory() as folder:
-        probe = Path(folder) / "probe.c"
-        probe.write_text("int main(void) { return 0; }\n")
+        probe = put_file(Path(folder) / "probe.c", "int main(void) { return 0; }\n")
         done = subprocess.run(["gcc", *CHECKS, probe, "-o", probe.with_name("probe")], capture_output=True, check=False)
     return "gcc has no sanitisers on this machine" if done.returncode else None
 

@@ -62,8 +62,7 @@ def missing():
 def compile_missing():
     """Compile what is missing, side by side."""
     command = (sys.executable, "-m", "tests.builders.compiled_loops")
-    started = [subprocess.Popen((*command, source), cwd=ROOT) for source in missing()]
-    for process in started:
+    for process in [subprocess.Popen((*command, source), cwd=ROOT) for source in missing()]:
         process.wait()
 
 

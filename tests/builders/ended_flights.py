@@ -14,6 +14,11 @@ ONE_AT_FULL = (1.6, 0.3, 0.3, 0.3)
 TWO_AT_FULL = (1.6, 0.3, 1.6, 0.3)
 
 
+def changed(own, **fields):
+    """Copy a flight but for some fields."""
+    return type(own)(**vars(own) | fields)
+
+
 def then(own, seconds, *, rate=0.0, felt=(0.0, 0.0, GRAVITY), rotors=0.0, roll=None, falls=0.0, seed=5):
     """Append some seconds: rate about x, rad/s, force that is felt, rotors as shares of hover, roll, fall, m/s^2."""
     rng = np.random.default_rng(seed)
@@ -33,10 +38,8 @@ def then(own, seconds, *, rate=0.0, felt=(0.0, 0.0, GRAVITY), rotors=0.0, roll=N
         "specific_force": np.tile(felt, (count, 1)) + 0.2 * rng.standard_normal((count, 3)),
         "speed": np.broadcast_to(rotors, (count, 4)) * own.speed.mean() + rng.standard_normal((count, 4)),
     }
-    longer = type(own)(**vars(own))
+    longer = changed(own, **{name: np.vstack([getattr(own, name), more[name]]) for name in _FIELDS})
     longer.time = step * np.arange(len(own.time) + count)
-    for name in _FIELDS:
-        setattr(longer, name, np.vstack([getattr(own, name), more[name]]))
     longer.speed = np.maximum(longer.speed, 0.0)
     longer.rotation = Rotation.from_euler("ZYX", longer.angles[:, ::-1])
     return longer
@@ -44,11 +47,8 @@ def then(own, seconds, *, rate=0.0, felt=(0.0, 0.0, GRAVITY), rotors=0.0, roll=N
 
 def joined(first, second):
     """One flight after another."""
-    longer = type(first)(**vars(first))
-    step = first.time[1] - first.time[0]
-    longer.time = step * np.arange(len(first.time) + len(second.time))
-    for name in _FIELDS:
-        setattr(longer, name, np.vstack([getattr(first, name), getattr(second, name)]))
+    longer = changed(first, **{name: np.vstack([getattr(first, name), getattr(second, name)]) for name in _FIELDS})
+    longer.time = (first.time[1] - first.time[0]) * np.arange(len(first.time) + len(second.time))
     longer.rotation = Rotation.from_euler("ZYX", longer.angles[:, ::-1])
     return longer
 
@@ -74,10 +74,9 @@ def tumbles(own):
 def gives_way(own):
     """Lean more and more with two rotors at full, swing, and hit the ground three seconds later."""
     leans = then(own, 1.5, rate=0.8, felt=(0.0, 0.0, 9.0), rotors=(2.5, 0.9, 2.5, 0.9))
-    swings = then(
-        then(leans, 0.75, rate=-3.0, rotors=(2.5, 0.9, 1.2, 0.9)), 0.75, rate=3.0, rotors=(0.9, 0.9, 2.5, 1.0)
+    return hits(
+        then(then(leans, 0.75, rate=-3.0, rotors=(2.5, 0.9, 1.2, 0.9)), 0.75, rate=3.0, rotors=(0.9, 0.9, 2.5, 1.0))
     )
-    return hits(swings)
 
 
 def falls_and_hits(own):
@@ -93,9 +92,7 @@ def turns_over(own):
 
 def stops_in_the_air(own):
     """Lose all rotors, fall and hit the ground on the feet."""
-    falls = then(own, 1.2, felt=(0.0, 0.0, 0.0), falls=9.8)
-    struck = then(falls, 0.04, rate=2.0, felt=(0.0, 0.0, 100.0))
-    return then(struck, 6.0)
+    return then(then(then(own, 1.2, felt=(0.0, 0.0, 0.0), falls=9.8), 0.04, rate=2.0, felt=(0.0, 0.0, 100.0)), 6.0)
 
 
 def held(own):
@@ -105,8 +102,7 @@ def held(own):
 
 def rocks_on_the_ground(own):
     """Hover calmly, hit the ground, and rock on the feet with one motor at full."""
-    calm = type(own)(**vars(own))
-    calm.rate, calm.speed = 0.02 * own.rate, own.speed.mean() + 0.1 * (own.speed - own.speed.mean())
+    calm = changed(own, rate=0.02 * own.rate, speed=own.speed.mean() + 0.1 * (own.speed - own.speed.mean()))
     struck = then(then(calm, 0.04, rate=-14.0, felt=(30.0, -20.0, 40.0), rotors=1.0), 1.0, rotors=1.0)
     rocks = then(struck, 25.0, rotors=ONE_AT_FULL)
     late = rocks.time > struck.time[-1]
@@ -142,7 +138,6 @@ def carried(own):
 
 def flips(own):
     """Flip over and over in the air: nearly in free fall and upside down, by the torque of the rotors."""
-    flipped = type(own)(**vars(own))
     angles, rate, force = own.angles.copy(), own.rate.copy(), own.specific_force.copy()
     squared = own.speed**2
     for begin in np.arange(5.0, own.time[-1] - 0.4, 2.5):
@@ -154,7 +149,6 @@ def flips(own):
         torque = INERTIA[0] * (np.pi**3 / 0.49) * np.cos(np.pi * done)
         wanted = np.column_stack([0.5 * MASS * GRAVITY + 0 * done, torque, 0 * done, 0 * done])
         squared[turn] = wanted @ np.linalg.inv(mixer()).T
-    flipped.angles, flipped.rate, flipped.specific_force = angles, rate, force
-    flipped.speed = np.sqrt(np.maximum(squared, 1e3))
+    flipped = changed(own, angles=angles, rate=rate, specific_force=force, speed=np.sqrt(np.maximum(squared, 1e3)))
     flipped.rotation = Rotation.from_euler("ZYX", angles[:, ::-1])
     return flipped

@@ -87,8 +87,7 @@ def states(model: InertiaFunctions, count: int, seed: int = 0) -> Motion:
     attitude = rng.uniform(-20, 20, (count, 3))
     turns = 2 * np.pi * rng.integers(-3, 4, (count, 2))
     for axis in (0, 1):
-        special = _special(model, axis)
-        picked = rng.choice(special, count) + np.where(rng.random(count) < 0.5, turns[:, axis], 0.0)
+        picked = rng.choice(_special(model, axis), count) + np.where(rng.random(count) < 0.5, turns[:, axis], 0.0)
         nudged = np.nextafter(picked, rng.choice([-np.inf, np.inf], count))
         own = np.where(rng.random(count) < 0.5, picked, nudged)
         attitude[:, axis] = np.where(rng.random(count) < 0.25, own, attitude[:, axis])
@@ -132,8 +131,7 @@ def sheet_of(model: InertiaFunctions, **changes) -> Sheet:
     shown = {"findings": given["findings"], "stop_reason": given["stop_reason"], "verdict": given["verdict"]}
     made = IdentifiedModel(**others | shown | {"model": vehicle, "judged": _judged()})
     origin = Origin(stage="identify", seed=1, config=yaml.safe_dump(given["config"]), inputs=inputs, version="0.1.0")
-    sheet = bare_sheet(made, vehicle, origin)
-    return replace(sheet, name=given["name"], file=given["file"], sha256="a" * 64)
+    return replace(bare_sheet(made, vehicle, origin), name=given["name"], file=given["file"], sha256="a" * 64)
 
 
 def verdict_of(label: str, region: str, *reasons: tuple[str, int]) -> Verdict:

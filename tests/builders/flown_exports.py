@@ -83,11 +83,10 @@ def _whole_body(model: ElementTree.Element) -> tuple[float, Array, Array]:
         own.append(symmetric([float(link.findtext(f"inertial/inertia/{entry}", "")) for entry in ENTRIES]))
         if link.get("name") != "base_link":
             hubs.append(place)
-    mass = float(sum(masses))
     centre = np.average(centres, axis=0, weights=masses)
     parts = zip(masses, centres, own, strict=True)
     inertia = sum(tensor + weight * apart(place - centre) for weight, place, tensor in parts)
-    return mass, np.asarray(inertia), np.array(hubs) - centre
+    return float(sum(masses)), np.asarray(inertia), np.array(hubs) - centre
 
 
 def fly_crazyflow(text: str, course: Course) -> State:
@@ -210,8 +209,7 @@ def fly_pyflyt(text: str, course: Course) -> State:
     fastest = most / _RPM
 
     def wrench(speed: Array, _air: Array, rate: Array, _rotation: Array) -> tuple[Array, Array]:
-        throttle = speed[:, order] / fastest
-        squares = (throttle * most) ** 2
+        squares = (speed[:, order] / fastest * most) ** 2
         lifts = (motor["thrust_coef"] * squares)[..., None] * [0.0, 0.0, 1.0]
         torque = rotations.cross(hubs, lifts).sum(axis=1) - np.sign(rate) * drag["drag_coef_pqr"] * rate**2
         torque[:, 2] += squares @ turns
@@ -266,14 +264,12 @@ def fly_jax(text: str, course: Course) -> State:
 
 def _run(course: Course, terms: Array, step: Callable[[Array, Array], Array]) -> State:
     """Take all runs through all steps, with states as rows of 18."""
-    start = course.start
-    state = np.hstack([part.reshape(len(course.starts), -1) for part in start])
+    state = np.hstack([part.reshape(len(course.starts), -1) for part in course.start])
     path = np.empty((course.horizon, *state.shape))
     for k in range(course.horizon):
         state = path[k] = step(state, terms[course.starts + k])
     path = path.swapaxes(0, 1)
-    rotation = path[:, :, 6:15].reshape(*path.shape[:2], 3, 3)
-    return State(path[:, :, :3], path[:, :, 3:6], rotation, path[:, :, 15:])
+    return State(path[:, :, :3], path[:, :, 3:6], path[:, :, 6:15].reshape(*path.shape[:2], 3, 3), path[:, :, 15:])
 
 
 def executed(text: str) -> dict[str, Any]:

@@ -47,11 +47,10 @@ def audit_with_fault(**changed):
 
 def flights(roles=("training", "held-out")):
     """Two flights of four samples each."""
-    pairs = zip(("one.csv", "two.csv"), roles, strict=True)
     still = {"time": 0.01 * np.arange(4), "body_rate": np.zeros((4, 3))}
     return {
         f"flight-{number}": RecordedFlight(name=name, role=role, commanded=False, begins=np.nan, **still)
-        for number, (name, role) in enumerate(pairs, start=1)
+        for number, (name, role) in enumerate(zip(("one.csv", "two.csv"), roles, strict=True), start=1)
     }
 
 

@@ -79,10 +79,9 @@ def fly(seed, effects=(), *, gyro=0.0, rotor=0.0, **given):
         signals = signals.with_rotor_speed(speed)
         wrench = effect_wrench(signals, effects)
     assert np.isfinite(speed).all()
-    felt = wrench[:, 3:] + thrust[:, None] * [0.0, 0.0, 1.0]
     return replace(
         signals,
-        specific_force=felt / VEHICLE.mass_kg,
+        specific_force=(wrench[:, 3:] + thrust[:, None] * [0.0, 0.0, 1.0]) / VEHICLE.mass_kg,
         body_rate=signals.body_rate + gyro * rng.standard_normal(signals.body_rate.shape),
         rotor_speed=speed + rotor * rng.standard_normal(speed.shape),
     )

@@ -176,8 +176,7 @@ def _change_structure(rng, file, name):
         del file[name]
         return
     if change == 1:
-        root = str(rng.choice(["format", "schema_version", "cpfls_version", "seed", "config_sha256"]))
-        file.attrs[root] = (
+        file.attrs[str(rng.choice(["format", "schema_version", "cpfls_version", "seed", "config_sha256"]))] = (
             rng.choice([-5, 0, 10**9, 1]) if rng.random() < 0.7 else str(rng.choice(["", "x", "cpfls/model"]))
         )
         return
@@ -344,8 +343,7 @@ def nested_case(rng, good):
         for name in names
     }
     sent = [(20_000 * number, int(rng.integers(0, len(names))), rng.random(12)) for number in range(60)]
-    path = put_file(good.folder / "hostile.ulg", ulogs.ulog(sent, formats))
-    return _imported(path, good, ULOG_STUDY, rng)
+    return _imported(put_file(good.folder / "hostile.ulg", ulogs.ulog(sent, formats)), good, ULOG_STUDY, rng)
 
 
 def names_case(rng, good):
@@ -449,8 +447,7 @@ def _inflated_text(path, count, rng):
     begin, part = [(b"", b"a" * 1024), (b"", b",a" * 512), (head, b"0," * 512), (head, b"1,0,0,0,0,0,0\n" * 64)][
         int(rng.integers(0, 4))
     ]
-    packing = zlib.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS | 16)
-    path.write_bytes(_packed(packing, begin, part * 1024, count))
+    path.write_bytes(_packed(zlib.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS | 16), begin, part * 1024, count))
 
 
 def _packed(packing, begin, part, count):

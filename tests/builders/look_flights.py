@@ -62,13 +62,12 @@ def hovering(needed, seed=0, seconds=60.0, rate_hz=20.0, gusts=0.02, weak=None, 
     generator = np.random.default_rng(seed)
     samples = round(seconds * rate_hz)
     heading = np.zeros(samples) if heading is None else heading(np.arange(samples) / rate_hz)
-    torque = np.column_stack([CROSS * np.sqrt(2), SPINS])
     trims = gusts * correlated(generator, samples, rate_hz, columns=3)
     cosine, sine = np.cos(heading), np.sin(heading)
     lean = np.stack([cosine * wind[0] + sine * wind[1], -sine * wind[0] + cosine * wind[1]], axis=1)
     # A push by a share of the arm takes twice that, over the root of two, of each rotor's thrust.
     trims[:, :2] += lean * np.sqrt(2)
-    thrust = 0.3 * (np.asarray(needed) + trims @ torque.T)
+    thrust = 0.3 * (np.asarray(needed) + trims @ np.column_stack([CROSS * np.sqrt(2), SPINS]).T)
     for rotor, share in (weak or {}).items():
         thrust[:, rotor] /= share
     time = np.arange(samples) / rate_hz

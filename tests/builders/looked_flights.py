@@ -35,8 +35,7 @@ def flown(rng, *, seconds=40.0, gusts=4.0, angle=0.0, sticks=3.0, truth=TRUTH) -
     kernel = np.hanning(round(0.12 * RATE_HZ))
     stick = np.clip(sticks / 3 * 0.4 * np.convolve(hand, kernel / kernel.sum(), "same"), -1, 1)
     controller = Controller(AUTOPILOTS["crazyflie"].law(PARAMETERS))
-    late = round(truth.delay / period)
-    sent, lagged, rate, turned = np.zeros(late + 1), 0.0, 0.0, 0.0
+    sent, lagged, rate, turned = np.zeros(round(truth.delay / period) + 1), 0.0, 0.0, 0.0
     decay = np.exp(-period / 0.1)
     shocks = gusts * np.sqrt(1 - decay**2) * rng.standard_normal(steps)
     noise = 0.02 * rng.standard_normal(steps)

@@ -110,7 +110,6 @@ def betaflight(own, *, version="4.5.1", reversed_spins=False, more=None):
 
 def plain(own):
     """A flat log without a word on who wrote it."""
-    turned = [2, 0, 3, 1]
     columns = {
         "t": own.time,
         **named(quaternion(own.rotation), "qw", "qx", "qy", "qz"),
@@ -118,7 +117,7 @@ def plain(own):
         **named(own.specific_force, "acc_x", "acc_y", "acc_z"),
         **named(own.position, "x", "y", "z"),
         **named(own.velocity, "vx", "vy", "vz"),
-        **named(own.speed[:, turned] / FULL, *(f"motor_cmd_{k}" for k in range(1, 5))),
+        **named(own.speed[:, [2, 0, 3, 1]] / FULL, *(f"motor_cmd_{k}" for k in range(1, 5))),
     }
     return LogContents({"": columns})
 

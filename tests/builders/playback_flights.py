@@ -196,8 +196,7 @@ def reference(kind, time, rng):
     """Plan one flight; its details are drawn."""
     zero, ones = np.zeros((len(time), 3)), np.ones(len(time))
     if kind == "figure":
-        pace = np.linspace(0.5, 1.4, len(time))
-        phase = np.cumsum(pace) * (time[1] - time[0]) + rng.uniform(0, 2 * np.pi)
+        phase = np.cumsum(np.linspace(0.5, 1.4, len(time))) * (time[1] - time[0]) + rng.uniform(0, 2 * np.pi)
         size = rng.uniform(2.0, 3.0, 3) * [1.0, 0.6, 0.25]
         position = size * np.stack([np.sin(phase), np.sin(2 * phase), np.cos(phase)], axis=1)
         return position, np.gradient(position, time, axis=0), 1.2 * np.sin(0.7 * phase), ones, zero
@@ -330,8 +329,7 @@ class Autopilot:
         wanted = 14.0 * (-5.0 * error * [1.0, 1.0, 0.5] - rate) * [1.0, 1.0, 0.5] + plan.kick[sample]
         wanted[:, 2] = np.clip(wanted[:, 2], -8.0, 8.0)
         thrust = stated.mass_kg * np.einsum("bi,bi->b", pull, rotation[:, :, 2])
-        wrench = np.column_stack([thrust, wanted * np.array(stated.inertia_kg_m2[:3])])
-        squared = wrench @ self.inverse.T
+        squared = np.column_stack([thrust, wanted * np.array(stated.inertia_kg_m2[:3])]) @ self.inverse.T
         return np.sqrt(np.clip(squared, (0.3 * self.hover) ** 2, (1.7 * self.hover) ** 2))
 
 

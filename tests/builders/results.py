@@ -108,11 +108,9 @@ def drawn(kind, rng, lengths=None):
     lengths, given = {} if lengths is None else lengths, {}
     # Axes have their lengths in parts too.
     for own in sorted(described_fields(kind), key=lambda each: each.about is None):
-        streamed = own.about and own.about.axes[:1] == (getattr(kind, "STREAMED", None),)
-        if streamed:
+        if own.about and own.about.axes[:1] == (getattr(kind, "STREAMED", None),):
             lengths.setdefault(own.about.axes[0], 3)
-        missing = own.optional and rng.random() < 0.3
-        given[own.name] = None if missing else _field(own, rng, lengths)
+        given[own.name] = None if own.optional and rng.random() < 0.3 else _field(own, rng, lengths)
     return kind(**given)
 
 

@@ -47,8 +47,7 @@ def flight_table(seed, offset=(0.0, 0.0), duration=24.0, rate_hz=100.0):
     tilting = np.column_stack([-offset[1] * thrust, offset[0] * thrust, np.zeros_like(thrust)])
     squared = np.linalg.solve(ALLOCATION, np.column_stack([thrust, torque - tilting]).T).T
     assert squared.min() > 0
-    noisy = rate + rng.normal(0, 0.002, rate.shape)
-    return np.column_stack([time, noisy, np.sqrt(squared)])
+    return np.column_stack([time, rate + rng.normal(0, 0.002, rate.shape), np.sqrt(squared)])
 
 
 def attitude_of(rate, step=0.01):

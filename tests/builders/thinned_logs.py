@@ -158,8 +158,7 @@ class Flown:
 
     def at(self, rate_hz):
         """Pick the steps of the law that a logger takes at a rate."""
-        wanted = np.arange(0.0, self.time[-1], 1 / rate_hz)
-        return np.searchsorted(self.time, wanted + 1e-9, side="right") - 1
+        return np.searchsorted(self.time, np.arange(0.0, self.time[-1], 1 / rate_hz) + 1e-9, side="right") - 1
 
     def px4_topics(self, torque_hz=50.0, motors_hz=10.0):
         """What PX4 logs of its allocation, by topic."""

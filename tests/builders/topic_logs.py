@@ -21,8 +21,7 @@ def maps(proposal):
 
 
 def ardupilot(own):
-    turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
-    angles = np.degrees(turned.as_euler("ZYX")[:, ::-1])
+    angles = np.degrees(Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP).as_euler("ZYX")[:, ::-1])
     # Outputs 5 to 8 drive the motors 1 to 4; the first four are servos.
     pulses = np.column_stack([np.full((len(own.time), 4), 1500.0), 1000 + own.speed])
     topics = {

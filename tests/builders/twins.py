@@ -63,7 +63,6 @@ def twin_found():
 
 def blown(twin):
     """Vehicles in gusts, as if they had flown the same setpoints: nearer than the flight in roll rate alone."""
-    drawn = {0: [0.001, 0.002, 0.003], 2: [0.1, 0.2, 0.3], 6: [0.5, 0.6, 2.0]}
     channels = {
         CHANNELS[at]: ChannelInGusts(
             rms=0.05,
@@ -74,6 +73,6 @@ def blown(twin):
             low=twin.simulated[:, at] - 0.1,
             high=twin.simulated[:, at] + 0.1,
         )
-        for at, each in drawn.items()
+        for at, each in {0: [0.001, 0.002, 0.003], 2: [0.1, 0.2, 0.3], 6: [0.5, 0.6, 2.0]}.items()
     }
     return InGusts(vehicle="found.h5", flights=3, lost=1, channels=channels)

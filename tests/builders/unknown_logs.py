@@ -41,8 +41,7 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0, angle=0.25,
         rotation = Rotation.from_euler("ZYX", lean) * rotation
         angles = rotation.as_euler("ZYX")[:, ::-1]
     steps = CubicSpline(time, rotation.as_quat()).derivative()(time)
-    turning = 2 * (Rotation.from_quat(rotation.as_quat()).inv().as_quat())
-    rate = _product(turning, steps)
+    rate = _product(2 * (Rotation.from_quat(rotation.as_quat()).inv().as_quat()), steps)
     up = rotation.as_matrix()[:, :, 2]
     lift = (GRAVITY + wave(climb, 0.2, 0.8 * highest_hz / 1.5)) / up[:, 2]
     acceleration = lift[:, None] * up - [0.0, 0.0, GRAVITY]
@@ -50,8 +49,7 @@ def flight(seconds=30.0, rate_hz=100.0, seed=3, noise=1.0, push=0.0, angle=0.25,
     velocity = cumulative_trapezoid(acceleration, time, axis=0, initial=0)
     velocity -= velocity.mean(axis=0)
     position = cumulative_trapezoid(velocity, time, axis=0, initial=0)
-    spin = CubicSpline(time, rate).derivative()(time)
-    torque = INERTIA * spin + np.cross(rate, INERTIA * rate)
+    torque = INERTIA * CubicSpline(time, rate).derivative()(time) + np.cross(rate, INERTIA * rate)
     squared = np.column_stack([MASS * lift, torque]) @ np.linalg.inv(mixer()).T
 
     def noisy(values, size):

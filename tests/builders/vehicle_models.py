@@ -72,8 +72,7 @@ def is_held(known, vehicle):
 
 def remainder(order, breakpoints=SEVEN_RULES, rows=(0, 2, 5), size=1e-7):
     """A remainder with coefficients at random; an order of 0 makes it a seesaw."""
-    features = 1 + (2 * order if order else 1)
-    columns = max(len(breakpoints) - 1, 1) * features
+    columns = max(len(breakpoints) - 1, 1) * (1 + (2 * order if order else 1))
     coefficients = size * np.random.default_rng(order).uniform(-1, 1, (len(rows), columns, 2)) * [1.0, 100.0]
     return Remainder(
         breakpoints=np.array(breakpoints), harmonic_order=order, rows=np.array(rows), coefficients=coefficients
@@ -159,7 +158,6 @@ def wrench_somewhere(model, count=20):
 def accelerations(model, state, rotor):
     """``v' = g + R F / m`` and ``omega' = I^-1 (M - omega x I omega)`` of a constant inertia, shape (samples, 6)."""
     body = model.body
-    air = np.einsum("nji,nj->ni", state.rotation, state.velocity - model.wind)
-    wrench = model.wrench(air, state.rate, rotor)
+    wrench = model.wrench(np.einsum("nji,nj->ni", state.rotation, state.velocity - model.wind), state.rate, rotor)
     linear = np.einsum("nij,nj->ni", state.rotation, wrench[:, 3:]) / body.mass - [0.0, 0.0, body.gravity]
     return np.hstack([linear, (wrench[:, :3] - np.cross(state.rate, state.rate @ body.inertia)) @ body.inverse])

@@ -132,6 +132,5 @@ def _fine(held: Held, course: Course) -> Array:
     found = []
     for steps in (_FINE, 2 * _FINE):
         flight = replace(course, finer=steps).finer_flight
-        errors = held.errors(flight, course.starts * steps, course.horizon * steps)
-        found.append(errors[:, steps - 1 :: steps])
+        found.append(held.errors(flight, course.starts * steps, course.horizon * steps)[:, steps - 1 :: steps])
     return np.asarray((4.0 * found[1] - found[0]) / 3.0)

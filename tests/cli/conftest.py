@@ -50,8 +50,7 @@ def pipeline(cpfls, study):
     paths, commands = stages(study, study.parent)
     printed = {}
     for stage, words in commands.items():
-        result = cpfls.done(*words, "-o", paths[stage], "--json")
-        printed[stage] = result.stdout
+        printed[stage] = cpfls.done(*words, "-o", paths[stage], "--json").stdout
     return SimpleNamespace(
         **paths, paths=paths, printed=printed, summaries={k: json.loads(v) for k, v in printed.items()}
     )

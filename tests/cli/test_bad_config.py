@@ -227,8 +227,7 @@ def test_an_inertia_that_flights_can_correct_is_taken(cpfls, tmp_path):
 
 
 def test_default_is_the_default_study(cpfls, tmp_path):
-    path = put_file(tmp_path / "default.yaml", cpfls("config").stdout)
-    assert load_study(path) == Study()
+    assert load_study(put_file(tmp_path / "default.yaml", cpfls("config").stdout)) == Study()
 
 
 def test_shipped_configs_load_and_print_the_same_study(cpfls, configs, tmp_path):
@@ -246,8 +245,7 @@ def test_any_yaml_reader_reads_it_as_the_json_says(cpfls, configs):
 @pytest.mark.parametrize("section", SECTIONS)
 def test_section(cpfls, study, section):
     printed = yaml.safe_load(cpfls("config", study, "--section", section).stdout)
-    whole = cpfls.summary("config", study)
-    assert printed == {"seed": 1, section: whole[section]}
+    assert printed == {"seed": 1, section: cpfls.summary("config", study)[section]}
 
 
 def test_single_key_and_several_sections(cpfls, study):
@@ -281,10 +279,9 @@ def test_overrides_show(cpfls, study):
     ],
 )
 def test_size_that_does_not_suit_the_flight(refuse, pipeline, study, tmp_path, size, message, dry):
-    words = ("-o", tmp_path / "out.h5", "--set", f"reduction.size={size}", *dry)
-    assert refuse("reduce", study, pipeline.flight, *words) == [
-        f"{pipeline.flight}: reduction.size = {size}: {message}"
-    ]
+    assert refuse(
+        "reduce", study, pipeline.flight, *("-o", tmp_path / "out.h5", "--set", f"reduction.size={size}", *dry)
+    ) == [f"{pipeline.flight}: reduction.size = {size}: {message}"]
 
 
 def test_all_samples_can_be_asked_for(cpfls, pipeline, study, tmp_path):

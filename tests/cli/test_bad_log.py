@@ -20,8 +20,7 @@ NOISE = np.random.default_rng(5).standard_normal((2000, 10))
 def rows():
     time = np.arange(0.0, 4.0, 0.02)
     angles = [0.2 * np.sin((2 + axis) * time) for axis in range(3)]
-    torques = [0.1 * np.cos((3 + axis) * time) for axis in range(3)]
-    return np.column_stack([time, *angles, *torques])
+    return np.column_stack([time, *angles, *[0.1 * np.cos((3 + axis) * time) for axis in range(3)]])
 
 
 def table():
@@ -51,8 +50,7 @@ def test_a_log_of_another_tool_is_listed_once_and_shortened(wrong):
     """Eighty columns, six of them missing: nearest names where there are any, three at most."""
     names = ["time", "state.roll", "state.pitch", "state.yaw", "roll_cmd", "roll_ref", "roll_std"]
     names += [f"debug_{number}" for number in range(73)]
-    content = ",".join(names) + "\n" + ",".join("0" * len(names)) + "\n"
-    lines = wrong(content)
+    lines = wrong(",".join(names) + "\n" + ",".join("0" * len(names)) + "\n")
     assert len(lines) == 8
     assert lines[1].endswith("no column 'roll' (nearest: state.roll, roll_std, roll_ref)")
     assert lines[2].endswith("no column 'pitch' (nearest: state.pitch)")
@@ -241,8 +239,7 @@ def test_what_later_stages_will_miss_is_said_and_kept(cpfls, imported, signals, 
     _, notes, flight = imported(*signals, source=source)
     assert [note[: len(start)] for note, start in zip(notes, wanted, strict=True)] == wanted
     assert all(note.endswith("cpfls vehicle and replay need rotors instead") for note in notes if NO_TORQUE in note)
-    again = cpfls("info", flight, "-v").stderr.splitlines()
-    assert [f"cpfls: note: {note}" for note in notes] == again
+    assert [f"cpfls: note: {note}" for note in notes] == cpfls("info", flight, "-v").stderr.splitlines()
 
 
 @pytest.mark.parametrize("rotors", ["rotor_speed", "rotor_command"])
@@ -252,8 +249,7 @@ def test_identify_says_how_rotors_give_the_torque_that_it_lacks(cpfls, imported,
     (message,) = refuse("identify", config, flight, "-o", out)
     remedy = re.search(r"--set (import.torque_source=\S+),", message).group(1)
     cpfls.done("import", config, tmp_path / "log.csv", "-o", flight, "--force", "--set", remedy)
-    size = "identification={population: 4, generations: 1}"
-    cpfls.done("identify", config, flight, "-o", out, "--set", size)
+    cpfls.done("identify", config, flight, "-o", out, "--set", "identification={population: 4, generations: 1}")
 
 
 def test_commands_are_shares_of_the_largest_speed_and_it_says_so(imported):
@@ -325,8 +321,7 @@ def test_a_dead_and_a_clipped_column_are_said_by_name(notes_of):
 
 
 def test_a_filter_before_the_log_is_said_and_its_cut_off_is_kept(notes_of):
-    filtered = low_pass(0.3 * NOISE[:, :3] + 0.3, 50.0, 12.0, 4)
-    notes, flight = notes_of(**dict(zip("pqr", filtered.T, strict=True)))
+    notes, flight = notes_of(**dict(zip("pqr", low_pass(0.3 * NOISE[:, :3] + 0.3, 50.0, 12.0, 4).T, strict=True)))
     assert "the spectrum drops sharply: body_rate at about 12 Hz; low-passed before logging" in notes[0]
     with h5py.File(flight) as file:
         assert list(file["cut_off_hz/name"].asstr()) == ["body_rate"]

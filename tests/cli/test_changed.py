@@ -8,6 +8,7 @@ import pytest
 from cpfls_cli.changes.results import Changed
 from cpfls_cli.store import read
 from tests.builders.changed_flights import HEADER, flight_table, save, write_flights
+from tests.builders.studies import put_file
 from tests.builders.unknown_logs import ARM, MASS, flat_log, flight, named, ulog_of_flight, write_csv
 
 
@@ -124,8 +125,7 @@ def test_what_the_comparison_lacks_is_said(changed, folder, tmp_path):
     speeds = save(tmp_path / "speeds.csv", flight_table(32), HEADER.replace("c1,c2,c3,c4,volts", "om1,om2,om3,om4,no"))
     short = save(tmp_path / "short.csv", flight_table(33, duration=2.0), HEADER)
     dead = save(tmp_path / "dead.csv", flight_table(34), HEADER.replace("volts", "no"))
-    copy = tmp_path / "copy.csv"
-    copy.write_bytes((folder / "same.csv").read_bytes())
+    copy = put_file(tmp_path / "copy.csv", (folder / "same.csv").read_bytes())
     notes = changed(slow, short, dead, "same.csv", copy, options=["-v"]).stderr
     assert "without attitude: all flights; how any flight is flown is not known" in notes
     assert "another sampling rate than the usual one of the reference, 100 Hz: slow.csv (50 Hz)" in notes
@@ -270,8 +270,7 @@ def stated(tmp_path_factory, cpfls):
 
 
 def test_logs_of_different_vehicles_are_refused_before_their_columns(cpfls, stated):
-    other = ulog_of_flight(TODAY, without="vehicle_local_position", MOT_POLE_COUNT=12)
-    (stated / "lacks.ulg").write_bytes(other)
+    (stated / "lacks.ulg").write_bytes(ulog_of_flight(TODAY, without="vehicle_local_position", MOT_POLE_COUNT=12))
     (stated / "scaled.ulg").write_bytes(ulog_of_flight(TODAY, MOT_POLE_COUNT=14, PWM_MIN=1100))
     assert "of different vehicles (MOT_POLE_COUNT 14 and 12)" in compared(cpfls, stated, "lacks.ulg").stderr
     since = [stated / f"before{seed}.ulg" for seed in (4, 1, 2)]

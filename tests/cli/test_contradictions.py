@@ -19,6 +19,7 @@ from cpfls_cli.stages.init import _findings as of_proposal
 from cpfls_cli.stages.init import _parted as parted
 from tests.builders.closed_loop_flights import COARSE, PERIOD, VEHICLE, flown, signals_of
 from tests.builders.command_line import run
+from tests.builders.studies import put_file
 from tests.builders.vehicle_search import left_out
 
 NOISE = {"body_rate": 0.01, "attitude": 0.003, "velocity": 0.02, "position": 0.005, "rotor_speed": 1.0}
@@ -75,9 +76,7 @@ def config_of(folder):
         "identification": LEARNED,
         "playback": {**SEARCH, "leave_out": left_out(TRIED)},
     }
-    path = folder / "quad.yaml"
-    path.write_text(json.dumps(study, indent=1))
-    return path
+    return put_file(folder / "quad.yaml", json.dumps(study, indent=1))
 
 
 def log_of(path, seed, sign=(1.0, 1.0, 1.0), duration=8.0):
@@ -250,8 +249,7 @@ def test_the_unit_that_carries_the_vehicle_is_said_where_the_declared_one_does_n
 def test_what_contradicts_a_guess_of_init_accuses_the_guess_and_not_the_log():
     ours = Finding("judged by the motion, the rotors are", "check vehicle.rotors and import.body_frame", ("rotors",))
     theirs = Finding("the velocity is in km/h", "check import.signals.velocity", ("velocity",))
-    guessed = ("vehicle.rotors", "import.body_frame", "import.signals.rotor_command")
-    wrong, doubted = parted([ours, theirs], guessed)
+    wrong, doubted = parted([ours, theirs], ("vehicle.rotors", "import.body_frame", "import.signals.rotor_command"))
     assert wrong == [theirs.sentence]
     assert doubted == [
         f"vehicle.rotors and import.body_frame are guesses, and one of them is likely wrong: {ours.sentence}"

@@ -26,13 +26,12 @@ def again(cpfls, pipeline, study, tmp_path_factory):
     time.sleep(1.1)
     folder = tmp_path_factory.mktemp("again")
     out = {stage: folder / f"again-{stage}.h5" for stage in STAGES}
-    commands = (
+    for words in (
         ("trajectory", study, "-o", out["trajectory"]),
         ("simulate", study, pipeline.trajectory, "-o", out["flight"]),
         ("reduce", study, pipeline.flight, "-o", out["selection"]),
         ("identify", study, pipeline.flight, "--selection", pipeline.selection, "-o", out["model"]),
-    )
-    for words in commands:
+    ):
         cpfls.done(*words)
     return out
 
@@ -105,12 +104,11 @@ LIMITS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NU
 
 def test_one_thread_whatever_the_environment_says(pipeline, study, tmp_path):
     words = ("cpfls", "reduce", study, pipeline.flight, "-o", tmp_path / "out.h5", "-q")
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2"}
     result = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(words=[*map(str, words)])],
         capture_output=True,
         text=True,
-        env=environment,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2"},
     )
     assert result.stderr == ""
     code, numerical, tasks, limits = json.loads(result.stdout)

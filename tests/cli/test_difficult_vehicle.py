@@ -336,8 +336,7 @@ def test_constants_are_found_and_written_into_a_config(cpfls, flights, open_fold
     config = heavier(flights, open_folder, open_constants, "logs.yaml")
     copy = open_folder / "found.yaml"
     words = ("vehicle", config, open_folder / "flight.csv", "-o", open_folder / "v.h5", "--write-config", copy)
-    result = cpfls.done(*words)
-    assert f"{copy}: written, the config with these constants" in result.stdout
+    assert f"{copy}: written, the config with these constants" in cpfls.done(*words).stdout
     parameters = plain(found_vehicle(open_folder / "v.h5"))["parameters"]
     assert set(parameters) == KEYS
     answer = {"value", "unit", "low", "high", "stated", "determined", "reason", "possible"}

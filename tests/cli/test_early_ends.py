@@ -39,8 +39,7 @@ def test_a_crash_is_said_first_and_cut(cpfls, tmp_path, crashed):
     assert imported(cpfls, config, log, "flown").startswith(
         "cpfls: note: impact at 40.0 s; the 40 s before it are used"
     )
-    kept = imported(cpfls, config, log, None)
-    assert kept.startswith(
+    assert imported(cpfls, config, log, None).startswith(
         "cpfls: note: impact at 40.0 s, and import.crop_s keeps what comes after; import.crop_s: flown"
     )
 
@@ -53,8 +52,7 @@ def test_a_crop_of_ones_own_is_warned_of_on_the_clock_of_the_log_and_only_if_flo
 
 
 def test_columns_that_run_on_in_straight_lines_are_cut_where_their_source_ends(cpfls, tmp_path):
-    contents = run_on(flat_log(flight(40.0)), 15.0, "gyro", "acc", "rpm")
-    log, config, result = proposed(cpfls, tmp_path, contents)
+    log, config, result = proposed(cpfls, tmp_path, run_on(flat_log(flight(40.0)), 15.0, "gyro", "acc", "rpm"))
     first, *more = result.stderr.splitlines()
     assert "acceleration, body_rate and rotor_speed run in straight lines from 15.0 s on" in first
     assert first.endswith("the 15 s of flight in between are used")

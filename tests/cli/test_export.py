@@ -74,11 +74,10 @@ def test_an_incomplete_model_is_refused_and_marked_with_force(cpfls, refuse, mod
     change(model, stop_reason=np.array("time-limit"))
     output = tmp_path / f"m.{ENDINGS[form]}"
     words = ("export", model, "--format", form, "-o", output)
-    (line,) = refuse(*words)
-    assert line == (
+    assert refuse(*words) == [
         f"{model}: the search for this model did not come to its end (time-limit); `cpfls identify ... --resume` goes "
         "on, --anyway exports the model as it is, marked as incomplete"
-    )
+    ]
     result = cpfls.done(*words, "--force", "--json")
     assert json.loads(result.stdout)["complete"] is False
     assert result.stderr == "cpfls: note: the model is incomplete, and marked as such: do not fly with it\n"
@@ -148,8 +147,7 @@ def test_a_config_is_no_model(refuse, study, tmp_path):
 )
 def test_a_model_of_wrong_content(refuse, model, tmp_path, values, message):
     change(model, **values)
-    lines = refuse("export", model, "--format", "c", "-o", tmp_path / "m.c")
-    assert lines[0].startswith(f"{model}: {message}")
+    assert refuse("export", model, "--format", "c", "-o", tmp_path / "m.c")[0].startswith(f"{model}: {message}")
 
 
 def test_output_rules(cpfls, refuse, model, tmp_path):
@@ -203,11 +201,10 @@ def test_the_suffix_shows_the_form(cpfls, pipeline, tmp_path, form):
 
 
 def test_a_suffix_that_shows_no_form(refuse, pipeline, tmp_path):
-    (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.h")
-    assert line == (
+    assert refuse("export", pipeline.model, "-o", tmp_path / "m.h") == [
         f"{tmp_path / 'm.h'}: its suffix names no form; give the name one of the suffixes .json (json), .c (c), "
         ".xml (mjcf), .sdf (sdf), .toml (crazyflow), .urdf (urdf), .proto (webots), .mcap (mcap), .csv (csv)"
-    )
+    ]
     (line,) = refuse("export", pipeline.model, "-o", tmp_path / "m.py")
     assert line == f"{tmp_path / 'm.py'}: rotorpy, pegasus, casadi and jax write Python; name one of them with --format"
 

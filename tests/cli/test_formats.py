@@ -52,8 +52,7 @@ def test_results_of_stages_are_described_too(cpfls):
 
 
 def test_without_a_name_all_are_listed(cpfls):
-    names = [each["format"] for each in described(cpfls)]
-    assert {"cpfls/flight", "cpfls/look"} <= set(names)
+    assert {"cpfls/flight", "cpfls/look"} <= {each["format"] for each in described(cpfls)}
     assert "cpfls info --format changed" in cpfls("info").stdout
 
 

@@ -88,8 +88,7 @@ def test_info_says_what_the_command_answered(cpfls, study, tmp_path, stage):
     ],
 )
 def test_inputs_are_named_by_role_and_hash(cpfls, pipeline, stage, roles):
-    inputs = cpfls.summary("info", pipeline.paths[stage])["inputs"]
-    assert inputs == {
+    assert cpfls.summary("info", pipeline.paths[stage])["inputs"] == {
         role: {
             "name": f"{source}.h5",
             "sha256": hashlib.sha256(pipeline.paths[source].read_bytes()).hexdigest(),

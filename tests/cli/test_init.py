@@ -169,7 +169,8 @@ def test_time_on_the_ground_is_cut_and_said(proposed, tmp_path, own):
 def test_two_guesses_that_the_data_cannot_part_are_both_listed(proposed, tmp_path, own):
     speed = named(own.speed, "rotor1", "rotor2", "rotor3", "rotor4")
     result, text, _ = proposed(write_csv(tmp_path / "log.csv", flat_log(own, speed=speed)))
-    assert re.search(r"# or unit: rpm \(a level of 57\d\.\d fits both\)", text)
+    (rival,) = re.findall(r"# or (unit: .*)", text)
+    assert re.fullmatch(r"unit: rpm \(a level of 57\d\.\d fits both\)", rival)
     assert "rotor_speed: a guess; it may also be unit: rpm: a level of 57" in result.stderr
 
 
@@ -256,8 +257,7 @@ def test_one_config_cannot_suit_logs_of_other_axes(refuse, tmp_path, own):
 
 
 def test_the_one_log_of_other_axes_is_named_to_be_left_out(refuse, tmp_path, own):
-    turned = named(own.rate @ FLIP, "gyro_x", "gyro_y", "gyro_z")
-    odd = write_csv(tmp_path / "odd.csv", flat_log(own, rate=turned))
+    odd = write_csv(tmp_path / "odd.csv", flat_log(own, rate=named(own.rate @ FLIP, "gyro_x", "gyro_y", "gyro_z")))
     one, two = (
         write_csv(tmp_path / f"{name}.csv", flat_log(flight(seconds=20.0, seed=seed)))
         for name, seed in (("one", 3), ("two", 5))
@@ -306,8 +306,7 @@ def test_a_log_without_rotors_is_imported_and_drives_nothing(cpfls, proposed, tm
 
 
 def test_rotors_that_nothing_shows_are_asked_for(proposed, tmp_path, own):
-    noise = np.random.default_rng(2).normal(500, 3, own.speed.shape)
-    speed = named(noise, "rotor1", "rotor2", "rotor3", "rotor4")
+    speed = named(np.random.default_rng(2).normal(500, 3, own.speed.shape), "rotor1", "rotor2", "rotor3", "rotor4")
     result, text, data = proposed(
         write_csv(tmp_path / "log.csv", flat_log(own, speed=speed)), "--mass", MASS, "--arm", ARM
     )
@@ -320,8 +319,7 @@ def test_rotors_that_nothing_shows_are_asked_for(proposed, tmp_path, own):
 
 
 def test_a_log_of_px4_brings_its_rotors_along(proposed, tmp_path, own):
-    path = put_file(tmp_path / "log.ulg", ulog_of_flight(own))
-    result, text, data = proposed(path, "--mass", MASS)
+    result, text, data = proposed(put_file(tmp_path / "log.ulg", ulog_of_flight(own)), "--mass", MASS)
     assert "vehicle_attitude.q[{0,1,2,3}] " in result.stdout
     signals = data["import"]["signals"]
     assert signals["quaternion"]["columns"][0] == "vehicle_attitude.q[0]"

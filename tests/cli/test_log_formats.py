@@ -30,8 +30,7 @@ MAGIC = b"FAKE\x00"
 
 def contents(path, wanted):
     """Columns one after the other, eight bytes a number."""
-    values = np.frombuffer(path.read_bytes()[len(MAGIC) :]).reshape(len(NAMES), -1)
-    columns = dict(zip(NAMES, values, strict=True))
+    columns = dict(zip(NAMES, np.frombuffer(path.read_bytes()[len(MAGIC) :]).reshape(len(NAMES), -1), strict=True))
     assert set(wanted) == set(columns)
     return formats.LogContents({"": columns}, warnings=("the logger was tired",))
 
@@ -52,8 +51,7 @@ def write(path):
 
 @pytest.mark.usefixtures("fake_format")
 def test_import_takes_a_log_of_a_new_format(cpfls, log_study, tmp_path):
-    log = write(tmp_path / "log.FAKE")
-    result = cpfls.done("import", log_study, log, "-o", tmp_path / "flight.h5", "--json")
+    result = cpfls.done("import", log_study, write(tmp_path / "log.FAKE"), "-o", tmp_path / "flight.h5", "--json")
     assert json.loads(result.stdout)["samples"] == 200
     assert "cpfls: note: the logger was tired" in result.stderr.splitlines()
 

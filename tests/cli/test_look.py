@@ -191,8 +191,7 @@ LOGGED = Logged(
 
 
 def test_patterns_are_named_and_no_rotor_is_called_weak():
-    quad = np.array([1.0, 1.0, -1.0, -1.0])
-    yaw = balance_of(hovering(1 + 0.1 * quad, seconds=60))
+    yaw = balance_of(hovering(1 + 0.1 * np.array([1.0, 1.0, -1.0, -1.0]), seconds=60))
     assert words_of(balance=yaw).startswith("# Flies, but holds a steady yaw torque: M")
     ahead = balance_of(hovering(1 + 0.1 * np.sign(CROSS[:, 0]), seconds=60, heading=lambda t: np.pi * (t > 30)))
     said = words_of(balance=ahead)

@@ -22,14 +22,6 @@ NAMES = {"r": ("roll", 0), "p": ("pitch", 1)}
 PARTITIONS = ("D13(pitch)", "D22(roll)", "D23(roll)", "D23(pitch)", "D33(roll)", "D33(pitch)")
 
 
-def wrapped(angle):
-    return (angle + np.pi) % (2 * np.pi) - np.pi
-
-
-def triangle(angle):
-    return 2 / np.pi * np.arcsin(np.sin(angle))
-
-
 def membership(x, peaks):
     """Zadeh's functions one by one, as a plain loop over the peaks."""
     if len(peaks) == 1:
@@ -67,7 +59,7 @@ class Stored:
     def inputs(self, attitude, axis):
         """Input of the memberships and input of the linear consequents."""
         angle = attitude[:, axis]
-        value = triangle(angle) if self.circular else wrapped(angle)
+        value = 2 / np.pi * np.arcsin(np.sin(angle)) if self.circular else (angle + np.pi) % (2 * np.pi) - np.pi
         if self.settings["input_map"] == "data-range":
             low, high = self.range[axis]
             return (value - low) / (high - low), (value - low) / (high - low)
@@ -126,8 +118,7 @@ class Stored:
                 [zero, -np.sin(roll), np.cos(roll) * np.cos(pitch)],
             ]
         )
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return np.einsum("ian,ij,jbn->nab", W, tensor, W)
+        return np.einsum("ian,ij,jbn->nab", W, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), W)
 
     def torque(self, attitude, rate, acceleration, step=1e-6):
         shifted = [step * np.eye(3)[axis] for axis in range(3)]

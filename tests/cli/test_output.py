@@ -34,13 +34,12 @@ def test_an_input_is_never_the_output(refuse, pipeline, study, tmp_path):
 def test_output_that_cannot_be_a_file(refuse, study, tmp_path, force):
     (tmp_path / "plain.txt").write_text("")
     (tmp_path / "folder").mkdir()
-    cases = {
+    for output, message in {
         tmp_path / "none" / "out.h5": f"cannot write into the folder {tmp_path / 'none'}: No such file or directory",
         tmp_path / "plain.txt" / "out.h5": f"cannot write into the folder {tmp_path / 'plain.txt'}: Not a directory",
         tmp_path / ("x" * 300): f"cannot write into the folder {tmp_path}: File name too long",
         tmp_path / "folder": "is a folder; -o names a file",
-    }
-    for output, message in cases.items():
+    }.items():
         assert refuse("trajectory", study, "-o", output, *force) == [f"{output}: {message}"]
 
 

@@ -39,8 +39,7 @@ def flight_table(seed, scale=1.0, samples=3000):
     rate, slope = (size * np.sin(phases)).sum(axis=2), (size * turns * np.cos(phases)).sum(axis=2)
     torque = scale * (INERTIA * slope + np.cross(rate, INERTIA * rate))
     lift = 9.81 + 0.3 * np.sin(phases[:, 0]).sum(axis=1) / 4
-    squared = np.linalg.solve(ALLOCATION, np.column_stack([MASS * lift, torque]).T).T
-    speed = np.sqrt(squared)
+    speed = np.sqrt(np.linalg.solve(ALLOCATION, np.column_stack([MASS * lift, torque]).T).T)
     command = speed + LAG_S * np.gradient(speed, 0.01, axis=0)
     asked = rate + 0.02 * slope
     columns = {"t": time, **dict(zip("pqr", rate.T, strict=True))}
@@ -59,10 +58,9 @@ def gusty_table(path, draw):
     torque = -INERTIA * answered * [1.0, 1.0, 0.1]
     squared = speed**2 + np.linalg.solve(ALLOCATION, np.column_stack([np.zeros(samples), torque]).T).T
     turned = 0.01 * np.cumsum((gusts - answered) * [1.0, 1.0, 0.1], axis=0)
-    rates = {name: still[name] + turned[:, axis] for axis, name in enumerate("pqr")}
     return (
         {name: still[name] for name in ("t", "fx", "fy", "fz")}
-        | rates
+        | {name: still[name] + turned[:, axis] for axis, name in enumerate("pqr")}
         | {f"w{n}": np.sqrt(squared[:, n - 1]) for n in range(1, 5)}
     )
 
@@ -150,8 +148,7 @@ def test_the_answer_begins_with_what_the_flights_tell(cpfls, folder, tmp_path):
 @pytest.mark.usefixtures("sketched")
 def test_a_report_shows_bode_plots(cpfls, summary, folder, tmp_path):
     _, output, _ = summary(folder / "light.csv")
-    page = cpfls.made("report", folder / "study.yaml", output, at=tmp_path / "page.html")
-    html = page.read_text()
+    html = cpfls.made("report", folder / "study.yaml", output, at=tmp_path / "page.html").read_text()
     assert "How a vehicle answers its rotors" in html
     assert "Frequency responses" in html
     assert html.count("<svg") == 8
@@ -160,8 +157,7 @@ def test_a_report_shows_bode_plots(cpfls, summary, folder, tmp_path):
 def test_equal_flights_give_equal_files(cpfls, folder, tmp_path):
     outputs = [tmp_path / "a.h5", tmp_path / "b.h5"]
     for output in outputs:
-        words = ("response", folder / "study.yaml", folder / "light.csv", folder / "heavy.csv", "-o", output)
-        cpfls.done(*words)
+        cpfls.done(*("response", folder / "study.yaml", folder / "light.csv", folder / "heavy.csv", "-o", output))
     assert outputs[0].read_bytes() == outputs[1].read_bytes()
 
 

@@ -220,8 +220,7 @@ def flown(tmp_path):
     columns |= {f"w{rotor}": 340 + 5 * np.sin(rotor * time) for rotor in range(1, 5)}
     columns |= {f"{name}_sp": np.roll(columns[name], -5) for name in ("roll", "pitch", "yaw")}
     columns["thrust_sp"] = np.where(time < 1.5, np.nan, 0.4 + 0.1 * np.sin(time))
-    rows = np.column_stack(list(columns.values()))
-    np.savetxt(log, rows, delimiter=",", header=",".join(columns), comments="")
+    np.savetxt(log, np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="")
     return config, log, columns
 
 
@@ -283,8 +282,7 @@ def test_init_proposes_the_setpoints_of_px4_and_import_takes_them(cpfls, tmp_pat
     log.write_bytes(ulog_of_flight(own, asked=asked))
     cpfls.done("init", log, "-o", config, "--mass", "0.8", "--arm", "0.16")
     assert "the attitude follows it" in " ".join(config.read_text().replace("#", "").split())
-    signals = yaml.safe_load(config.read_text())["import"]["signals"]
-    assert signals["setpoint_thrust"] == {
+    assert yaml.safe_load(config.read_text())["import"]["signals"]["setpoint_thrust"] == {
         "columns": ["vehicle_attitude_setpoint.thrust_body[2]"],
         "unit": "1",
         "sign": [-1],

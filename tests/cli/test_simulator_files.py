@@ -37,8 +37,7 @@ def folder(tmp_path_factory):
 
 def test_init_writes_the_vehicle_with_its_lines(cpfls, folder, tmp_path):
     output = tmp_path / "study.yaml"
-    result = cpfls.done("init", "--from", folder / "mine.sdf", "-o", output)
-    assert "mine.sdf, Gazebo: 0.04500 kg" in result.stdout
+    assert "mine.sdf, Gazebo: 0.04500 kg" in cpfls.done("init", "--from", folder / "mine.sdf", "-o", output).stdout
     text, vehicle = output.read_text(), load_study(output).vehicle
     assert "# mine.sdf line 8: <mass> of link base_link, and 4 more links" in text
     assert "<motorConstant>" in text

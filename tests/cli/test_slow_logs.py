@@ -32,8 +32,7 @@ def slow(cpfls, logs):
     """The config that `init` writes, its logs, and what it said."""
     first, second = logs(10)
     config = first.with_name("study.yaml")
-    said = cpfls.done("init", first, second, "--mass", 0.8, "--arm", 0.16, "-o", config)
-    return config, first, second, said
+    return config, first, second, cpfls.done("init", first, second, "--mass", 0.8, "--arm", 0.16, "-o", config)
 
 
 def test_init_says_what_to_set(slow):

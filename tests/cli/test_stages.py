@@ -220,8 +220,7 @@ def test_several_results_have_a_page_each_and_an_index(tmp_path):
 
 @pytest.mark.usefixtures("at_home")
 def test_names_of_files_that_are_no_text_are_written_and_linked(tmp_path):
-    names = ["a\udcff", "[b](c) <i>"]
-    several.run(run_to(tmp_path / "out"), names=names)
+    several.run(run_to(tmp_path / "out"), names=["a\udcff", "[b](c) <i>"])
     assert "a%FF" in (page := (tmp_path / "out" / "index.html").read_text())
     assert "%5Bb%5D%28c%29%20%3Ci%3E" in page
     assert read(tmp_path / "out" / "a\udcff.h5", Named)[0].name == "a\\udcff"

@@ -152,8 +152,7 @@ def test_notes_that_say_the_same_of_several_files_are_one(answer):
     # Asked for, each stands by itself.
     assert answer(Outcome({}, blocks), verbose=True)[1] == [f"cpfls: note: {block.text}" for block in blocks]
     without = tuple(Text(note, "warning") for note in ("no colon", "name: no colon", "other: no colon"))
-    said = ["cpfls: note: no colon", "cpfls: note: name and 1 more: no colon"]
-    assert answer(Outcome({}, without))[1] == said
+    assert answer(Outcome({}, without))[1] == ["cpfls: note: no colon", "cpfls: note: name and 1 more: no colon"]
     # What is done to a file is no name: "the first 3.1 s are cut and 1 more: ..." said nothing.
     cut = tuple(Text(f"the {end} s are cut: it is on the ground", "warning") for end in ("first 3.1", "last 7.0"))
     assert answer(Outcome({}, cut))[1] == ["cpfls: note: the first 3.1 s are cut: it is on the ground (1 more like it)"]

@@ -37,10 +37,9 @@ def gains(cpfls, folder):
     """What the command says and writes for each autopilot."""
     answer = {}
     for name in AUTOPILOTS:
-        result = cpfls.done(
+        answer[name] = cpfls.done(
             "tune", folder / "study.yaml", folder / "vehicle.h5", "--autopilot", name, "-o", folder / f"{name}.h5"
         )
-        answer[name] = result
     return answer
 
 
@@ -105,10 +104,9 @@ def test_gains_of_a_body_by_bounds_keep_their_margins_between_them(cpfls, refuse
         )
         numbers = [each._replace(determined=each.determined and each.high < 2 * each.low) for each in numbers]
         lag = known["lag.time_constant_s"]._replace(low=0.02, high=0.04, determined=False)
-        drag = number_of("drag_factor", determined=False)
         own = replace(
             plain,
-            numbers=(*numbers, lag, drag),
+            numbers=(*numbers, lag, number_of("drag_factor", determined=False)),
             correlation=np.eye(5),
             trades=(Trade("drag_factor", held[2], 1.0),),
             loop=loop,
@@ -177,10 +175,9 @@ def test_a_vehicle_that_flights_do_not_tell_is_refused_with_the_flight_that_is_m
 
 
 def test_a_model_that_is_no_vehicle_is_refused(refuse, folder, tmp_path):
-    message = refuse(
-        "tune", folder / "study.yaml", folder / "study.yaml", "--autopilot", "px4", "-o", tmp_path / "g.h5"
+    assert "gains need a vehicle that `cpfls vehicle` found" in " ".join(
+        refuse("tune", folder / "study.yaml", folder / "study.yaml", "--autopilot", "px4", "-o", tmp_path / "g.h5")
     )
-    assert "gains need a vehicle that `cpfls vehicle` found" in " ".join(message)
 
 
 def said_of(gains):
@@ -268,8 +265,7 @@ def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_said(cpfls
         *("tune", tmp_path / "study.yaml", folder / "vehicle.h5", "--autopilot", "px4", "--json"),
         *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
     )
-    found = read(tmp_path / "gains.h5")
-    assert any("no log holds 256 samples" in words for words in found.warnings)
+    assert any("no log holds 256 samples" in words for words in read(tmp_path / "gains.h5").warnings)
     answer = json.loads(result.stdout)
     assert answer["parameters"]["MC_ROLLRATE_P"]["proposed"] > 0
     assert answer["falls_short"]["proposed"] == []

@@ -172,11 +172,10 @@ def test_a_flight_that_was_simulated_knows_its_autopilot(cpfls, tmp_path):
     }
     (tmp_path / "study.yaml").write_text(yaml.safe_dump(study))
     path, flight = tmp_path / "path.h5", tmp_path / "flight.h5"
-    steps = (
+    for words in (
         ("trajectory", tmp_path / "study.yaml", "--hover", "5", "--excite", "roll", "-o", path),
         ("simulate", tmp_path / "study.yaml", path, "--autopilot", "crazyflie", "-o", flight),
-    )
-    for words in steps:
+    ):
         cpfls.done(*words)
     said = cpfls.summary("simulate", tmp_path / "study.yaml", flight, "-o", tmp_path / "twin.h5")
     assert (said["autopilot"], said["gains"]["source"], said["thrust_from"]) == ("crazyflie", "simulation", "setpoint")

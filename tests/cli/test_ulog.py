@@ -173,8 +173,7 @@ def test_the_example_gives_torques_in_the_directions_of_px4(cpfls, write, tmp_pa
         torque = file["body_torque"][()]
         assert "position" not in file
     # In FLU, whose y and z are those of FRD turned round.
-    middle = [torque[50], torque[200], torque[350]]
-    for axis, (own, sign) in enumerate(zip(middle, (1, -1, -1), strict=True)):
+    for axis, (own, sign) in enumerate(zip([torque[50], torque[200], torque[350]], (1, -1, -1), strict=True)):
         assert sign * own[axis] > 0
         np.testing.assert_allclose(np.delete(own, axis), 0.0, atol=1e-9)
 

@@ -342,10 +342,9 @@ def test_rotors_that_no_vehicle_flies_with_are_refused(refuse, config, tmp_path,
     name, *model = command
     sets = {"import.signals": signals, "import.torque_source": None, "vehicle.rotors": given}
     words = [word for key, value in sets.items() for word in ("--set", f"{key}={json.dumps(value)}")]
-    (line,) = refuse(name, config, *model, log, "-o", tmp_path / "out.h5", *words)
-    assert line == (
+    assert refuse(name, config, *model, log, "-o", tmp_path / "out.h5", *words) == [
         f"vehicle.rotors: the rotors cannot produce {axes} independently of the rest; check their positions and spins"
-    )
+    ]
 
 
 @pytest.mark.parametrize("more", [(), ("--dry-run",)])

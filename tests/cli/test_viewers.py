@@ -64,8 +64,7 @@ def messages_of(path):
     with path.open("rb") as stream:
         for schema, channel, message in make_reader(stream).iter_messages():
             said = json.loads(message.data)
-            checks = schemas.setdefault(schema.id, jsonschema.Draft202012Validator(json.loads(schema.data)))
-            checks.validate(said)
+            schemas.setdefault(schema.id, jsonschema.Draft202012Validator(json.loads(schema.data))).validate(said)
             assert schema.encoding == "jsonschema"
             assert channel.message_encoding == "json"
             assert message.log_time == message.publish_time

@@ -150,8 +150,7 @@ WITHOUT = {
 @pytest.mark.parametrize("part", WITHOUT)
 def test_every_part_of_the_model_flies(sums, written, own, flight, part):
     """A model that lacks a part does not play the flight back."""
-    lacking = sums(written("lacking.h5", WITHOUT[part]), flight)["model"]
-    assert (lacking / own["model"]).max() > 4
+    assert (sums(written("lacking.h5", WITHOUT[part]), flight)["model"] / own["model"]).max() > 4
 
 
 def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
@@ -159,8 +158,7 @@ def test_a_vehicle_found_from_commands_flies_from_commands(sums, fly, written):
     flown = fly("commanded-flight.h5", commanded)
     record = read(flown, Simulated)[0]
     assert record.rotor_speed is None
-    late = {"motor_lag.time_constant_s": 0.02, "command_delay.delay_s": 0.013}
-    assert late.items() <= record.effects.items()
+    assert {"motor_lag.time_constant_s": 0.02, "command_delay.delay_s": 0.013}.items() <= record.effects.items()
     errors = sums(commanded, flown, "--hold", "linear", "--horizon", "0.5")
     assert (errors["model"] < 0.005 * np.minimum(errors["nothing-moves"], errors["rate-stays"])).all()
 
@@ -193,13 +191,12 @@ def test_a_vehicle_with_more_than_its_table_is_evaluated_whole(cpfls, config, pa
     # No polynomial of velocity and rotor speeds: evaluated along the motion, and by itself in a simulation.
     blown = ModelEffect("wind", {}, np.array([1e-5, 2e-5, 0.0]))
     model = written("more.h5", model=replace(WHOLE, effects=(*WHOLE.effects, blown)))
-    words = {
+    for command, given in {
         "simulate": (path, "--model", model),
         "compare": (flight, "--model", model),
         "replay": (model, flight),
         "response": (flight, "--model", model),
-    }
-    for command, given in words.items():
+    }.items():
         result = cpfls(command, config, *given, "-o", tmp_path / f"{command}.h5")
         assert result.exit_code == 0, (command, result.stderr)
 
@@ -265,8 +262,7 @@ def test_a_torque_that_was_logged_is_what_a_prediction_is_held_against(
     torque = cpfls_cli.load_model(vehicle).predict(flight).body_torque
     log, settings = written_log(body_torque=("N m", torque))
     settings["torque_source"] = "column"
-    options = ("--set", f"import={json.dumps(settings)}")
-    cpfls.done("import", config, log, "-o", tmp_path / "log.h5", *options)
+    cpfls.done("import", config, log, "-o", tmp_path / "log.h5", *("--set", f"import={json.dumps(settings)}"))
     with warnings.catch_warnings(action="ignore"):
         held = cpfls_cli.load_model(vehicle).predict(tmp_path / "log.h5")
     np.testing.assert_allclose(body_torque(held.attitude, held.measured_torque), torque, atol=1e-6)

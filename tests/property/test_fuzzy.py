@@ -107,8 +107,7 @@ def test_gradient_is_that_of_the_function(structure, seed):
     angles, values, elsewhere = drawn(seed)
     system = fit_periodic(angles, values[0], structure)
     # The triangle wave has a kink at a quarter of a turn.
-    smooth = np.all(np.abs(np.abs(elsewhere) - np.pi / 2) > 2 * STEP, axis=1)
-    points = elsewhere[smooth]
+    points = elsewhere[np.all(np.abs(np.abs(elsewhere) - np.pi / 2) > 2 * STEP, axis=1)]
     scale = 1 + np.abs(system.coefficients).max()
     for angle in (0, 1):
         step = STEP * np.eye(2)[angle]

@@ -50,8 +50,7 @@ def test_split(time, share, embargo):
     assert split.held_out.stop == len(time)
     if len(held_out):
         assert held_out[0] > training[-1] + embargo - 1e-9
-    dropped = time[split.training.stop : split.held_out.start]
-    assert np.all(dropped <= training[-1] + embargo + 1e-9)
+    assert np.all(time[split.training.stop : split.held_out.start] <= training[-1] + embargo + 1e-9)
 
 
 SEESAW = {"consequents": "seesaw", "products": "additive"}

@@ -48,8 +48,7 @@ def test_peaks_bound_the_samples_and_are_reached(profile):
     lengths = [length for _, length in pulse_sequence(profile)]
     ends = np.cumsum(lengths)
     quarters = np.concatenate([ends - fraction * np.array(lengths) for fraction in (0.0, 0.25, 0.5, 0.75)])
-    reached = np.abs(profile.sample(quarters)).max(axis=0)
-    np.testing.assert_allclose(reached, astuple(profile.peaks), rtol=1e-9)
+    np.testing.assert_allclose(np.abs(profile.sample(quarters)).max(axis=0), astuple(profile.peaks), rtol=1e-9)
     everywhere = np.abs(profile.sample(np.linspace(0, profile.duration, 2000))).max(axis=0)
     assert (everywhere <= np.array(astuple(profile.peaks)) * (1 + 1e-9)).all()
 
@@ -88,8 +87,7 @@ def test_torque_shares_are_those_of_newton_and_euler(seed):
     path = full_rotation(chosen, 10.0, np.random.default_rng(seed), INERTIA)
     motion = path.sample(path.times(50))
     motions = motion.attitude, motion.attitude_rate, motion.attitude_acceleration
-    inertia = np.array([[0.6, 0.02, -0.01], [0.02, 0.7, 0.03], [-0.01, 0.03, 1.2]])
-    expected = newton_euler_torque(*motions, inertia)
+    expected = newton_euler_torque(*motions, np.array([[0.6, 0.02, -0.01], [0.02, 0.7, 0.03], [-0.01, 0.03, 1.2]]))
     shares = RotationLimits(chosen, INERTIA).loads(motion)[:, 12:]
     np.testing.assert_allclose(rotations.generalised_torque(motion.attitude, shares * TORQUE), expected, atol=1e-12)
 
@@ -153,8 +151,7 @@ def test_samples_are_the_integral_of_the_pop():
     count = 60
     limits = 10 ** rng.uniform(-3, 3, (6, count))
     limits[:5][rng.random((5, count)) < 0.2] = np.inf
-    moves = plan_moves(10 ** rng.uniform(-3, 3, count), Limits(**dict(zip(LIMIT_NAMES, limits, strict=True))))
-    for move in moves:
+    for move in plan_moves(10 ** rng.uniform(-3, 3, count), Limits(**dict(zip(LIMIT_NAMES, limits, strict=True)))):
         times, states = integrated(move.profile)
         peaks = np.array(astuple(move.peaks))
         slopes = np.append(peaks[1:], peaks[6] * 2 * np.pi / move.profile.period)
@@ -202,8 +199,7 @@ def peaks_upward(batch):
 
 def test_a_move_is_found_wherever_anything_limits_it_and_nothing_is_not_a_number(batch):
     limited = np.isfinite(batch.limits).any(axis=0) | (batch.period is not None)
-    expected = np.where(limited, MoveOutcome.SOLVED, MoveOutcome.NO_LIMIT)
-    np.testing.assert_array_equal(batch.moves.outcome, expected)
+    np.testing.assert_array_equal(batch.moves.outcome, np.where(limited, MoveOutcome.SOLVED, MoveOutcome.NO_LIMIT))
     assert np.isfinite(batch.moves.duration[limited]).all()
     for values in (batch.moves.duration, batch.moves.peaks, batch.moves.holds, batch.moves.period):
         assert not np.isnan(values).any()

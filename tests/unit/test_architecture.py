@@ -79,5 +79,4 @@ def test_layers_hold_as_imported():
 def test_a_front_page_that_nobody_outside_needs_loads_nothing():
     needed = {"__init__.py", "fuzzy/__init__.py", "library/__init__.py"}
     pages = {page.relative_to(PACKAGE).as_posix(): page for page in PACKAGE.rglob("__init__.py")}
-    loading = {name for name, page in pages.items() if len(syntax(page).body) > 1}
-    assert loading == needed
+    assert {name for name, page in pages.items() if len(syntax(page).body) > 1} == needed

@@ -157,12 +157,10 @@ def test_penalised_system_is_solved_with_its_penalty(condition):
 
 def test_losing_rank_never_improves_the_conditioning():
     """Systems whose last singular value falls through the tolerance: conditioning only rises."""
-    tolerance = 1e-6
-    found = [
-        solved(columns([8.0, 4.0, third, last])[0], np.ones(200), rank_tolerance=tolerance).conditioning
+    assert [
+        solved(columns([8.0, 4.0, third, last])[0], np.ones(200), rank_tolerance=1e-6).conditioning
         for third, last in ((2, 1), (2, 1e-9), (0, 0))
-    ]
-    assert found == pytest.approx([8, 2e6, 3e6])
+    ] == pytest.approx([8, 2e6, 3e6])
 
 
 @pytest.mark.usefixtures("each_way")
@@ -271,8 +269,7 @@ def excitation(attitude, noise=0.0, **settings):
 
 def test_rules_that_never_fire_are_named():
     """Angles within a quarter turn on either side of zero never reach the function at pi (rule 3 of 4)."""
-    attitude = np.random.default_rng(16).uniform(-1.5, 1.5, (400, 3))
-    found = excitation(attitude, membership_functions=5)
+    found = excitation(np.random.default_rng(16).uniform(-1.5, 1.5, (400, 3)), membership_functions=5)
     silent = {name for name, excited in zip(found.name, found.excited, strict=True) if not excited}
     third_by_third = {
         f"{name} rule {4 * i + j + 1}" for name in ("D23", "D33") for i in range(4) for j in range(4) if 2 in (i, j)
@@ -283,8 +280,7 @@ def test_rules_that_never_fire_are_named():
 
 
 def test_every_rule_is_excited_on_the_full_circle():
-    attitude = np.random.default_rng(16).uniform(-np.pi, np.pi, (2000, 3))
-    found = excitation(attitude, membership_functions=5)
+    found = excitation(np.random.default_rng(16).uniform(-np.pi, np.pi, (2000, 3)), membership_functions=5)
     assert len(found.name) == 1 + 4 + 4 + 16 + 16
     assert found.excited.all()
     np.testing.assert_allclose(found.determined, 1.0, atol=1e-9)

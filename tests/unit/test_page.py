@@ -126,14 +126,13 @@ def test_several_at_once_are_what_a_loop_over_them_gives(tmp_path, tag, loop, te
 
 
 def test_a_list_is_what_a_loop_appends(tmp_path):
-    text = """\
+    (tmp_path / "a.md.j2").write_text("""\
 {% list whole = "%s%s" | format(name, loop.index0) for name, size in r.items() if size %}
 {% list sums = (x + y if x else y) for x, y in zip([0, 1, 2], [3, 4, 5]) %}
 {% for own in ["a", "b"] %}{% list each = own ~ x for x in [1, 2] %}{{ each | join("+") }} {% endfor %}
 {% macro of(xs) %}{% list twice = 2 * x for x in xs %}{{ twice | join(",") }}{% endmacro %}
 {{ whole | join(",") }} {{ sums | join(",") }} {{ of([1, 2]) }} {% list none_ = x for x in [] %}{{ none_ | length }}
-"""
-    (tmp_path / "a.md.j2").write_text(text)
+""")
     said = page.words("a", {"p": 1, "q": 0, "s": 2}, folder=tmp_path)
     assert said.split() == ["a1+a2", "b1+b2", "p0,s1", "3,5,7", "2,4", "0"]
 

@@ -48,8 +48,7 @@ def test_thinned_signals_keep_each_peak_and_each_gap(most):
     assert (np.diff(time) >= 0).all()
     assert (np.nanmax(kept[:, 0]), np.nanmin(kept[:, 1])) == (50.0, -50.0)
     assert np.isnan(kept).any()
-    at = int(np.nanargmax(kept[:, 0]))
-    assert abs(time[at] - 777) <= 2 * 2000 / min(most, 2000) + 1
+    assert abs(time[int(np.nanargmax(kept[:, 0]))] - 777) <= 2 * 2000 / min(most, 2000) + 1
 
 
 def test_a_track_has_a_gap_where_the_log_has_one_and_no_signal_of_nothing():

@@ -13,9 +13,8 @@ from tests.builders.shifted_flights import save
 def column(path, *names):
     """Copy a log without some of its columns."""
     header = path.read_text().splitlines()[0].split(",")
-    data = np.loadtxt(path, delimiter=",", skiprows=1)
     kept = [place for place, name in enumerate(header) if name not in names]
-    return data[:, kept], ",".join(header[place] for place in kept)
+    return np.loadtxt(path, delimiter=",", skiprows=1)[:, kept], ",".join(header[place] for place in kept)
 
 
 def test_output_that_is_a_file(refuse, gap_config, shifted, tmp_path):
@@ -50,8 +49,7 @@ def test_unknown_effect_to_ignore(refuse, gap_config, shifted, tmp_path):
 
 def test_flight_too_short_to_split(refuse, gap_config, shifted, tmp_path):
     data, header = column(shifted[0])
-    short = save(tmp_path / "short.csv", data[:900], header)
-    (message,) = refuse("gap", gap_config, short, "-o", tmp_path / "x")
+    (message,) = refuse("gap", gap_config, save(tmp_path / "short.csv", data[:900], header), "-o", tmp_path / "x")
     assert message.startswith("short.csv: the only flight is too short to hold out a third of it")
     assert "--held-out" in message
     assert "gap.window_s = 0.4" in message
@@ -59,8 +57,7 @@ def test_flight_too_short_to_split(refuse, gap_config, shifted, tmp_path):
 
 def test_log_without_actuation(refuse, gap_config, shifted, tmp_path):
     data, header = column(shifted[0], "om1", "om2", "om3", "om4")
-    still = save(tmp_path / "still.csv", data, header)
-    (message,) = refuse("compare", gap_config, still, "-o", tmp_path / "x.h5")
+    (message,) = refuse("compare", gap_config, save(tmp_path / "still.csv", data, header), "-o", tmp_path / "x.h5")
     assert "has no rotor_speed, rotor_command or body_torque" in message
 
 

@@ -158,8 +158,7 @@ def answer(cpfls, gap_config, pipeline, with_attitude, tmp_path_factory):
 def test_artifacts_carry_the_model(answer, pipeline):
     folder, _ = answer
     with h5py.File(folder / "diagnosis.h5") as file, h5py.File(pipeline.model) as model:
-        functions = model["model/fuzzy/coefficients"][()]
-        assert (file["base/fuzzy/coefficients"][()] == functions).all()
+        assert (file["base/fuzzy/coefficients"][()] == model["model/fuzzy/coefficients"][()]).all()
 
 
 def test_offset_is_found_next_to_the_model(answer):
@@ -212,8 +211,7 @@ def test_error_is_the_gap_that_remains(gap_config, extended, flown):
     found = cpfls_cli.load_model(extended).predict(flown)
     error, measured, inertia = found.error[50:-50], found.measured_torque[50:-50], found.inertia[0]
     # The rotors balance the offset, 0.47 N m about y, so that their torque turns nothing, and the model knows.
-    vehicle = load_study(gap_config).vehicle
-    rotors = body_wrench(vehicle, read(flown, Flight)[0].signals["rotor_speed"]).body_torque
+    rotors = body_wrench(load_study(gap_config).vehicle, read(flown, Flight)[0].signals["rotor_speed"]).body_torque
     assert abs(rotors[50:-50, 1].mean()) > 0.4
     assert abs(measured[:, 1].mean()) < 0.01
     assert abs(error[:, 1].mean()) < 0.01
@@ -247,8 +245,7 @@ def test_the_file_says_what_the_effects_and_what_the_base_learned_from(extended,
 
 def test_stages_hand_the_flights_on(cpfls, gap_config, two_models, tmp_path):
     """Another model to extend brings its own flights."""
-    diagnosis = two_models.with_name("diagnosis.h5")
-    again = cpfls.made("extend", gap_config, diagnosis, at=tmp_path / "again.h5")
+    again = cpfls.made("extend", gap_config, two_models.with_name("diagnosis.h5"), at=tmp_path / "again.h5")
     assert learned(again) == learned(two_models)
 
 
@@ -257,8 +254,7 @@ def test_replay_and_compare_warn_of_flights_seen(
 ):
     fast = ("--every", "400")
     result = cpfls("replay", gap_config, extended, shifted[1], shifted[2], "-o", tmp_path / "r.h5", *fast)
-    whole = "flight_2.csv: extended.h5 has learned from it, so it says nothing about unseen flights"
-    assert whole in result.stderr
+    assert "flight_2.csv: extended.h5 has learned from it, so it says nothing about unseen flights" in result.stderr
     assert "flight_3.csv: extended.h5" not in result.stderr
     result = cpfls("compare", gap_config, *with_attitude, "--model", two_models, "-o", tmp_path / "d.h5", "--json")
     part = "flight_4.csv: extended.h5 has learned from its first 1600 of 2400 samples, so that says nothing"

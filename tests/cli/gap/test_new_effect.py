@@ -105,8 +105,7 @@ def test_it_is_named_with_its_coefficients(new):
 
 
 def test_it_is_in_the_exported_c(new):
-    text = (new.folder / "vehicle.c").read_text()
-    assert "static const real cubic_damping_d_z" in text
+    assert "static const real cubic_damping_d_z" in (new.folder / "vehicle.c").read_text()
     require_gcc()
     subprocess.run(["gcc", *WARNINGS, "-c", "vehicle.c", "-o", "vehicle.o"], cwd=new.folder, check=True)
 

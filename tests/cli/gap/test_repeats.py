@@ -12,6 +12,7 @@ from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.rotations import euler_angles
 from cpfls_cli.store import read
 from tests.builders.gusty_flights import GUSTS, SMALL, Flight, gusty_flights
+from tests.builders.studies import put_file
 
 COLUMNS = {
     "attitude": (["phi", "theta", "psi"], "rad"),
@@ -42,8 +43,7 @@ def found(cpfls, tmp_path_factory):
         parts = (time, euler_angles(motion.rotation), motion.rate, motion.velocity, flown.speed)
         header = ",".join(["t", *(name for names, _ in COLUMNS.values() for name in names)])
         np.savetxt(path, np.column_stack(parts), delimiter=",", header=header, comments="", fmt="%.9g")
-    study = folder / "study.yaml"
-    study.write_text(yaml.safe_dump(config()))
+    study = put_file(folder / "study.yaml", yaml.safe_dump(config()))
     result = cpfls.done("gap", study, *paths, "-o", folder / "gap", "-v")
     summary = json.loads((folder / "gap" / "gap.json").read_text())
     return SimpleNamespace(folder=folder / "gap", stdout=result.stdout, summary=summary)

@@ -232,8 +232,7 @@ def test_a_flight_without_rotors_is_refused(refused, shifted, tmp_path):
     table = np.loadtxt(shifted[0], delimiter=",", skiprows=1)[:, :4]
     log = tmp_path / "still.csv"
     np.savetxt(log, table, delimiter=",", header="t,wx,wy,wz", comments="", fmt="%.9g")
-    message = refused("vehicle", log)
-    assert message.startswith(
+    assert refused("vehicle", log).startswith(
         "still.csv: has no rotor_speed, rotor_command or body_torque, so nothing drives a playback"
     )
 
@@ -248,8 +247,7 @@ def test_a_horizon_longer_than_the_flight_or_shorter_than_a_sample_is_refused(re
 
 
 def test_a_model_of_another_vehicle_is_refused(refused, extended, shifted):
-    message = refused(extended, shifted[0], options=("--set", "vehicle.mass_kg=5.5"))
-    assert message.startswith(
+    assert refused(extended, shifted[0], options=("--set", "vehicle.mass_kg=5.5")).startswith(
         f"{extended}: was made with another vehicle; these differ: vehicle.mass_kg (6.0 there, 5.5"
     )
 

@@ -206,8 +206,7 @@ def test_flights_of_another_vehicle_are_named(cpfls, study, pipeline, others, tm
     """Their numbers are of that vehicle; they are used all the same."""
     heavy = tmp_path / "heavy.h5"
     path = others[0].with_name(others[0].name.replace("flight", "trajectory"))
-    inertia = ("--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]")
-    cpfls.done("simulate", study, path, *inertia, "-o", heavy)
+    cpfls.done("simulate", study, path, *("--set", "vehicle.inertia_kg_m2=[0.7, 0.6, 1.2]"), "-o", heavy)
     words = ("identify", study, pipeline.flight, *HELD_OUT, *SEARCH, "--choose-on", heavy, "--validate", others[1])
     result = cpfls.done(*words, "-o", tmp_path / "out.h5")
     said = [line for line in result.stderr.splitlines() if "another vehicle" in line]

@@ -24,6 +24,7 @@ from tests.builders.exported_vehicles import flat, on_numpy
 from tests.builders.identified_models import write_changed
 from tests.builders.playback_flights import STATED
 from tests.builders.results import craft, drawn
+from tests.builders.studies import put_file
 
 PERIOD = 0.01
 HOVER = np.sqrt(vehicle_models.QUAD.mass_kg * 9.81 / sum(r.thrust_factor_n_s2 for r in vehicle_models.QUAD.rotors))
@@ -198,8 +199,7 @@ def test_many_vehicles_step_side_by_side(whole, speeds):
     rolls = np.linspace(-0.5, 0.5, 7)[:, None] * [1.0, 0.0, 0.0]
     together = whole.step(whole.state(attitude=rolls), speeds[:7], PERIOD)
     for index, roll in enumerate(rolls):
-        alone = whole.step(whole.state(attitude=roll), speeds[index], PERIOD)
-        for one, all_ in zip(alone, together, strict=True):
+        for one, all_ in zip(whole.step(whole.state(attitude=roll), speeds[index], PERIOD), together, strict=True):
             np.testing.assert_allclose(one[0], all_[index], rtol=1e-12, atol=1e-12)
 
 
@@ -217,9 +217,7 @@ def test_an_identified_model_flies_as_it_is_played_back(pipeline):
 
 
 def test_a_stated_vehicle_falls_and_hovers(tmp_path):
-    config = tmp_path / "study.yaml"
-    config.write_text(json.dumps({"vehicle": asdict(STATED)}))
-    vehicle = cpfls_cli.stated_vehicle(config)
+    vehicle = cpfls_cli.stated_vehicle(put_file(tmp_path / "study.yaml", json.dumps({"vehicle": asdict(STATED)})))
     fallen = vehicle.fly(vehicle.state(), np.zeros((11, 4)), 0.1)
     np.testing.assert_allclose(fallen.position[-1], [0, 0, -9.81 / 2], atol=1e-12)
     hover = np.sqrt(STATED.mass_kg * 9.81 / sum(r.thrust_factor_n_s2 for r in STATED.rotors))

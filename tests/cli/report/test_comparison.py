@@ -67,10 +67,6 @@ def unfolded(blocks):
     return [inner for block in blocks for inner in (unfolded(block["blocks"]) if "blocks" in block else [block])]
 
 
-def named(blocks, name):
-    return next(block for block in blocks if block.get("name") == name)
-
-
 def table(blocks, first, place=0):
     """Find a table by the name of its first column, the first or a later one of that name."""
     tables = [block for block in blocks if block["kind"] == "table" and block["header"][0] == first]
@@ -123,8 +119,7 @@ def test_models_of_different_flights_are_not_ranked(compared, write):
     assert texts.startswith("Judged on different flights, so the errors cannot be ranked: ")
     assert "one.h5 on training" in texts
     assert "two.h5 on training (sha256 ffffffffffff)" in texts
-    tables = [block["header"][0] for block in blocks if block["kind"] == "table"]
-    assert "Model" not in tables
+    assert "Model" not in [block["header"][0] for block in blocks if block["kind"] == "table"]
     assert not [block for block in blocks if block["kind"] == "figure"]
 
 
@@ -139,8 +134,7 @@ def test_a_flight_of_another_name_with_equal_content_is_the_same_flight(compared
 
 
 def test_another_split_of_one_flight_is_other_data(compared, write):
-    other = ("training_share: 1.0", "training_share: 0.9")
-    _, blocks = compared(write("one.h5"), write("two.h5", config=other))
+    _, blocks = compared(write("one.h5"), write("two.h5", config=("training_share: 1.0", "training_share: 0.9")))
     assert any("cannot be ranked" in block.get("text", "") for block in blocks)
     assert table(blocks, "Key")["rows"] == [["identification.training_share", "1.0", "0.9"]]
 
@@ -199,8 +193,7 @@ def test_inertia_curves_and_verdicts_stand_side_by_side(compared, write):
     ]
     labels = figure_of("comparison-curves-1", *models).axes[0].get_legend_handles_labels()[1]
     assert {"one.h5", "two.h5", "rigid body", "95 % band of one.h5", "95 % band of two.h5"} == set(labels)
-    rows = table(blocks, "Model")["rows"]
-    assert [row[1] for row in rows] == ["do not use", "new", "not judged", ""]
+    assert [row[1] for row in table(blocks, "Model")["rows"]] == ["do not use", "new", "not judged", ""]
 
 
 def test_differences_are_found_at_every_depth_and_long_values_are_cut():
@@ -229,7 +222,7 @@ def test_a_model_that_is_the_rigid_body_hides_its_line_and_the_caption_says_so(c
     output = cpfls.made("report", study, write("one.h5", **own), at=tmp_path / "curves.json")
     page = json.loads(output.read_text(encoding="utf-8"))
     blocks = unfolded(next(part["blocks"] for part in page["sections"] if part["name"] == "identify"))
-    caption = named(blocks, "identify-1-inertia-curves-1")["caption"]
+    caption = next(block for block in blocks if block.get("name") == "identify-1-inertia-curves-1")["caption"]
     assert ("the grey line lies under its own" in caption) == same
     assert "what the structure does, not what the vehicle does" in caption
     assert "a band need not hold the truth" in caption

@@ -107,8 +107,7 @@ def test_the_verdict_comes_first_and_with_its_reasons(report, model, label, shor
 
 
 def test_an_incomplete_search_is_said_in_the_summary(report, model):
-    stopped = {"stop_reason": "time-limit"}
-    assert "stopped (time limit), go on with" in section(report(model(**stopped)), "summary")
+    assert "stopped (time limit), go on with" in section(report(model(stop_reason="time-limit")), "summary")
     assert "stopped" not in section(report(model()), "summary")
 
 
@@ -150,8 +149,7 @@ def test_the_ridge_curve_says_whether_there_is_evidence_for_a_fuzzy_part(report,
 
 def test_how_many_samples_of_how_many_were_examined(report, model):
     assert "the first 2500 of its 7300 samples" in section(report(model()), "identify")
-    whole = section(report(model(**{"residuals/available": 2500})), "identify")
-    assert "held-out rest, 2500 samples" in whole
+    assert "held-out rest, 2500 samples" in section(report(model(**{"residuals/available": 2500})), "identify")
 
 
 def test_residuals_are_called_white_where_they_are(page):
@@ -286,8 +284,7 @@ def test_the_model_that_runs_away_does_not_flatten_the_picture(full):
 
 
 def test_what_is_lacking_is_left_out_and_said(tmp_path):
-    bare = replace(made.diagnosis(force=False), run=None, picture=None, playback=None)
-    page = shown(tmp_path, bare)
+    page = shown(tmp_path, replace(made.diagnosis(force=False), run=None, picture=None, playback=None))
     assert page.summary["figures"] == ["diagnose-1-gap-sizes", "diagnose-1-intervals"]
     assert page.summary["missing"] == ["disagreement", "extended"]
     assert "too short to simulate" in page.text

@@ -120,8 +120,7 @@ def test_every_claim_and_every_figure_has_its_line(parted):
     summary, html = page(parted, "whole.h5", times=TIMES)
     assert "figure-1-seesaw" in summary.figures
     rows = table_cells(html, "claims")[1:]
-    verdicts = [row[1] for row in rows]
-    assert set(verdicts) <= {"PASS", "FAIL", "UNDECIDED", "NOT MEASURED"}
+    assert {row[1] for row in rows} <= {"PASS", "FAIL", "UNDECIDED", "NOT MEASURED"}
     for row in rows:
         assert ("Made by: " in row[4]) == (row[1] == "NOT MEASURED") == (row[2] == "—")
     assert [row[1] for row in rows if row[0].startswith("Time of an evaluation: ")] == ["PASS"]
@@ -151,8 +150,7 @@ def with_settings(parted, name, **values):
 
 
 def test_paper_stands_next_to_settings_of_equal_structure_and_samples(parted):
-    claimed = with_settings(parted, "paper.h5", samples=[685, 5487], structure=["cpfls", "fls"])
-    _, html = page(parted, claimed)
+    _, html = page(parted, with_settings(parted, "paper.h5", samples=[685, 5487], structure=["cpfls", "fls"]))
     rows = table_cells(html, "searches-1-table")
     places = {row[0].replace("\N{NO-BREAK SPACE}", " "): place for place, row in enumerate(rows)}
     assert rows[places["best run: MSE, (N m)²"] + 1] == ["· paper", "0.0008", "0.0007"]

@@ -120,11 +120,9 @@ def test_waypoints_without_points_are_refused(refuse, tmp_path, config):
 
 def test_a_duration_too_short_for_the_file_is_refused(refuse, tmp_path, config):
     path = put_file(tmp_path / "far.csv", "x_m,y_m,z_m\n0,0,0\n30,0,0\n0,0,0\n30,0,0\n0,0,0\n")
-    (message,) = refuse("trajectory", config, "--waypoints", path, "-o", tmp_path / "t.h5")
-    assert (
-        message
-        == "trajectory.duration_s = 54.86: 4 moves take 64 s; raise it, or set it to null for as long as they take"
-    )
+    assert refuse("trajectory", config, "--waypoints", path, "-o", tmp_path / "t.h5") == [
+        "trajectory.duration_s = 54.86: 4 moves take 64 s; raise it, or set it to null for as long as they take"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -296,8 +294,7 @@ def test_what_a_held_vehicle_lacks_has_no_noise(cpfls, refuse, tmp_path, study):
 
 def test_no_autopilot_flies_a_held_vehicle(cpfls, refuse, tmp_path, study):
     cpfls.done("trajectory", study(), "-o", tmp_path / "t.h5")
-    command = ("simulate", study(), tmp_path / "t.h5", "-o", tmp_path / "f.h5", "--mode", "closed-loop")
-    (message,) = refuse(*command)
+    (message,) = refuse(*("simulate", study(), tmp_path / "t.h5", "-o", tmp_path / "f.h5", "--mode", "closed-loop"))
     assert "turns a vehicle that is held at its centre of mass" in message
 
 
@@ -321,7 +318,6 @@ def test_turns_that_no_rotor_gives_name_the_torque_to_limit(refuse, tmp_path, st
     ],
 )
 def test_impossible_rotations_name_their_key(refuse, tmp_path, study, key, value, complaint):
-    config = study()
-    (message,) = refuse("trajectory", config, "-o", tmp_path / "t.h5", "--set", f"trajectory.{key}={value}")
+    (message,) = refuse("trajectory", study(), "-o", tmp_path / "t.h5", "--set", f"trajectory.{key}={value}")
     assert f"trajectory.{key.rsplit('.', 1)[0]}" in message
     assert complaint in message

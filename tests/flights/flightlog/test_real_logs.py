@@ -149,8 +149,7 @@ def imported(tmp_path):
 
     def call(config, folder, name):
         flight = tmp_path / f"{config}_{name}.h5"
-        words = ("import", CONFIGS / f"{config}.yaml", path_of_log(folder, name), "-o", flight, "--json")
-        result = run(*words)
+        result = run(*("import", CONFIGS / f"{config}.yaml", path_of_log(folder, name), "-o", flight, "--json"))
         assert result.exit_code == 0, result.stderr
         with h5py.File(flight) as file:
             samples = len(file["time"])
@@ -262,8 +261,7 @@ def body_torque(signals):
 
 def rotorpy_flight(source, **changes):
     columns = columns_of_log("rotorpy", "none")
-    rotors = {"rotor-speed": ("rotor_speed", "om"), "rotor-command": ("rotor_command", "omcmd")}
-    name, column = rotors[source]
+    name, column = {"rotor-speed": ("rotor_speed", "om"), "rotor-command": ("rotor_command", "omcmd")}[source]
     signals = {
         "attitude": SignalMap(columns=("phi", "theta", "psi"), unit="rad"),
         "body_rate": SignalMap(columns=("wx", "wy", "wz"), unit="rad/s"),
@@ -284,8 +282,7 @@ def test_the_torque_of_the_rotors_is_that_of_the_motion():
     flight = rotorpy_flight("rotor-speed")
     momentum = INERTIA * flight.body_rate
     needed = INERTIA * derivative(flight.time, flight.body_rate) + np.cross(flight.body_rate, momentum)
-    error = (needed - flight.body_torque)[50:-50]
-    assert (error.std(axis=0) < 1e-3 * flight.body_torque.std(axis=0)).all()
+    assert ((needed - flight.body_torque)[50:-50].std(axis=0) < 1e-3 * flight.body_torque.std(axis=0)).all()
 
 
 @pytest.mark.parametrize(("source", "delay_s"), [("rotor-speed", 0.0), ("rotor-command", 0.006)])
@@ -323,8 +320,7 @@ def explained(flight, axis):
     """R2 of a rigid body turning about one axis: angular acceleration, gyroscopic product, constant."""
     rate, torque = flight.body_rate, flight.body_torque[:, axis]
     product = rate[:, (axis + 1) % 3] * rate[:, (axis + 2) % 3]
-    acceleration = derivative(flight.time, rate[:, axis])
-    regressor = np.column_stack([acceleration, product, np.ones(len(torque))])
+    regressor = np.column_stack([derivative(flight.time, rate[:, axis]), product, np.ones(len(torque))])
     residual = torque - regressor @ np.linalg.lstsq(regressor, torque, rcond=None)[0]
     return 1 - residual.var() / torque.var()
 
@@ -396,9 +392,8 @@ def test_a_spike_in_the_gyroscope_of_a_real_flight_is_counted_and_can_be_repaire
     assert any("1 suspected spike in column ctrlLee_omegax" in text for text in seen.warnings)
     repaired = taken(columns, spike_deviations=10.0)
     # Nothing is there to interpolate from beyond an end, so the row goes.
-    at_end = row in (0, 1438)
     assert (repaired.spikes, repaired.dropped.get("incomplete_ends", 0)) == (
-        ({}, 1) if at_end else ({"ctrlLee_omegax": 1}, 0)
+        ({}, 1) if row in (0, 1438) else ({"ctrlLee_omegax": 1}, 0)
     )
     assert (repaired.suspected_spikes, repaired.warnings) == ({}, ())
     at = clean.span_s[0] + clean.time

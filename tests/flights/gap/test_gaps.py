@@ -179,6 +179,5 @@ def test_the_most_cut_propeller_is_named(answer_of, coefficients_of):
     """M3 is back left and faces M1; with 4 mm less on both blades its commands reach their limit."""
     flights = tuple(f"cut_propeller_M3_4mm_4mm_39mm__E8_log0{number}" for number in (1, 0))
     answer = answer_of("crazypad_usd", "real/crazypad_usd", *flights[:1], held_out=flights[1:])
-    loss = coefficients_of(answer, "rotor_mismatch")["difference_1"]
-    assert loss["value"] == pytest.approx(0.31, abs=0.05)
+    assert coefficients_of(answer, "rotor_mismatch")["difference_1"]["value"] == pytest.approx(0.31, abs=0.05)
     assert answer["verdict"] == "PARTIAL"

@@ -53,8 +53,7 @@ def dragged(also):
 
 
 def headed(signals, degrees):
-    names = ("position", "velocity", "acceleration")
-    world = {name: getattr(signals, name) @ turned(degrees).T for name in names}
+    world = {name: getattr(signals, name) @ turned(degrees).T for name in ("position", "velocity", "acceleration")}
     return replace(signals, attitude=signals.attitude + np.array([0.0, 0.0, np.radians(degrees)]), **world)
 
 

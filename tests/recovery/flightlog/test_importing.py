@@ -70,8 +70,7 @@ def test_filtering_keeps_the_torque_equation():
         columns[name] = columns[name] + 0.02 * columns[name].std() * rng.standard_normal(5000)
     flight = import_log(columns, ImportSettings(signals=mapped(), lowpass_hz=3.0))
     rate, acceleration = flight.body_rate, derivative(flight.time, flight.body_rate)
-    unit = np.eye(3)
-    regressor = np.stack([acceleration * e + np.cross(rate, rate * e) for e in unit], axis=2)
+    regressor = np.stack([acceleration * e + np.cross(rate, rate * e) for e in np.eye(3)], axis=2)
     inner = slice(200, -200)
     found = np.linalg.lstsq(regressor[inner].reshape(-1, 3), flight.body_torque[inner].ravel(), rcond=None)[0]
     np.testing.assert_allclose(found, INERTIA, rtol=0.02)
@@ -79,8 +78,7 @@ def test_filtering_keeps_the_torque_equation():
 
 def test_the_generalised_torque_of_a_log_is_the_same_flight():
     columns = log()
-    attitude = motion(columns["t"])[0]
-    general = generalised_torque(attitude, torque_at(columns["t"]))
+    general = generalised_torque(motion(columns["t"])[0], torque_at(columns["t"]))
     columns |= {f"general{axis}": general[:, axis] for axis in range(3)}
     signals = mapped()
     del signals["body_torque"]
@@ -94,8 +92,7 @@ def test_another_rate_is_interpolated_and_thinning_without_a_filter_is_warned_of
     assert flight.rate_hz == 100
     np.testing.assert_allclose(flight.attitude, motion(flight.time)[0], atol=1e-8)
     assert any("aliases" in sentence for sentence in flight.warnings)
-    filtered = import_log(log(), ImportSettings(signals=mapped(), rate_hz=100.0, lowpass_hz=20.0))
-    assert filtered.warnings == ()
+    assert import_log(log(), ImportSettings(signals=mapped(), rate_hz=100.0, lowpass_hz=20.0)).warnings == ()
 
 
 def test_rotors_give_the_torque_through_the_function_of_the_caller():

@@ -69,8 +69,7 @@ def test_one_that_nothing_levels_says_so_of_none():
 
 def test_of_one_slow_swing_no_gyroscope_is_late_because_the_attitude_may_be_levelled():
     """The lead of a levelled attitude at one frequency is any delay's."""
-    flights = [replace(s, rotor_speed=None) for s in levelled_slowly(0.1)]
-    assert audit(flights, WINDOWS).named == ()
+    assert audit([replace(s, rotor_speed=None) for s in levelled_slowly(0.1)], WINDOWS).named == ()
 
 
 def test_an_attitude_levelled_so_fast_that_the_gyroscope_hardly_agrees_makes_none_late_either():

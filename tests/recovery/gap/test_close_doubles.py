@@ -134,8 +134,7 @@ def low_pass(s, damping=0.7, natural=2 * np.pi * 3.0):
 
 
 def test_a_part_on_springs_is_named_with_its_frequency_and_share():
-    spring = {"share": 0.3, "natural": 2 * np.pi * 2.65, "damping": 0.1}
-    chosen = found(on_springs((1, 2, 3), **spring), STILL)
+    chosen = found(on_springs((1, 2, 3), share=0.3, natural=2 * np.pi * 2.65, damping=0.1), STILL)
     assert names_of(chosen) == {"flexible_mount"}
     assert shape_of(chosen, "flexible_mount")["frequency_hz"] == pytest.approx(2.65, rel=0.02)
     assert shape_of(chosen, "flexible_mount")["damping"] == pytest.approx(0.1, rel=0.1)
@@ -156,8 +155,7 @@ def test_noise_of_the_gyroscope_takes_nothing_off_the_share_on_springs():
 
 
 def test_a_short_flight_takes_nothing_from_long_ones_and_gives_no_numbers_alone():
-    spring = {"share": 0.3, "natural": 2 * np.pi * 2.65, "damping": 0.1}
-    whole = on_springs((4, 5, 6), **spring)
+    whole = on_springs((4, 5, 6), share=0.3, natural=2 * np.pi * 2.65, damping=0.1)
     short = weak(stretch_of(whole[2].signals, slice(0, round(2.0 / PERIOD))))
     own = candidate("flexible_mount", frequency_hz=2.65, damping=0.1)
 
@@ -205,8 +203,7 @@ def test_a_lag_and_a_delay_are_no_notch_and_no_low_pass():
 
 
 def test_a_low_pass_is_no_lag_and_delay():
-    flights = late((1, 2), low_pass)
-    (chosen,) = found(flights, (*STILL, "low_pass_filter"))
+    (chosen,) = found(late((1, 2), low_pass), (*STILL, "low_pass_filter"))
     assert chosen.effect.name == "low_pass_filter"
     assert chosen.shape == {"frequency_hz": pytest.approx(3.0, rel=0.05), "damping": pytest.approx(0.7, rel=0.05)}
 

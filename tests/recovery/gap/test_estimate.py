@@ -221,8 +221,7 @@ def test_rotors_that_are_logged_rarely_accuse_no_log_of_reversed_yaw(slow, accus
         replace(each, vehicle=reversed_yaw, name=f"flight {number}", slow_rotors=slow)
         for number, each in enumerate(flights)
     ]
-    few = GapSettings(shifts=39)
-    found = diagnose(recordings[:2], recordings[2:], few, np.random.default_rng(1)).diagnosis
+    found = diagnose(recordings[:2], recordings[2:], GapSettings(shifts=39), np.random.default_rng(1)).diagnosis
     assert any("inertia about z" in each for each in found.contradictions) is accused
 
 
@@ -246,8 +245,7 @@ def test_wind_blows_on_all_that_the_air_acts_on():
     """Rotor drag, inflow and fuselage in one wind: with still air for the last two, floors of a gap stay."""
     chosen = [candidate(name) for name in AIR]
     noise = {"body_rate": 0.002, "velocity": 0.01, "acceleration": 0.02, "rotor_speed": 0.3}
-    flight = signals_of(flown(8.0, noise=noise, effects=AIR))
-    found = refit([flight], chosen, force=True)
+    found = refit([signals_of(flown(8.0, noise=noise, effects=AIR))], chosen, force=True)
     for effect, numbers in zip(AIR.values(), found.estimates.effects, strict=True):
         true = effect if isinstance(effect, dict) else {n.name: v for n, v in zip(numbers, effect, strict=True)}
         for number in numbers:
@@ -410,8 +408,7 @@ def glauert(signals, _shape):
     """Thrust that grows as a rotor's own air speed falls, per k_h: v^2 at first, and less and less of it."""
     hover = 3.0
     squared = (signals.hub_velocity[..., :2] ** 2).sum(axis=-1)
-    induced = np.sqrt((np.sqrt(squared**2 + 4 * hover**4) - squared) / 2)
-    thrust = 4 * hover * (hover - induced)
+    thrust = 4 * hover * (hover - np.sqrt((np.sqrt(squared**2 + 4 * hover**4) - squared) / 2))
     return Columns(stack(hub_wrench(signals.hubs, thrust[..., None] * np.array([0.0, 0.0, 1.0]))))
 
 

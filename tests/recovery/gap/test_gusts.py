@@ -105,8 +105,7 @@ def tells_sizes(found):
 def in_what_is_left(recordings):
     windows, model = common_windows(recordings, FEW), plain(None)
     hypothesis = model.system([weak_flight(each, windows, None, force=True) for each in recordings])
-    block = block_index(hypothesis, FEW)
-    return air(hypothesis, model.linear, block, known_motion(recordings), FEW)
+    return air(hypothesis, model.linear, block_index(hypothesis, FEW), known_motion(recordings), FEW)
 
 
 @pytest.mark.parametrize(("kind", "setpoints"), [("asked", True), ("again", False)])
@@ -216,8 +215,7 @@ def test_what_is_small_against_gusts_is_found_by_samples(of_small, setpoints):
 
 @pytest.mark.parametrize("setpoints", [True, False])
 def test_noise_of_rotors_that_no_loop_sees_is_no_small_effect(flown, setpoints):
-    recordings = recorded(flown["noisy"], TRUE.vehicle, setpoints=setpoints)
-    run = diagnosed(recordings)
+    run = diagnosed(recorded(flown["noisy"], TRUE.vehicle, setpoints=setpoints))
     assert run.air is not None
     assert run.air.split.all()
     assert run.diagnosis.verdict is GapVerdict.NO_GAP
@@ -284,8 +282,7 @@ def test_blocks_of_a_run_follow_each_other_in_time(flown, kind):
     recordings = recorded(flown[kind], TRUE.vehicle, setpoints=kind == "asked")
     windows = common_windows(recordings, FEW)
     flights = [weak_flight(each, windows, None, force=True) for each in recordings]
-    found = fitted(flights, [], np.ones(6), FEW)
-    of_paths, of_runs = _windows_of_runs(found, known_motion(recordings))
+    of_paths, of_runs = _windows_of_runs(fitted(flights, [], np.ones(6), FEW), known_motion(recordings))
     for runs in (of_runs, of_paths):
         blocks = [run.block for run in runs]
         assert all(np.isin(np.diff(each), [0, 1]).all() for each in blocks)

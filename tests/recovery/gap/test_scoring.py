@@ -26,15 +26,13 @@ def flights(*effects, seeds=(1, 2)):
 
 
 def test_a_damping_that_drives_is_set_to_zero_and_the_others_stay():
-    known = flights((candidate("linear_damping"), [0.2, -0.1, 0.1]))
-    found = scored(known, CATALOGUE["linear_damping"])
+    found = scored(flights((candidate("linear_damping"), [0.2, -0.1, 0.1])), CATALOGUE["linear_damping"])
     np.testing.assert_allclose(found.coefficients, [0.2, 0.0, 0.1], atol=0.02)
     assert found.gain > 1000
 
 
 def test_an_effect_of_one_refused_sign_is_refused():
-    found = scored(flights((candidate("rotor_drag"), [-1.5e-3])), CATALOGUE["rotor_drag"])
-    assert found.gain == -np.inf
+    assert scored(flights((candidate("rotor_drag"), [-1.5e-3])), CATALOGUE["rotor_drag"]).gain == -np.inf
     assert scored(flights((candidate("rotor_drag"), [1.5e-3])), CATALOGUE["rotor_drag"]).gain > 100
 
 
@@ -83,8 +81,7 @@ def test_gain_is_what_fits_without_each_block_take_off_it():
         flat = flat[..., length > 0] / length[length > 0]
         for b in range(block.max() + 1):
             seen = block != b
-            rows = flat[seen].reshape(-1, flat.shape[2])
-            own = np.linalg.lstsq(rows, right[seen].reshape(-1), rcond=None)[0]
+            own = np.linalg.lstsq(flat[seen].reshape(-1, flat.shape[2]), right[seen].reshape(-1), rcond=None)[0]
             total += ((right[~seen] - flat[~seen] @ own) ** 2).sum()
         return total
 
@@ -103,8 +100,7 @@ def test_candidates_are_all_points_of_the_grids_that_are_tried():
 
 def test_fit_is_weighted_by_the_floors():
     """Two channels that contradict each other: the one with the smaller floor is believed."""
-    known = flights((candidate("rotor_gyroscopic"), [1e-3]))
-    hypothesis = system(known, [candidate("rotor_gyroscopic")])
+    hypothesis = system(flights((candidate("rotor_gyroscopic"), [1e-3])), [candidate("rotor_gyroscopic")])
     hypothesis.residual[:, 1] = 0.0
     small_first = fit(hypothesis, np.array([1e-3, 1.0, 1.0, 1.0, 1.0, 1.0]))[-1]
     small_second = fit(hypothesis, np.array([1.0, 1e-3, 1.0, 1.0, 1.0, 1.0]))[-1]

@@ -141,8 +141,7 @@ def test_a_load_that_swings_all_flight_long_is_found_in_its_narrow_valley():
     hidden = {"length_m": 2.14, "damping_1_s": 0.06, "depth_m": 0.1}
     effect = (candidate("payload", **hidden), [0.04, 0.0, 0.0, 0.4])
     known = [weak(fly(2, [effect], gyro=5e-4, seconds=30.0, speed=1.0))]
-    start = candidate("payload", length_m=1.9, damping_1_s=0.2, depth_m=0.0)
-    (found,) = refined(known, [start], np.ones(6)).chosen
+    (found,) = refined(known, [candidate("payload", length_m=1.9, damping_1_s=0.2, depth_m=0.0)], np.ones(6)).chosen
     assert found.shape["length_m"] == pytest.approx(hidden["length_m"], rel=0.01)
     assert found.shape["damping_1_s"] == pytest.approx(hidden["damping_1_s"], abs=0.01)
 
@@ -154,8 +153,7 @@ def test_noise_deepens_no_hook_whose_torque_says_where_it_is():
         flown = fly(seed, [effect], gyro=0.02, rotor=1.0, seconds=30.0, speed=1.0)
         noise = 0.05 * np.random.default_rng(seed).standard_normal(flown.velocity.shape)
         known.append(weak(replace(flown, velocity=flown.velocity + noise), force=True))
-    start = candidate("payload", length_m=0.53, damping_1_s=0.2, depth_m=0.0)
-    found = refined(known, [start], np.ones(6))
+    found = refined(known, [candidate("payload", length_m=0.53, damping_1_s=0.2, depth_m=0.0)], np.ones(6))
     ((_, place),) = found.places[1:]
     depth, *_, mass = fit(found, np.ones(6))[place]
     assert mass == pytest.approx(0.6, rel=0.05)

@@ -41,8 +41,7 @@ def corrected(folder, logs, text="", ending="sdf", **wrong):
     mine = folder / f"mine.{ending}"
     mine.write_text(text or sdf_of(TRUE, **wrong))
     before = mine.read_bytes()
-    words = ("gap", mine, *logs[:-1], "--held-out", logs[-1], "-o", folder / "gap", "--json")
-    result = command_line.done(*words)
+    result = command_line.done(*("gap", mine, *logs[:-1], "--held-out", logs[-1], "-o", folder / "gap", "--json"))
     assert mine.read_bytes() == before
     return json.loads(result.stdout), read_model(folder / "gap" / mine.name)
 
@@ -177,8 +176,7 @@ def test_a_yaw_share_one_and_a_half_times_too_large_in_newtons(tmp_path, logs):
     known = replace(settings, rotors=rotors, unknown=())
     write_vehicle(vehicle, vehicle_of(VehicleModel(vehicle=known)), config=study.read_text())
     words = ("gap", mine, *logs[:-1], "--held-out", logs[-1], "--model", vehicle, "-o", tmp_path / "gap", "--json")
-    result = command_line.done(*words)
-    said, share = json.loads(result.stdout)["corrected"], TRUE.drag_factor / TRUE.thrust_factor
+    said, share = json.loads(command_line.done(*words).stdout)["corrected"], TRUE.drag_factor / TRUE.thrust_factor
     assert {change["element"] for change in said["changes"]} == {"gear yaw"}
     for change in said["changes"]:
         assert min(map(abs, (change["low"], change["high"]))) < share < max(map(abs, (change["low"], change["high"])))

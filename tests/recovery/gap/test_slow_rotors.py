@@ -22,8 +22,7 @@ ROWS = 10  # From one update to the next, at 100 rows a second.
 
 def rarely(signals, first):
     """The flight as a log has it whose rows repeat the rotors between updates, and as it is read."""
-    row = np.arange(len(signals))
-    held = signals.rotor_speed[np.maximum((row - first) // ROWS * ROWS + first, 0)]
+    held = signals.rotor_speed[np.maximum((np.arange(len(signals)) - first) // ROWS * ROWS + first, 0)]
     as_logged = replace(signals, rotor_speed=held)
     return as_logged, replace(as_logged, rotor_speed=between_updates(held, ROWS), rotor_span_s=ROWS * signals.period)
 

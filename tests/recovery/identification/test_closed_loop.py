@@ -66,8 +66,7 @@ def test_least_squares_of_the_freed_torque_is_the_estimate_by_instruments(identi
 
 
 def test_in_still_air_repeats_tell_the_body_to_half_a_per_cent(sources):
-    found = freed_torque(sources["calm"], sources["calm"])
-    assert np.abs(off(found.rigid_body)).max() < 0.005
+    assert np.abs(off(freed_torque(sources["calm"], sources["calm"]).rigid_body)).max() < 0.005
 
 
 def test_where_nothing_repeats_what_was_before_shows_roll_and_pitch(identified):
@@ -119,8 +118,7 @@ def test_a_selection_learns_from_its_own_samples(sources):
     source = sources["gusts"]
     whole = freed_torque(source, source)
     every = np.concatenate([data.time for data in source.chunks()])[::7]
-    places = np.flatnonzero(np.isin(sample_times(source), every))
-    chosen = freed_torque(source, gathered(source, places)).learned
+    chosen = freed_torque(source, gathered(source, np.flatnonzero(np.isin(sample_times(source), every)))).learned
     assert set(chosen.time) <= set(every)
     np.testing.assert_array_equal(chosen.torque, whole.training.torque[np.isin(whole.training.time, every)])
 

@@ -47,8 +47,7 @@ def without_euler_transposed(motion):
 
 
 def without_coriolis(motion):
-    J = motion.rate[:, :, None] * 0 + INERTIA
-    return rotations.multiply(J, motion.acceleration)
+    return rotations.multiply(motion.rate[:, :, None] * 0 + INERTIA, motion.acceleration)
 
 
 def without_centrifugal(motion):
@@ -176,12 +175,10 @@ def test_what_a_selection_misses_is_judged_all_the_same():
     """A selection that holds still about roll fits anything there; the samples between it know better."""
     m = motion(27)
     data = TorqueData(0.01 * np.arange(len(m)), m, of_rigid_body(m) + 0.05 * of_rigid_body(motion(31)))
-    few = np.flatnonzero(np.abs(m.attitude[:, 0]) < 0.5)
-    learned = data[few]
+    learned = data[np.flatnonzero(np.abs(m.attitude[:, 0]) < 0.5)]
     curve = model_evaluator(data, learned, SETTINGS).solver.curve(PARTITIONS)
     assert curve.weight[curve.chosen] == np.inf
-    blind = model_evaluator(learned, learned, SETTINGS).solver.curve(PARTITIONS)
-    assert curve.error[0] > 10 * blind.error[0]
+    assert curve.error[0] > 10 * model_evaluator(learned, learned, SETTINGS).solver.curve(PARTITIONS).error[0]
 
 
 def test_the_shipped_default_is_this_base():

@@ -65,8 +65,7 @@ def test_in_still_air_they_tell_it_to_a_per_cent(constants):
 def test_what_instruments_do_not_tell_is_not_determined(constants):
     """About yaw gusts turn the vehicle by more than the path asks for."""
     found = constants["setpoints"]
-    yaw = found.fitted.free.index[LOG_INERTIA[2]]
-    assert not found.spread.determined[yaw]
+    assert not found.spread.determined[found.fitted.free.index[LOG_INERTIA[2]]]
 
 
 @cache
@@ -122,8 +121,7 @@ def _limited_information(torque, turning, asked):
     """Estimate c in ``torque = c turning`` by LIML: the least ratio of residuals without and with instruments."""
     both = np.stack([torque, turning], axis=1)
     left = both - asked @ np.linalg.lstsq(asked, both, rcond=None)[0]
-    least = eigh(both.T @ both, left.T @ left, eigvals_only=True)[0]
-    moments = both.T @ both - least * left.T @ left
+    moments = both.T @ both - eigh(both.T @ both, left.T @ left, eigvals_only=True)[0] * left.T @ left
     return moments[0, 1] / moments[1, 1]
 
 

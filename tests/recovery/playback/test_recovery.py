@@ -47,8 +47,7 @@ def numbers(found):
 def chosen(vehicle, flights, candidates, **asked):
     others = tuple(block for block in blocks_of(vehicle) if block not in candidates)
     settings = PlaybackSettings(leave_out=others, **asked)
-    choice = choose(vehicle, flights, settings, lambda *_: None)
-    return choice.chosen, settings
+    return choose(vehicle, flights, settings, lambda *_: None).chosen, settings
 
 
 @pytest.fixture(scope="module")

@@ -102,15 +102,13 @@ def test_speeds_follow_their_commands(flights):
     model = VehicleModel(vehicle=SMALL.vehicle, response=behind, commanded=True, hold="linear")
     found = vehicle_responses(model, [logged_both])["rotor speed"]
     lag = 1 / (1 + 2j * np.pi * found.frequency * 0.05)
-    seen = found.frequency < 10.0
-    assert np.abs(found.gain / lag - 1)[seen].max() < 0.03
+    assert np.abs(found.gain / lag - 1)[found.frequency < 10.0].max() < 0.03
     assert found.cost < 1.0
     assert vehicle_responses(RIGHT, [logged_both])["rotor speed"].model is None
 
 
 def test_a_flight_in_parts_is_one_flight(flights):
-    whole = flights[0].parts[0]
-    halves = [slice(0, 1900), slice(2100, len(whole))]
+    halves = [slice(0, 1900), slice(2100, len(flights[0].parts[0]))]
     cut = [replace(f, parts=tuple(_part(f.parts[0], half) for half in halves)) for f in flights]
     assert vehicle_responses(RIGHT, cut, by_repeats(cut))["roll"].cost < 10.0
 

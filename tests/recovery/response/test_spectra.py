@@ -29,8 +29,7 @@ def flown():
     gusts = lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal((samples, DRAWS)), axis=0) * GUST
     noise = NOISE * rng.standard_normal((samples, DRAWS))
     tones = np.linspace(0.15, 9.0, 60)
-    time = STEP_S * np.arange(samples)
-    phases = 2 * np.pi * (tones * time[:, None] + rng.uniform(0, 1, 60))
+    phases = 2 * np.pi * (tones * (STEP_S * np.arange(samples))[:, None] + rng.uniform(0, 1, 60))
     setpoint = (0.05 / np.sqrt(tones) * np.sin(phases)).sum(axis=1)
     angle, rate, torque = (np.zeros(DRAWS) for _ in range(3))
     commands, rates = [], []
@@ -125,8 +124,7 @@ def test_windows_of_one_length_are_those_of_scipy():
     at, cross = csd(command, rate, 1 / period, **settings)
     _, power = csd(command, command, 1 / period, **settings)
     theirs = np.interp(found.frequency, at, cross / power)
-    high = found.frequency > 3.0
-    assert np.abs(found.gain / theirs - 1)[high].max() < 0.02
+    assert np.abs(found.gain / theirs - 1)[found.frequency > 3.0].max() < 0.02
     waves = 2j * np.pi * found.frequency
     assert np.abs(by_parts.gain / (waves * found.gain) - 1)[found.frequency > 5].max() < 0.2
 

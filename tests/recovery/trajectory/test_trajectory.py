@@ -75,10 +75,9 @@ def _minimised(start: Array, matrix: Array, bounds: Array, period: float | None)
     if period is not None:
         held = np.eye(1, size)
         constraints.append({"type": "eq", "fun": lambda y: y[:1] - np.log(period), "jac": lambda _: held})
-    found = minimize(
+    spans = minimize(
         _total, start, jac=_shares, method="SLSQP", constraints=constraints, options={"maxiter": 500, "ftol": 1e-14}
-    )
-    spans = found.x
+    ).x
     broken = min(np.min(bounds - matrix @ spans, initial=0.0), _nested(spans).min(initial=0.0))
     return float(np.exp(_total(spans))) if broken > -1e-8 else np.inf
 

@@ -157,8 +157,7 @@ def with_yaw_rate(evidence, share):
 
 
 def test_an_axis_that_hardly_moves_is_judged_by_its_rate_replayed(better):
-    quiet = with_still_yaw(with_r2(better, [0.9, 0.9, -5.0], [0.5, 0.5, 0.1]))
-    judged = verdict(with_yaw_rate(quiet, 1e-3))
+    judged = verdict(with_yaw_rate(with_still_yaw(with_r2(better, [0.9, 0.9, -5.0], [0.5, 0.5, 0.1])), 1e-3))
     assert judged.label == "good-inside-region"
     assert "nothing confirms it about yaw" in judged.reasons[0][0]
     assert "-5" not in judged.reasons[0][0]
@@ -192,8 +191,7 @@ def compared(*, lower=False, higher=False):
 def test_better_is_lower_beyond_chance_in_one_and_higher_in_none(better, torque, steps, label):
     errors = better.steps.window_error.copy()
     errors[0] = {"lower": 0.5, "same": 1.0, "higher": 2.0}[steps] * errors[1]
-    changed = with_replayed(replace(better, torque={"other": torque}), window_error=errors)
-    assert verdict(changed).label == label
+    assert verdict(with_replayed(replace(better, torque={"other": torque}), window_error=errors)).label == label
 
 
 def not_better(evidence):
@@ -250,14 +248,12 @@ def test_windows_that_both_lose_prove_nothing(better):
     lost = np.full_like(better.steps.lost, 100)
     gone = with_replayed(replace(better, torque={"other": compared()}), window_error=errors, lost=lost)
     assert verdict(gone).label == "not-better-than-rigid-body"
-    some_torque = replace(gone, torque={"other": compared(lower=True)})
-    assert verdict(some_torque).label == "do-not-use"
+    assert verdict(replace(gone, torque={"other": compared(lower=True)})).label == "do-not-use"
 
 
 def test_a_rule_of_all_attitudes_has_to_be_a_body_at_all_of_them(better):
     """Training went all round in roll and in pitch and yet left most attitudes out."""
-    physics = replace(better.physics, indefinite_anywhere=2000)
-    judged = verdict(replace(better, physics=physics))
+    judged = verdict(replace(better, physics=replace(better.physics, indefinite_anywhere=2000)))
     assert judged.label == "good-inside-region"
     assert judged.region != "every roll and pitch"
     assert said(judged, "not positive definite in 2000 of 4896 cells of roll and pitch") == -1

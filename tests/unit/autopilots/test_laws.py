@@ -54,8 +54,7 @@ def test_a_command_turns_the_body_about_its_axis_alone(name):
     allocation = allocation_matrix(CROSS)
     hover = motors.speeds(0.4, np.zeros(3)).speed
     for axis in range(3):
-        speed = motors.speeds(0.4, 0.02 * np.eye(3)[axis]).speed
-        torque = allocation[1:] @ (speed**2 - hover**2)
+        torque = allocation[1:] @ (motors.speeds(0.4, 0.02 * np.eye(3)[axis]).speed ** 2 - hover**2)
         assert torque[axis] > 0
         assert np.abs(np.delete(torque, axis)).max() < 1e-9
     assert motors.share_of(motors.speed_at(0.4)) == pytest.approx(0.4)
@@ -223,12 +222,10 @@ def test_the_parameters_of_px4_make_the_mixer_of_the_vehicle():
     expected = mixing(rule, CROSS) * [1.0, *FRD]
     np.testing.assert_allclose(px4_mix(rule, CA, [0, 1, 2, 3]), expected, atol=1e-9)
     # A motor that is weaker and as dear in torque is asked for more of everything, so that all turn and lift alike.
-    weak = px4_mix(rule, CA | {"CA_ROTOR0_CT": 5.0}, [0, 1, 2, 3])
-    effect = np.array([5.0, 6.5, 6.5, 6.5])[:, None] * weak
+    effect = np.array([5.0, 6.5, 6.5, 6.5])[:, None] * px4_mix(rule, CA | {"CA_ROTOR0_CT": 5.0}, [0, 1, 2, 3])
     places = np.array([rotor.position_m[:2] for rotor in CROSS.rotors])
     spins = np.array([rotor.spin for rotor in CROSS.rotors])
-    torques = np.column_stack([np.ones(4), places[:, 1], places[:, 0], 0.05 * spins])
-    made = torques.T @ effect
+    made = np.column_stack([np.ones(4), places[:, 1], places[:, 0], 0.05 * spins]).T @ effect
     np.testing.assert_allclose(made - np.diag(np.diag(made)), 0.0, atol=1e-2 * np.abs(made).max())
 
 
@@ -238,5 +235,4 @@ def test_a_battery_that_empties_is_made_good():
     lift = 0.65 * 0.9**2 + 0.35 * 0.9
     # What is asked for is raised by the same, so that thrust stays and the signal rises as voltage falls.
     raised = curve.signal(0.5 * signals[:, None] / lift, np.full((50, 1), 0.9))
-    full = curve.signal(0.5 * signals[:, None])
-    np.testing.assert_allclose(raised - 0.15, (full - 0.15) / 0.9, atol=1e-12)
+    np.testing.assert_allclose(raised - 0.15, (curve.signal(0.5 * signals[:, None]) - 0.15) / 0.9, atol=1e-12)

@@ -156,8 +156,7 @@ def test_a_change_is_found(cause, change, size):
     assert found.p <= FALSE_ALARM
     (first, *more), (result, *_) = found.causes, found.causes[0].sizes
     assert not more
-    alike = {first.name, *(each.name for each in first.alike)}
-    assert cause in alike
+    assert cause in {first.name, *(each.name for each in first.alike)}
     if cause == "rotor M3":
         assert first.name == cause
         assert first.belief > 0.9

@@ -31,12 +31,6 @@ def without_velocity():
     return replace(recorded(), velocity=None)
 
 
-def weaker(rotor, share):
-    rotors = list(VEHICLE.rotors)
-    rotors[rotor] = replace(rotors[rotor], thrust_factor_n_s2=(1 - share) * rotors[rotor].thrust_factor_n_s2)
-    return replace(VEHICLE, rotors=tuple(rotors))
-
-
 @pytest.fixture(scope="module")
 def usual():
     return flight_numbers(recorded())
@@ -56,7 +50,9 @@ def test_names_and_noise(usual):
 
 def test_a_weak_rotor_is_asked_for_more(usual):
     """Of a cross each rotor carries its share alone, but for what its drag turns about z."""
-    result = flight_numbers(recorded(weaker(2, 0.2)))
+    rotors = list(VEHICLE.rotors)
+    rotors[2] = replace(rotors[2], thrust_factor_n_s2=(1 - 0.2) * rotors[2].thrust_factor_n_s2)
+    result = flight_numbers(recorded(replace(VEHICLE, rotors=tuple(rotors))))
     more = [result.values[f"thrust M{index}"] - usual.values[f"thrust M{index}"] for index in range(1, 5)]
     # The drag factor stayed: M3 turns faster, so that all others have to hold it.
     assert more[2] > 0.1
@@ -146,8 +142,7 @@ def test_the_ground_is_no_flight_and_throttle_cuts_of_acrobatic_flight_are():
     assert flies[560:].all()
     # As the import has it: a second of each three with the throttle cut, in which the vehicle turns.
     signals = recorded()
-    cut = np.mod(signals.time, 3.0) > 2.0
-    speed = np.where(cut[:, None], 0.05, 1.0) * signals.rotor_speed
+    speed = np.where((np.mod(signals.time, 3.0) > 2.0)[:, None], 0.05, 1.0) * signals.rotor_speed
     turns = signals.body_rate + 3.0 * np.sin(5 * signals.time)[:, None] * [1.0, 1.0, 0.0]
     lively = replace(signals, rotor_speed=speed, body_rate=turns, position=None, attitude=None)
     assert in_flight(lively)[: -round(1.5 / PERIOD)].all()
@@ -172,8 +167,7 @@ def test_a_weak_rotor_turns_the_body_less_however_thrust_and_yaw_turn_it_too():
 def test_a_lean_against_wind_is_no_fault_of_the_accelerometer():
     """It feels gravity along its own axes however it leans; what it feels next to is its own, ahead and to the left."""
     signals = without_velocity()
-    leans = np.array([0.1, -0.15, 2.0]) + np.zeros((len(signals), 3))
-    tilted = replace(signals, attitude=leans)
+    tilted = replace(signals, attitude=np.array([0.1, -0.15, 2.0]) + np.zeros((len(signals), 3)))
     feels = np.einsum("tji,j->ti", tilted.rotation, [0.0, 0.0, 9.81])
     calm, biased = (
         flight_numbers(replace(tilted, specific_force=feels + bias, name="flight.h5")).values

@@ -55,8 +55,7 @@ def test_a_step_is_found_at_its_flight():
 def test_a_rotor_is_named_with_its_size():
     """The others of the vehicle carry what it lacks by its size, so a row of the loads is what one rotor does."""
     weak = 0.25 * (np.arange(10) == 2)
-    found = trend(flights(24, np.random.default_rng(4), weak, since=16), QUAD, np.random.default_rng(1))
-    (shift,) = found.shifts
+    (shift,) = trend(flights(24, np.random.default_rng(4), weak, since=16), QUAD, np.random.default_rng(1)).shifts
     (cause,) = shift.causes
     assert (shift.flight, cause.name) == (17, "rotor M3")
     assert cause.belief > 0.9

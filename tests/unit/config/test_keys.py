@@ -35,12 +35,10 @@ def all_keys(settings, prefix=""):
 
 
 def test_every_key_has_one_line_of_documentation_which_the_commented_default_shows():
-    undocumented = [path for path, key in all_keys(Study) if not key.doc.strip() or "\n" in key.doc]
-    assert undocumented == []
+    assert [path for path, key in all_keys(Study) if not key.doc.strip() or "\n" in key.doc] == []
     comments = {line.split("#", 1)[1].strip() for line in commented_default().splitlines() if "#" in line}
     entries = {comment.split(": ", 1)[-1] for comment in comments}
-    missing = [path for path, key in all_keys(Study) if key.doc not in comments | entries]
-    assert missing == []
+    assert [path for path, key in all_keys(Study) if key.doc not in comments | entries] == []
     assert [key.name for key in keys_of(Study) if key.section is not None] == list(SECTIONS)
 
 

@@ -107,8 +107,7 @@ def test_swapped_and_turned_axes_of_the_gyroscope_are_a_contradiction_not_a_faul
 def test_channels_that_agree_are_not_warned_about(turning):
     found = audit([moved(turning)], WINDOWS)
     assert (found.warnings, found.contradictions) == ((), ())
-    checks = sensors_of([moved(turning)], WINDOWS).motion.checks
-    exact = [check for check in checks if check.pair.exact]
+    exact = [check for check in sensors_of([moved(turning)], WINDOWS).motion.checks if check.pair.exact]
     assert {check.pair.words for check in exact} == {"position and velocity", "velocity and acceleration"}
     np.testing.assert_allclose([check.scale for check in exact], 1.0, atol=1e-3)
     np.testing.assert_allclose([check.delay.value for check in exact], 0.0, atol=1e-3)
@@ -170,8 +169,7 @@ def test_a_slow_rounded_gyroscope_is_not_called_clipped():
 @pytest.mark.parametrize(("commanded", "whom"), [(True, "commands"), (False, "logged torque")])
 def test_the_motion_follows_the_torque(turning, commanded, whom):
     clean = faulty_flight(np.random.default_rng(3), Faults(), duration=20.0)
-    inertia = np.diag(clean.vehicle.inertia_kg_m2)
-    momentum = clean.body_rate @ inertia
+    momentum = clean.body_rate @ np.diag(clean.vehicle.inertia_kg_m2)
     torque = np.gradient(momentum, clean.time, axis=0) + np.cross(clean.body_rate, momentum)
     early = np.roll(torque, -5, axis=0)
     (note,) = audit([replace(clean, stated_torque=early, commanded=commanded)], WINDOWS).notes
@@ -269,8 +267,7 @@ def test_an_attitude_and_a_gyroscope_that_disagree_are_found_where_they_move():
     assert len(found(replace(signals, attitude=signals.attitude * [1.0, -1.0, -1.0]))) == 2
     assert len(found(turned(log(), [1.0, 0.0, 1.0]))) == 1
     assert found(log(sizes=(0.001, 0.001, 0.001), noise=0.05)) == []
-    still = turned(log(sizes=(0.01, 0.9, 0.001)), [1.0, 1.0, 0.0])
-    assert not any("yaw" in each.what for each in found(still))
+    assert not any("yaw" in each.what for each in found(turned(log(sizes=(0.01, 0.9, 0.001)), [1.0, 1.0, 0.0])))
 
 
 def gains(signals):

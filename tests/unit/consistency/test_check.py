@@ -24,6 +24,11 @@ def flight():
     return signals_of(flown(12.0, noise=NOISE, integration_rate_hz=COARSE))
 
 
+@pytest.fixture(scope="module")
+def lively():
+    return signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
+
+
 def said(signals):
     return " ".join(finding.sentence for finding in check([signals], SETTINGS))
 
@@ -193,8 +198,7 @@ def test_rotors_above_each_other_do_not_touch(flight):
     assert beyond_propellers([replace(both, rotor_speed=speed)]) is None
 
 
-def test_rotors_on_another_clock_are_said():
-    lively = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
+def test_rotors_on_another_clock_are_said(lively):
     assert said(lively) == ""
     assert "the rotor speeds are late by" in said(replace(lively, rotor_speed=np.roll(lively.rotor_speed, 5, axis=0)))
 
@@ -202,11 +206,10 @@ def test_rotors_on_another_clock_are_said():
 @pytest.mark.parametrize(
     ("off", "known", "words"), [(0.0, False, ""), (3.0, False, "2.9 m/s^2"), (3.0, True, "constant")]
 )
-def test_an_accelerometer_that_would_carry_it_away_is_said(off, known, words):
+def test_an_accelerometer_that_would_carry_it_away_is_said(lively, off, known, words):
     """Where a velocity is known it says more."""
-    long = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
-    felt = np.einsum("tji,tj->ti", long.rotation, long.acceleration + np.array([0.0, 0.0, 9.80665]))
-    own = replace(long, acceleration=None, position=None, specific_force=felt + np.array([off, 0.0, 0.0]))
+    felt = np.einsum("tji,tj->ti", lively.rotation, lively.acceleration + np.array([0.0, 0.0, 9.80665]))
+    own = replace(lively, acceleration=None, position=None, specific_force=felt + np.array([off, 0.0, 0.0]))
     found = said(own if known else replace(own, velocity=None))
     assert words in found
     assert ("it would be 57 m/s faster" in found) is (off > 0 and not known)
@@ -214,16 +217,14 @@ def test_an_accelerometer_that_would_carry_it_away_is_said(off, known, words):
 
 
 @pytest.mark.parametrize(("factors", "clock"), [((1.3, 1.3, 1.3), True), ((1.3, 1.0, 1.3), False)])
-def test_a_gyroscope_that_is_off_alike_about_all_axes_may_be_a_clock(factors, clock):
-    turning = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
-    words = said(times(body_rate=factors)(turning))
+def test_a_gyroscope_that_is_off_alike_about_all_axes_may_be_a_clock(lively, factors, clock):
+    words = said(times(body_rate=factors)(lively))
     assert "the gyroscope reads" in words
     assert ("the clock of the log" in words) is clock
 
 
-def test_where_a_source_was_silent_nothing_is_compared():
-    long = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
-    late = replace(long, attitude=np.roll(long.attitude, 3, axis=0))
+def test_where_a_source_was_silent_nothing_is_compared(lively):
+    late = replace(lively, attitude=np.roll(lively.attitude, 3, axis=0))
     frozen = late.body_rate.copy()
     frozen[800:1200] = frozen[800]
     both, one = (check([own], SETTINGS) for own in (replace(late, body_rate=frozen), late))
@@ -344,10 +345,9 @@ def test_axes_that_are_rotated_are_said_of_a_flight_that_turns_both_ways(flight)
 
 @pytest.mark.parametrize("late_s", [0.1, 0.2])
 @pytest.mark.parametrize("name", ["attitude", "body_rate"])
-def test_what_a_filter_takes_of_fast_motion_is_no_error_of_scale(name, late_s):
-    flight = signals_of(flown(20.0, noise=NOISE, also=0.05, integration_rate_hz=COARSE))
-    values = getattr(flight, name)
+def test_what_a_filter_takes_of_fast_motion_is_no_error_of_scale(lively, name, late_s):
+    values = getattr(lively, name)
     behind = lfilter([1.0], [1 + late_s / PERIOD, -late_s / PERIOD], values - values[0], axis=0) + values[0]
-    found = check([replace(flight, **{name: behind})], SETTINGS)
+    found = check([replace(lively, **{name: behind})], SETTINGS)
     assert found
     assert not any(finding.contradiction for finding in found)

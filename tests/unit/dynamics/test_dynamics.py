@@ -77,7 +77,7 @@ def test_inertia_matrix_has_the_printed_components():
     roll, pitch, _ = attitude.T
     xx, yy, zz = MOMENTS
     J = inertia_matrix(attitude, np.diag(MOMENTS))
-    printed = {
+    for (row, column), component in {
         (0, 0): np.full_like(roll, xx),
         (0, 1): np.zeros_like(roll),
         (0, 2): -xx * np.sin(pitch),
@@ -86,8 +86,7 @@ def test_inertia_matrix_has_the_printed_components():
         (2, 2): xx * np.sin(pitch) ** 2
         + yy * np.sin(roll) ** 2 * np.cos(pitch) ** 2
         + zz * np.cos(roll) ** 2 * np.cos(pitch) ** 2,
-    }
-    for (row, column), component in printed.items():
+    }.items():
         np.testing.assert_allclose(J[:, row, column], component, atol=1e-15)
         np.testing.assert_allclose(J[:, column, row], component, atol=1e-15)
 
@@ -127,15 +126,14 @@ def case(request):
     rng = np.random.default_rng(19)
     structure = model_structure(StructureSettings(**STRUCTURES[request.param]))
     attitude = rng.uniform(-np.pi, np.pi, (50, 3))
-    model = InertiaFunctions(
+    return InertiaFunctions(
         structure,
         data_ranges(structure, attitude),
         decode(structure, rng.uniform(1, 2, structure.genes)),
         rng.standard_normal(structure.parameters),
         rng.standard_normal(6),
         visited_cells([attitude]),
-    )
-    return model, Motion(attitude, *rng.standard_normal((2, 50, 3)))
+    ), Motion(attitude, *rng.standard_normal((2, 50, 3)))
 
 
 def test_torque_is_inertial_plus_coriolis(case):
@@ -150,8 +148,7 @@ def test_coriolis_forces_do_no_work_of_their_own(case):
     model, motion = case
     inertia = model.inertia(motion.attitude)
     np.testing.assert_allclose(inertia.value, inertia.value.swapaxes(1, 2), atol=1e-14)
-    change = np.einsum("nkij,nk->nij", inertia.gradient, motion.rate)
-    skew = change - 2 * coriolis_matrix(inertia, motion.rate)
+    skew = np.einsum("nkij,nk->nij", inertia.gradient, motion.rate) - 2 * coriolis_matrix(inertia, motion.rate)
     np.testing.assert_allclose(skew + skew.swapaxes(1, 2), 0.0, atol=1e-11)
     assert np.abs(skew).max() > 0.1
 
@@ -215,11 +212,6 @@ class InEulerCoordinates:
         return InertiaValues(inertia_matrix(attitude, TENSOR), inertia_matrix_gradient(attitude, TENSOR))
 
 
-def last(runs):
-    *_, end = runs
-    return end
-
-
 def by_euler_angles():
     """Each body by another integrator, in other coordinates: attitudes and body rates at the end."""
 
@@ -239,7 +231,8 @@ def by_rotation_matrices(predictor, steps):
     time = np.tile(np.linspace(0.0, 0.5, steps + 1), (2, 1))
     start, beyond = RotationState(rotations.rotation_matrix(ATTITUDE), BODY_RATE), np.zeros(2, dtype=bool)
     torque = np.repeat(TORQUE[:, None], steps + 1, axis=1)
-    return last(free_runs(turning_law(predictor), start, beyond, time, torque, fastest=0.0))
+    *_, end = free_runs(turning_law(predictor), start, beyond, time, torque, fastest=0.0)
+    return end
 
 
 @pytest.mark.parametrize("predictor", [BODY, InEulerCoordinates()], ids=["tensor", "Euler coordinates"])

@@ -19,12 +19,6 @@ TIME = np.arange(0.0, 8.0, 0.01)
 LEVEL = {"length_m": 1.0, "damping_1_s": 0.2, "depth_m": 0.0}
 
 
-def direction(angles):
-    """Cable from an elevation about the world's x and a turn about it: regular where the cable hangs."""
-    a, b = angles
-    return np.array([np.sin(a), np.cos(a) * np.sin(b), -np.cos(a) * np.cos(b)])
-
-
 def lagrange(felt, length, damping):
     def rate(t, state):
         a, b, da, db = state
@@ -39,7 +33,9 @@ def lagrange(felt, length, damping):
 
 def hanging(felt, time, length, damping, start=(0.0, 0.0, 0.0, 0.0)):
     solved = solve_ivp(lagrange(felt, length, damping), time[[0, -1]], start, t_eval=time, rtol=1e-9, atol=1e-10)
-    return direction(solved.y[:2]).T
+    # Cable from an elevation about the world's x and a turn about it: regular where the cable hangs.
+    a, b = solved.y[:2]
+    return np.array([np.sin(a), np.cos(a) * np.sin(b), -np.cos(a) * np.cos(b)]).T
 
 
 def push(t):
@@ -140,13 +136,11 @@ def test_force_is_what_the_load_needs_besides_its_weight(columns, flight):
     signals = tumbling(flight.vehicle)
     way = hook_way(signals, depth)
     load = CubicSpline(TIME, way(TIME) + length * hanging(lambda t: way(t, 2) + GRAVITY, TIME, length, 0.0))
-    rotation = Rotation.from_euler("ZYX", signals.attitude[:, ::-1])
-    pull = rotation.inv().apply(-(load(TIME, 2) + GRAVITY))
+    pull = Rotation.from_euler("ZYX", signals.attitude[:, ::-1]).inv().apply(-(load(TIME, 2) + GRAVITY))
     found = columns("payload", signals, length_m=length, damping_1_s=0.0, depth_m=depth).direct
     inside = slice(30, -30)
     np.testing.assert_allclose(found[inside, 3:, 3], pull[inside], atol=0.15)
-    hooks = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
-    for column, hook in enumerate(hooks):
+    for column, hook in enumerate(np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])):
         np.testing.assert_allclose(found[inside, :3, column], np.cross(hook, pull)[inside], atol=0.15)
         assert not found[:, 3:, column].any()
 
@@ -157,19 +151,17 @@ def balanced(signals, start, length=1.5, damping=0.1, load=0.6):
     way = CubicSpline(time, 0.5 * signals.position)
     cable = hanging(lambda t: way(t, 2) + GRAVITY, time, length, damping, start)
     felt = way(time, 2) + GRAVITY
-    rate = CubicSpline(time, cable)(time, 1)
-    tension = length * (rate**2).sum(axis=1) - (felt * cable).sum(axis=1)
+    tension = length * (CubicSpline(time, cable)(time, 1) ** 2).sum(axis=1) - (felt * cable).sum(axis=1)
     thrust = signals.vehicle.mass_kg * felt - load * tension[:, None] * cable
     size = np.linalg.norm(thrust, axis=1)
     roll, pitch = -np.arcsin(thrust[:, 1] / size), np.arctan2(thrust[:, 0], thrust[:, 2])
-    level = replace(
+    return replace(
         signals,
         attitude=np.column_stack([roll, pitch, np.zeros_like(roll)]),
         velocity=way(time, 1),
         acceleration=way(time, 2),
         stated_thrust=size,
-    )
-    return level, cable[:, :2]
+    ), cable[:, :2]
 
 
 def off(found, cable):
@@ -188,8 +180,7 @@ def test_a_load_that_swings_from_the_start_is_followed_all_flight_long(flight):
 
 def test_in_gusts_all_of_a_flight_shows_the_start(flight):
     """In gusts of a hundredth of the weight that last a second: two swings alone leave twice as much."""
-    long = tumbling(flight.vehicle, np.arange(0.0, 25.0, 0.01))
-    level, cable = balanced(long, (0.12, -0.15, 0.3, 0.2))
+    level, cable = balanced(tumbling(flight.vehicle, np.arange(0.0, 25.0, 0.01)), (0.12, -0.15, 0.3, 0.2))
     found = []
     for seed in range(6):
         gust = lfilter([1.0], [1.0, -0.99], np.random.default_rng(seed).standard_normal((len(cable), 2)), axis=0)
@@ -214,8 +205,7 @@ def test_a_start_that_would_throw_the_load_about_is_none(flight, load):
     """Of forces that a load all but massless would have to be started beyond all numbers for."""
     way = _Way.of(tumbling(flight.vehicle), 1.5, 0.1, 0.0)
     rest, spun = way.pull(np.zeros(4)), way.pull(np.array([0.0, 0.0, 1e-4, 0.0]))
-    balance = _Balance(way, load * rest + (spun - rest) / 1e-4, np.zeros_like(rest))
-    assert balance.start(np.zeros(4), 2) is None
+    assert _Balance(way, load * rest + (spun - rest) / 1e-4, np.zeros_like(rest)).start(np.zeros(4), 2) is None
 
 
 def test_what_rings_late_in_a_flight_is_no_swing_at_its_start(flight):

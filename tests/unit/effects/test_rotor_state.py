@@ -109,10 +109,9 @@ def test_bounds_hold_the_curves_of_the_sources(vehicle):
     """Thrust over ratio as measured in flight and as computed; the two disagree in sign."""
     knots = [0.0, 0.5, 1.0, 1.25, 1.6, 2.0, 2.5]
     ratio = np.array([0.0, 0.5, 1.0, 1.2, 1.4, 1.6, 2.0])
-    rising = np.array([1.0, 1.04, 1.07, 1.08, 1.11, 1.20, 1.70])
     falling = np.array([1.0, 1.01, 0.92, 0.82, 0.85, 0.91, 1.36])
     bounds = np.array([c.bounds(vehicle) for c in CATALOGUE["vertical_descent"].coefficients])
-    for curve in (rising, falling):
+    for curve in (np.array([1.0, 1.04, 1.07, 1.08, 1.11, 1.20, 1.70]), falling):
         hats = np.array([np.interp(ratio, knots, unit) for unit in np.eye(len(knots))[1:]]).T
         coefficients = np.linalg.lstsq(hats, curve - 1, rcond=None)[0]
         assert (bounds[:, 0] < coefficients).all()
@@ -120,14 +119,13 @@ def test_bounds_hold_the_curves_of_the_sources(vehicle):
 
 
 def with_gains(vehicle, thrust, drag=(0.0,) * 4):
-    factors = zip(vehicle.rotors, thrust, drag, strict=True)
     rotors = (
         replace(
             rotor,
             thrust_factor_n_s2=rotor.thrust_factor_n_s2 * (1 + kappa),
             drag_factor_n_m_s2=rotor.drag_factor_n_m_s2 * (1 + delta),
         )
-        for rotor, kappa, delta in factors
+        for rotor, kappa, delta in zip(vehicle.rotors, thrust, drag, strict=True)
     )
     return replace(vehicle, rotors=tuple(rotors))
 
@@ -255,8 +253,7 @@ def test_one_weak_rotor_of_many_is_found(number, weak):
     """What a growth along x and y alone cannot show: the torque of one rotor."""
     craft, loss = circle(number), np.zeros(number)
     loss[weak] = -0.04
-    differences = np.linalg.pinv(gain_modes(craft)) @ loss
-    found = gains(craft, differences)
+    found = gains(craft, np.linalg.pinv(gain_modes(craft)) @ loss)
     # In eight on a circle a strong one opposite looks the same.
     assert np.argmin(found) == weak
     assert found[weak] == pytest.approx(-0.04)
@@ -364,6 +361,5 @@ def test_a_lag_taken_step_by_step_is_that_of_what_stays_the_same_during_each_ste
     middle, _ = step_by_step(
         lambda one, memory: one._replace(speed=memory.lagged(one.speed, ratio, speed[0])), speed, 1.0
     )
-    along = lagged(speed, ratio, "previous")
-    expected = speed + (along.start - speed) * (np.exp(-0.5 / ratio) if ratio else 0.0)
+    expected = speed + (lagged(speed, ratio, "previous").start - speed) * (np.exp(-0.5 / ratio) if ratio else 0.0)
     np.testing.assert_allclose(middle, expected, rtol=1e-12)

@@ -67,8 +67,7 @@ def test_what_acts_on_the_body(columns, flight, name):
     spins = np.array([rotor.spin for rotor in flight.vehicle.rotors])
     for k in (0, 211, 599):
         at = SimpleNamespace(rate=flight.body_rate[k], w=flight.rotor_speed[k], s=spins)
-        torque = np.array(BODIES[name](at)).T
-        np.testing.assert_allclose(found[k, :3], torque, atol=1e-12)
+        np.testing.assert_allclose(found[k, :3], np.array(BODIES[name](at)).T, atol=1e-12)
     assert not found[:, 3:].any()
 
 

@@ -68,8 +68,7 @@ def test_an_interval_covers_as_often_as_it_says():
 
 def test_a_prior_weighs_as_its_precision():
     z, x, y = closed_loop(np.random.default_rng(4))
-    prior = Prior(np.array([5.0, 5.0]), np.array([0.02, np.inf]))
-    found = fit(z, x, y, prior=prior)
+    found = fit(z, x, y, prior=Prior(np.array([5.0, 5.0]), np.array([0.02, np.inf])))
     matrix = z.T @ x + np.diag([1 / 0.02**2, 0.0])
     np.testing.assert_allclose(found.values, np.linalg.solve(matrix, z.T @ y + [5.0 / 0.02**2, 0.0]), rtol=1e-6)
     held = np.linalg.inv(matrix) @ np.diag([1 / 0.02**2, 0.0]) @ np.linalg.inv(matrix).T
@@ -162,8 +161,7 @@ def test_derivatives_by_parts_are_those_of_the_signal():
         np.real((2j * np.pi * 3.1) ** order * np.exp(2j * np.pi * 3.1 * time + 0.4j)) for order in range(3)
     )
     begins = window_starts(np.ones(2000, dtype=bool), length)
-    found = transforms(signal, begins, length, period, 2)
-    for each, actual in zip(found, (signal, slope, bend), strict=True):
+    for each, actual in zip(transforms(signal, begins, length, period, 2), (signal, slope, bend), strict=True):
         wanted = transforms(actual, begins, length, period)[0]
         np.testing.assert_allclose(each[:, :10], wanted[:, :10], atol=2e-4 * np.abs(wanted).max())
 
@@ -187,8 +185,7 @@ def test_a_burst_is_cut_finer_than_rest():
 def test_slow_motion_is_taken_off_and_a_gap_does_not_spread():
     time = np.arange(4000) / 500
     slow, fast = np.sin(2 * np.pi * 0.1 * time), np.sin(2 * np.pi * 5 * time)
-    found = without_slow(slow + fast, np.ones(4000, dtype=bool), 150)
-    assert np.abs(found - fast)[500:-500].max() < 0.15
+    assert np.abs(without_slow(slow + fast, np.ones(4000, dtype=bool), 150) - fast)[500:-500].max() < 0.15
 
 
 def test_a_gain_by_an_instrument_is_that_of_the_vehicle():

@@ -367,8 +367,7 @@ HAND_WORKED = np.array([[1.0, 4.0], [2.0, 2.0], [4.0, 1.0], [3.0, 3.0], [4.0, 4.
 
 @pytest.mark.parametrize("method", ["quantity-dominance", "pareto-count", "pareto-fronts"])
 def test_a_failed_individual_ranks_last_and_failures_tie(method):
-    failed = [[np.nan, np.nan], [np.inf, -np.inf], [np.nan, np.inf]]
-    ranks = rank(np.vstack([HAND_WORKED, failed]), method)
+    ranks = rank(np.vstack([HAND_WORKED, [[np.nan, np.nan], [np.inf, -np.inf], [np.nan, np.inf]]]), method)
     assert len(set(ranks[5:].tolist())) == 1
     assert ranks[5] > ranks[:5].max()
 

@@ -70,8 +70,7 @@ def test_gradient_of_the_conditioning_is_that_of_differences():
 def test_the_penalty_pulls_back_only_what_exceeds_a_limit():
     path, limits = drawn(), RotationLimits(RotationSettings())
     laid_out = design(path, path.times(200))
-    inside = laid_out.motion(variables_of(path.scaled(0.5)))
-    assert not penalty_gradient(limits, inside, 100.0).any()
+    assert not penalty_gradient(limits, laid_out.motion(variables_of(path.scaled(0.5))), 100.0).any()
     beyond = variables_of(path.scaled(1.3))
     descended = beyond - 1e-3 * laid_out.gradient(penalty_gradient(limits, laid_out.motion(beyond), 100.0))
     before, after = (limits.peaks(path_of(variables, path)).max() for variables in (beyond, descended))
@@ -85,13 +84,9 @@ def test_adam_finds_the_bottom_of_a_bowl_under_noise():
     assert last == pytest.approx(bottom, abs=0.02)
 
 
-def gram(seed=0):
-    rows = np.random.default_rng(seed).standard_normal((20, 6))
-    return rows.T @ rows
-
-
 def test_smoothed_value_falls_to_the_logarithm_of_the_condition_number():
-    G = gram()
+    rows = np.random.default_rng(0).standard_normal((20, 6))
+    G = rows.T @ rows
     exact = 0.5 * np.log(np.linalg.cond(G))
     values = [conditioning(G, exponent).smoothed for exponent in (1.0, 4.0, 16.0, 256.0)]
     assert (values, values[-1]) == (sorted(values, reverse=True), pytest.approx(exact, abs=1e-2))

@@ -100,8 +100,7 @@ def test_betaflights_own_mixers_are_those_of_its_own_frames():
     np.testing.assert_allclose(quad, [[1, y, -x, spin] for x, y, spin in cross])
     # Rear right, front right, rear left, front left, right, left; 1 of the last column is counter-clockwise.
     angles = np.radians([-150.0, -30.0, 150.0, 30.0, -90.0, 90.0])
-    ways = [1, 1, -1, -1, -1, 1]
-    six = [(np.cos(a), np.sin(a), way) for a, way in zip(angles, ways, strict=True)]
+    six = [(np.cos(a), np.sin(a), way) for a, way in zip(angles, [1, 1, -1, -1, -1, 1], strict=True)]
     known = [
         [1, -0.5, 0.866025, 1], [1, -0.5, -0.866025, 1], [1, 0.5, 0.866025, -1],
         [1, 0.5, -0.866025, -1], [1, -1, 0, -1], [1, 1, 0, 1],
@@ -158,8 +157,7 @@ def test_a_header_is_read_again(tmp_path):
 
 
 def test_a_header_says_what_is_not_its_own():
-    turned = rotors_of([(x, y, -spin) for x, y, spin in CROSS])
-    for vehicle in (turned, HEXA):
+    for vehicle in (rotors_of([(x, y, -spin) for x, y, spin in CROSS]), HEXA):
         with pytest.raises(InputError, match=r"the Crazyflie has four rotors on diagonals, .*counter-clockwise"):
             text_of("crazyflie", vehicle)
     made = exported(sheet_of_vehicle(VehicleModel(vehicle=unequal(rotors_of(CROSS)))), "crazyflie", "uav.h")

@@ -137,8 +137,7 @@ def test_input_that_is_not_finite_is_flagged_and_gives_zeros(computed, name):
 
 def test_the_torque_of_a_rigid_body_is_exact_with_the_nose_up(computed):
     model = model_of(CASES["rigid body alone"])
-    attitude = np.array([[0.3, 0.5 * np.pi, 0.1], [0.3, -0.5 * np.pi, 0.1]])
-    motion = Motion(attitude, np.ones((2, 3)), np.ones((2, 3)))
+    motion = Motion(np.array([[0.3, 0.5 * np.pi, 0.1], [0.3, -0.5 * np.pi, 0.1]]), np.ones((2, 3)), np.ones((2, 3)))
     found = computed("rigid body alone", motion)
     assert max(errors(found, wanted_of(model, motion)).values()) < 1e-15
     assert np.abs(found["body"]).max() < 10
@@ -146,8 +145,7 @@ def test_the_torque_of_a_rigid_body_is_exact_with_the_nose_up(computed):
 
 def test_outputs_may_be_the_inputs_and_two_models_live_in_one_program(tmp_path):
     for stem, case in (("first", "paper"), ("second", "default")):
-        model = model_of(CASES[case])
-        written(tmp_path, stem, c_source(sheet_of(model, name=stem), stem))
+        written(tmp_path, stem, c_source(sheet_of(model_of(CASES[case]), name=stem), stem))
     main = """#include "first.h"
 #include "second.h"
 int main(void)

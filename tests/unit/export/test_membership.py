@@ -49,8 +49,7 @@ def case(request):
     coefficients = np.zeros(model.structure.parameters)
     # The first feature of a rule is the constant 1.
     coefficients[block.columns] = np.outer(np.arange(block.rules) % 2, np.arange(block.features) == 0).ravel()
-    u = np.append(np.linspace(0.01, 0.99, 37), MIDDLE)
-    x = (peaks[:-1, None] + np.diff(peaks)[:, None] * u).ravel()
+    x = (peaks[:-1, None] + np.diff(peaks)[:, None] * np.append(np.linspace(0.01, 0.99, 37), MIDDLE)).ravel()
     seam = 0.0 if model.structure.circular else 0.5
     attitude = np.column_stack([2 * np.pi * (x - seam), np.zeros((len(x), 2))])
     return SimpleNamespace(
@@ -70,8 +69,7 @@ def by_definition(x, peaks, circular):
         u = (value - peaks[left]) / width
         falling, slope = (1 - 2 * u**2, -4 * u) if u < 0.5 else (2 * (1 - u) ** 2, -4 * (1 - u))
         degree = falling * (left % 2) + (1 - falling) * (right % 2)
-        by_roll = (left % 2 - right % 2) * slope / width / (2 * np.pi)
-        torque[row] = -2 * by_roll, degree, 0.0
+        torque[row] = -2 * ((left % 2 - right % 2) * slope / width / (2 * np.pi)), degree, 0.0
     return torque
 
 
@@ -126,8 +124,7 @@ def airflow():
     coefficients[0, ::3, 1] = np.arange(len(peaks) - 1) % 2
     learned = Remainder(breakpoints=peaks, harmonic_order=1, rows=np.array([0]), coefficients=coefficients)
     model = VehicleModel(vehicle=VehicleSettings(), remainder=learned)
-    u = np.append(np.linspace(0.01, 0.99, 37), MIDDLE)
-    x = (peaks[:-1, None] + np.diff(peaks)[:, None] * u).ravel()
+    x = (peaks[:-1, None] + np.diff(peaks)[:, None] * np.append(np.linspace(0.01, 0.99, 37), MIDDLE)).ravel()
     air = np.column_stack([np.cos(2 * np.pi * x), np.sin(2 * np.pi * x), np.zeros(len(x))])
     return SimpleNamespace(model=model, air=air, expected=by_definition(x, peaks, True)[:, 1])
 
@@ -143,8 +140,7 @@ def test_the_learned_part_of_a_vehicle(airflow, form, tmp_path):
         return sum(parts_along(model, *motion).values())
 
     wrench = library if form == "library" else FORMS[form](tmp_path, model).wrench
-    torque = wrench(airflow.air, still, rotor)[:, 0]
-    np.testing.assert_allclose(torque, airflow.expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(wrench(airflow.air, still, rotor)[:, 0], airflow.expected, rtol=0, atol=1e-12)
 
 
 def test_the_learned_part_of_a_vehicle_that_is_simulated(airflow):

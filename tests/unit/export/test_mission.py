@@ -176,8 +176,7 @@ def test_parameters_keep_to_the_ranges_of_ardupilot_and_sweep_the_band(shaken):
     assert np.abs(angle - angle.mean()).max() == pytest.approx(degrees(shaken.excited.size_rad[0]), rel=0.15)
     power = np.abs(np.fft.rfft(rate)) ** 2
     frequency = np.fft.rfftfreq(len(time), 0.0025)
-    inside = (frequency > 0.3) & (frequency < 2.2)
-    assert power[inside].sum() > 0.98 * power.sum()
+    assert power[(frequency > 0.3) & (frequency < 2.2)].sum() > 0.98 * power.sum()
 
 
 def test_thrust_is_a_share_of_the_largest(shaken):

@@ -18,7 +18,6 @@ from cpfls_cli.export.text import checked_identifier, comment_lines, comment_tex
 from cpfls_cli.playback.player import free_runs, player_of
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.spread import drawn
-from cpfls_cli.vehicle.values import NoPolynomialError, Polynomial
 from tests.builders.exported_models import CASES, model_of, sheet_of, states, verdict_of
 from tests.builders.exported_vehicles import on_numpy, sheet_of_vehicle
 from tests.builders.flown_exports import executed
@@ -163,8 +162,7 @@ def test_the_verdict_and_its_reasons_are_there():
 
 
 def test_tables_take_one_line_for_each_rule():
-    text = json_text(sheet_of(model_of(CASES["default"])))
-    inertia, _ = text.split('\n "rotors": ')
+    inertia, _ = json_text(sheet_of(model_of(CASES["default"]))).split('\n "rotors": ')
     assert len(inertia.splitlines()) < 400
 
 
@@ -181,12 +179,6 @@ def test_weights_are_those_of_the_parts(vehicle):
         assert np.abs((found - parts[name]) / points.scale).max() < 1e-12
     everything = Held.whole(model).wrench(points.air, points.rate, points.rotor)
     assert np.abs((everything - sum(parts.values())) / points.scale).max() < 1e-12
-
-
-@pytest.mark.parametrize("work", [lambda x: 1 / x, lambda x: x > 0, lambda x: x**0.5, lambda x: x / x])
-def test_what_no_polynomial_is_is_refused(work):
-    with pytest.raises(NoPolynomialError):
-        work(Polynomial({("u",): 2.0}))
 
 
 @pytest.mark.parametrize(
@@ -284,5 +276,4 @@ def test_one_batched_function_flies_all_vehicles():
     assert np.isnan(short).any()
     for own, path in zip(spread.models, flown_, strict=True):
         runs = free_runs(player_of(own, flight), flight, np.array([0]), horizon)
-        rate = runs.errors[0, :, 3] + flight.motion.rate[1:]
-        assert np.abs(path[:, 15:] - rate).max() < 1e-9
+        assert np.abs(path[:, 15:] - (runs.errors[0, :, 3] + flight.motion.rate[1:])).max() < 1e-9

@@ -98,8 +98,7 @@ def test_sizes_are_those_of_what_is_missing():
     """Torque, floors and the end of half a second, of a vehicle that lacks one part alone."""
     flapping = truth().effects[2]
     model = replace(truth(), effects=(flapping,), response=RotorResponse())
-    floor = (1e-3,) * 6
-    (missing,) = exported(sheet_of_vehicle(model, floor=floor), "mjcf", "v").missing
+    (missing,) = exported(sheet_of_vehicle(model, floor=(1e-3,) * 6), "mjcf", "v").missing
     assert missing.title == "flapping hub moment"
     assert missing.floors == pytest.approx(max(missing.torque, missing.force) / 1e-3)
     assert 0.1 < missing.off.rate < 10.0
@@ -135,8 +134,7 @@ def test_an_inertia_that_depends_on_the_attitude_is_named():
 
 def test_an_inertia_that_no_body_has_is_brought_to_the_nearest():
     model = replace(truth(), vehicle=replace(QUAD, inertia_kg_m2=(0.004, 0.005, 0.0096)), effects=())
-    body = of_a_body(model.body)
-    np.testing.assert_allclose(np.diag(body.inertia), [0.0042, 0.0052, 0.0094], rtol=1e-6)
+    np.testing.assert_allclose(np.diag(of_a_body(model.body).inertia), [0.0042, 0.0052, 0.0094], rtol=1e-6)
     made = exported(sheet_of_vehicle(model), "mjcf", "v.xml")
     assert any("which no body has" in each.title for each in made.missing)
     if find_spec("mujoco") is not None:
@@ -175,8 +173,7 @@ def test_jax_differentiates_and_batches():
 
 
 def test_what_a_target_does_otherwise_counts_as_not_held():
-    model = replace(whole(response=RotorResponse()), remainder=None)
-    made, found = fly("urdf", model)
+    made, found = fly("urdf", replace(whole(response=RotorResponse()), remainder=None))
     (turned,) = [each for each in made.missing if each.title.startswith("drag along the axes of the world")]
     assert turned.off.velocity > 1e-4
     # The equations are compared along the axes of the body, and the flight is along those of the world.

@@ -74,8 +74,7 @@ def test_torque_and_force_are_those_of_the_library(exports, name, form):
 
 def sizes_of(model, state, rotor):
     """Sizes of the terms of the accelerations."""
-    air = np.einsum("nji,nj->ni", state.rotation, state.velocity)
-    parts = parts_along(model, air, state.rate, rotor).values()
+    parts = parts_along(model, np.einsum("nji,nj->ni", state.rotation, state.velocity), state.rate, rotor).values()
     sizes, rate = part_sizes(model, parts), np.abs(state.rate).max(axis=1, keepdims=True)
     torque = sizes[:, :3].max(axis=1, keepdims=True) + np.abs(model.body.inertia).max() * rate**2
     linear = sizes[:, 3:].max(axis=1, keepdims=True) / model.body.mass + model.body.gravity
@@ -117,8 +116,7 @@ def test_a_step_under_an_inertia_over_attitude_is_that_of_the_library(name, form
     constant = flat(one_step(replace(model, fuzzy=None), state, rotor, PERIOD))
     assert np.max(np.abs(moved - wanted)) < ALLOWED * np.abs(wanted).max()
     assert np.max(np.abs(constant - wanted)) > 1e-5
-    air = np.einsum("nji,nj->ni", state.rotation, velocity)
-    torque = sum(parts_along(model, air, rate, rotor).values())[:, :3]
+    torque = sum(parts_along(model, np.einsum("nji,nj->ni", state.rotation, velocity), rate, rotor).values())[:, :3]
     turning = turning_law(model.fuzzy)(attitude, rate)
     for own, wanted, inertia, direct in zip(found[:, 3:], torque, *turning, strict=True):
         left = inertia @ own + direct - wanted
@@ -280,8 +278,7 @@ def test_a_delay_longer_than_the_history_is_flagged(tmp_path):
     compiled = InC(tmp_path, model)
     assert set(compiled.statuses("r", speed, 18, "0.001")[:, -1]) == {0}
     assert set(compiled.statuses("r", speed, 18, "0.0005")[:, -1]) == {HISTORY_END}
-    longer = InC(tmp_path, model, "-DVEHICLE_HISTORY=102")
-    assert set(longer.statuses("r", speed, 18, "0.0005")[:, -1]) == {0}
+    assert set(InC(tmp_path, model, "-DVEHICLE_HISTORY=102").statuses("r", speed, 18, "0.0005")[:, -1]) == {0}
     broken = speed.copy()
     broken[3, 1] = np.nan
     assert np.flatnonzero(compiled.statuses("r", broken, 18, "0.01")[:, -1]).tolist() == [3]

@@ -145,8 +145,7 @@ def test_the_motion_shows_which_way_named_rotors_turn():
     own = flight(seconds=20.0)
     names = [NAMES[hub[:2]] for hub in HUBS]
     columns = ["motor_" + "".join(part[0] for part in name.split()) for name in names]
-    moved = airframe_from_motion(own.rate, own.speed, 100.0, False)
-    found = named_airframe(columns, moved)
+    found = named_airframe(columns, airframe_from_motion(own.rate, own.speed, 100.0, False))
     assert [(rotor.name, rotor.spin) for rotor in found.rotors] == [
         (n, hub[2]) for n, hub in zip(names, HUBS, strict=True)
     ]

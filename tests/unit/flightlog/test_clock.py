@@ -42,8 +42,7 @@ def test_a_clock_that_restarts_stops_with_the_row_and_the_rows_behind():
     ids=["reset from a later clock", "joined with some overlap", "one stamp far in the future"],
 )
 def test_a_crop_that_is_offered_keeps_what_it_says(time, rows):
-    message = refusal(time)
-    offer = re.search(r"keep one part of (\d+) rows with import.crop_s = \[(.*), (.*)\]", message)
+    offer = re.search(r"keep one part of (\d+) rows with import.crop_s = \[(.*), (.*)\]", refusal(time))
     assert int(offer[1]) == pytest.approx(rows, abs=2)
     kept = read(time, crop_s=(float(offer[2]), float(offer[3])))
     assert kept.samples_read - sum(kept.dropped.values()) == pytest.approx(int(offer[1]), abs=1)

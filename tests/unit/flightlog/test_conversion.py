@@ -31,8 +31,7 @@ def columns(attitude, **others):
 )
 def test_forward_right_down_in_north_east_down_gives_the_known_angles(ned, enu):
     """North is yaw 90 in ENU; nose up is a positive pitch in FRD and a negative one in FLU."""
-    converted = np.rad2deg(attitude_to_enu_flu(np.deg2rad([ned]), "FRD", "NED"))
-    np.testing.assert_allclose(converted, [enu], atol=1e-9)
+    np.testing.assert_allclose(np.rad2deg(attitude_to_enu_flu(np.deg2rad([ned]), "FRD", "NED")), [enu], atol=1e-9)
 
 
 def test_rates_of_a_flight_in_frd_ned_agree_with_its_converted_attitude():
@@ -62,8 +61,7 @@ def test_rates_of_a_flight_in_frd_ned_agree_with_its_converted_attitude():
 
 def test_a_resting_accelerometer_means_no_acceleration():
     attitude = np.deg2rad([[0.0, 0.0, 40.0], [30.0, 0.0, 0.0], [0.0, 20.0, 10.0]])
-    g = 9.80665
-    sensed = g * np.array(
+    sensed = 9.80665 * np.array(
         [
             [0, 0, 1],
             [0, np.sin(attitude[1, 0]), np.cos(attitude[1, 0])],

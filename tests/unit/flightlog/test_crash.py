@@ -11,7 +11,7 @@ from tests.builders import ended_flights as ended
 from tests.builders.topic_logs import ardupilot, proposed
 from tests.builders.unknown_logs import flight
 
-HIGH = np.array([0.0, 0.0, 30.0])
+HIGH, WEIGHT = np.array([0.0, 0.0, 30.0]), np.array([0.0, 0.0, 9.81])
 ALL = ("height", "upright", "force")
 
 
@@ -79,8 +79,7 @@ def test_a_vehicle_on_its_back_does_not_fly_whatever_its_rotors_do(own, known):
 
 
 def test_a_wreck_that_flies_again_later_has_lain_on_its_back(own):
-    again = ended.joined(ended.rocks_on_its_back(own), flight(20.0, seed=4))
-    found = flown(again, ("force",))
+    found = flown(ended.joined(ended.rocks_on_its_back(own), flight(20.0, seed=4)), ("force",))
     assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.3))
     assert "impact at " in found.ended
 
@@ -115,8 +114,7 @@ def test_a_log_that_ends_upside_down_after_a_few_seconds_of_flight():
 @pytest.mark.parametrize("known", [("height", "upright"), ("upright",)])
 def test_a_log_that_ends_upside_down_right_after_its_rotors_stopped(known):
     over = ended.then(flight(6.0), 0.5, rate=-12.0, rotors=1.0)
-    found = flown(ended.then(over, 0.3, rate=-12.0), known)
-    assert re.fullmatch(r"loss of control at [56]\.\d s", found.ended)
+    assert re.fullmatch(r"loss of control at [56]\.\d s", flown(ended.then(over, 0.3, rate=-12.0), known).ended)
     # Long afterwards it has been carried away.
     assert flown(ended.then(over, 3.0, rate=-12.0), known).ended == ""
 
@@ -128,11 +126,14 @@ def test_a_vehicle_that_hangs_on_one_of_four_rotors_throughout_does_not_fly():
 
 
 def test_a_hop_says_how_it_ended():
-    stands = ended.then(flight(0.1), 6.0)
-    found = flown(ended.joined(stands, ended.rocks_on_its_back(flight(1.0))), ("force",))
+    found = flown(ended.joined(ended.then(flight(0.1), 6.0), ended.rocks_on_its_back(flight(1.0))), ("force",))
     assert not found.flies
     assert found.reasons[0].startswith("flies for only ")
     assert found.reasons[0].endswith("; from 8.1 s on it rests on something, with its rotors on")
+    # Nor are two, one after another, that are landed.
+    found = flown(ended.joined(ended.then(flight(1.0), 10.0), ended.then(flight(1.5), 10.0)), ())
+    assert not found.flies
+    assert found.reasons[0].startswith("flies for only ")
 
 
 @pytest.mark.parametrize("known", [ALL, ("force",), ("height",)])
@@ -140,14 +141,12 @@ def test_rotors_that_stop_in_the_air_are_no_landing(own, known):
     found = flown(ended.stops_in_the_air(own), known)
     hit = ", impact at 41.2 s" if "force" in known else ""
     assert found.ended == f"the rotors stop in the air at 40.0 s{hit}"
-    landed = ended.then(ended.then(own, 0.04, rate=1.0, felt=(0.0, 0.0, 40.0)), 5.0)
-    assert flown(landed, known).ended == ""
+    assert flown(ended.then(ended.then(own, 0.04, rate=1.0, felt=(0.0, 0.0, 40.0)), 5.0), known).ended == ""
 
 
 def test_a_fall_that_no_flight_has_is_a_loss_of_control(own):
     """Rotors at full all the while, and a landing at any speed is none."""
-    plunges = ended.then(own, 8.0, rate=2.0, rotors=1.6, felt=(0.0, 0.0, 4.0), falls=10.0)
-    found = flown(plunges, ("height",))
+    found = flown(ended.then(own, 8.0, rate=2.0, rotors=1.6, felt=(0.0, 0.0, 4.0), falls=10.0), ("height",))
     assert found.span_s == (0.0, pytest.approx(ended.SECONDS + 2.5, abs=0.3))
     assert found.ended.startswith("loss of control at 42.")
     brief = ended.then(own, 4.0, rate=2.0, rotors=1.6, felt=(0.0, 0.0, 4.0), falls=10.0)
@@ -179,8 +178,7 @@ def test_flips_are_flight_also_where_the_log_ends_in_them(own, known):
 
 def test_a_push_before_the_end_of_a_log_that_is_flown_out_of_is_no_loss_of_control(own):
     """Such as the wake of another vehicle: its rotors do not turn it, and it flies on as before."""
-    pushed = type(own)(**vars(own))
-    pushed.rate, pushed.angles = own.rate.copy(), own.angles.copy()
+    pushed = ended.changed(own, rate=own.rate.copy(), angles=own.angles.copy())
     begin = own.time[-1] - 1.3
     turn = (own.time >= begin) & (own.time < begin + 0.4)
     phase = 2 * np.pi * (own.time[turn] - begin) / 0.4
@@ -188,8 +186,7 @@ def test_a_push_before_the_end_of_a_log_that_is_flown_out_of_is_no_loss_of_contr
     pushed.angles[turn, 0] += 12.0 * 0.4 / (2 * np.pi) * (1 - np.cos(phase))
     assert flown(pushed, ("height", "upright")).ended == ""
     # What does not move at all has come down.
-    lies = type(own)(**vars(pushed))
-    lies.rate = np.where((own.time > begin + 0.6)[:, None], 0.0, pushed.rate)
+    lies = ended.changed(pushed, rate=np.where((own.time > begin + 0.6)[:, None], 0.0, pushed.rate))
     assert flown(lies, ("height", "upright")).ended.startswith("loss of control at ")
     still = own.time < begin + 0.35
     for name in ("time", "rate", "angles", "position", "specific_force", "speed"):
@@ -205,10 +202,8 @@ def test_a_vehicle_that_is_carried_home_by_hand_is_said_to(own):
 @pytest.mark.parametrize("known", [ALL, ("force",), ()])
 def test_what_only_shakes_on_a_bench_does_not_fly(own, known):
     rng = np.random.default_rng(1)
-    bench = type(own)(**vars(own))
-    bench.rate = 0.1 * rng.standard_normal(own.rate.shape)
-    bench.angles, bench.position = 0.001 * rng.standard_normal(own.rate.shape), 0 * own.position
-    bench.specific_force = np.array([0.0, 0.0, 9.81]) + 0.5 * rng.standard_normal(own.rate.shape)
+    rate, angles, force = np.array([[[0.1]], [[0.001]], [[0.5]]]) * rng.standard_normal((3, *own.rate.shape))
+    bench = ended.changed(own, rate=rate, angles=angles, position=0 * own.position, specific_force=WEIGHT + force)
     found = flown(bench, known)
     assert (found.flies, found.reasons) == (False, ("no flight in it: the vehicle neither turns nor moves",))
 
@@ -225,47 +220,30 @@ def test_height_of_an_autopilot_that_counts_downward(own):
 
 @pytest.mark.parametrize("known", [("height",), ("force",), ("upright",)])
 def test_dead_rates_deny_no_flight_that_leans_is_pushed_or_climbs(own, known):
-    dead = type(own)(**vars(own))
-    dead.position = own.position + np.outer(own.time, [0.0, 0.0, 1.0])
-    dead.rate, dead.specific_force = (
-        0.001 * own.rate,
-        own.specific_force * np.linspace(0.6, 1.4, len(own.time))[:, None],
-    )
-    assert flown(dead, known).flies
+    climbs = own.position + np.outer(own.time, [0.0, 0.0, 1.0])
+    felt = own.specific_force * np.linspace(0.6, 1.4, len(own.time))[:, None]
+    assert flown(ended.changed(own, position=climbs, rate=0.001 * own.rate, specific_force=felt), known).flies
 
 
 def test_an_estimate_of_height_that_drifts_on_the_ground_is_no_flight(own):
     rng = np.random.default_rng(1)
-    stands = type(own)(**vars(own))
-    stands.rate = 0.006 * rng.standard_normal(own.rate.shape)
-    stands.angles = 0.001 * rng.standard_normal(own.rate.shape)
-    stands.specific_force = np.array([0.0, 0.0, 9.81]) + 0.05 * rng.standard_normal(own.rate.shape)
-    stands.rate += 0.01 * np.sin(own.time)[:, None]
-    stands.position = np.outer(0.4 * np.sin(0.2 * own.time), [0.0, 0.0, 1.0])
-    found = flown(stands, ALL)
+    rate, angles, force = np.array([[[0.006]], [[0.001]], [[0.05]]]) * rng.standard_normal((3, *own.rate.shape))
+    rate += 0.01 * np.sin(own.time)[:, None]
+    drifts = np.outer(0.4 * np.sin(0.2 * own.time), [0.0, 0.0, 1.0])
+    found = flown(ended.changed(own, rate=rate, angles=angles, specific_force=WEIGHT + force, position=drifts), ALL)
     assert (found.flies, found.reasons) == (False, ("no flight in it: the vehicle neither turns nor moves",))
 
 
 def test_a_climb_that_neither_turns_nor_leans_is_a_flight(own):
-    climbs = type(own)(**vars(own))
-    climbs.rate, climbs.angles = 0.006 * np.random.default_rng(1).standard_normal(own.rate.shape), 0 * own.angles
-    assert flown(climbs).flies
-
-
-def test_a_hop_is_no_flight():
-    hop = ended.joined(ended.then(flight(1.0), 10.0), ended.then(flight(1.5), 10.0))
-    found = flown(hop, ())
-    assert not found.flies
-    assert found.reasons[0].startswith("flies for only ")
+    rate = 0.006 * np.random.default_rng(1).standard_normal(own.rate.shape)
+    assert flown(ended.changed(own, rate=rate, angles=0 * own.angles)).flies
 
 
 def test_a_hover_without_gyroscope_that_leans_is_a_flight(own):
-    hovers = type(own)(**vars(own))
-    hovers.position = 0.05 * np.sin(own.time)[:, None] + 0 * own.position
     signs = Signs(
         time=own.time,
         rotors=rotor_shares(own.speed, shares=False),
-        height=hovers.position[:, 2],
+        height=0.05 * np.sin(own.time),
         upright=upright_of(own.angles, None, "wxyz"),
     )
     assert find_flown(signs).flies
@@ -279,15 +257,12 @@ def test_a_rotor_that_weakens_high_up_rests_on_nothing(own):
 
 @pytest.mark.parametrize("known", [("force",), ("upright",), ()])
 def test_a_flip_before_landing_is_no_crash(own, known):
-    landed = ended.then(ended.joined(own, ended.flips(flight(7.0))), 5.0, roll=0.0)
-    assert flown(landed, known).ended == ""
+    assert flown(ended.then(ended.joined(own, ended.flips(flight(7.0))), 5.0, roll=0.0), known).ended == ""
 
 
 def test_an_attitude_that_turns_over_while_weight_stays_is_no_flight(own):
-    bench = type(own)(**vars(own))
-    bench.angles, bench.rate = own.angles.copy(), own.rate.copy()
+    bench = ended.changed(own, angles=own.angles.copy(), rate=own.rate.copy(), specific_force=WEIGHT + 0 * own.rate)
     bench.angles[:, 0], bench.rate[:, 0] = 0.6 * own.time, 0.6
-    bench.specific_force = np.tile([0.0, 0.0, 9.81], (len(own.time), 1))
     found = flown(bench, ("force", "upright"))
     assert not found.flies
     assert found.reasons[0].startswith("no flight in it: by its attitude it lies on its back for seconds")
@@ -295,10 +270,9 @@ def test_an_attitude_that_turns_over_while_weight_stays_is_no_flight(own):
 
 def test_a_long_turn_pushed_along_its_side_is_no_rest(own):
     """Air that is as strong as the weight, as a dive has it, while the vehicle turns slowly all the time."""
-    dives = type(own)(**vars(own))
-    inside = (own.time > 15) & (own.time < 20)
-    dives.rate = np.where(inside[:, None], [0.35, 0.0, 0.3], own.rate)
-    dives.specific_force = np.where(inside[:, None], [9.0, 1.0, 0.0], own.specific_force)
+    inside = ((own.time > 15) & (own.time < 20))[:, None]
+    dives = ended.changed(own, specific_force=np.where(inside, [9.0, 1.0, 0.0], own.specific_force))
+    dives.rate = np.where(inside, [0.35, 0.0, 0.3], own.rate)
     assert flown(dives, ("force",)).ended == ""
-    dives.rate = np.where(inside[:, None], np.median(own.rate, axis=0), own.rate)
+    dives.rate = np.where(inside, np.median(own.rate, axis=0), own.rate)
     assert "rests on something" in flown(dives, ("force",)).ended

@@ -11,10 +11,12 @@ from cpfls_cli.flightlog.names import BY_HAND
 TIME = np.arange(0.0, 40.0, 0.01)
 
 
-def flown_by(level, height, rate):
+def flown_by(level, height, rate, force=None):
+    """What flies by rotors that are alike, height, turning about x and force, in weights along z or three of them."""
     rotors = None if level is None else np.repeat(level[:, None], 4, axis=1)
     turns = None if rate is None else rate[:, None] * [1.0, 0.0, 0.0]
-    return find_flown(Signs(time=TIME, rotors=rotors, height=height, body_rate=turns))
+    felt = force if force is None or force.ndim == 2 else force[:, None] * [0.0, 0.0, 1.0]
+    return find_flown(Signs(time=TIME, rotors=rotors, height=height, body_rate=turns, force=felt))
 
 
 def between(begin, end, inside, outside=0.0):
@@ -31,8 +33,7 @@ def test_a_log_that_flies_from_first_to_last_is_not_cut():
 
 
 def test_standing_and_idling_rotors_are_cut_with_a_margin():
-    level = between(5, 10, 0.1) + between(10, 30, 0.5)
-    flown = flown_by(level, None, turning(10, 30))
+    flown = flown_by(between(5, 10, 0.1) + between(10, 30, 0.5), None, turning(10, 30))
     assert flown.span_s == (pytest.approx(10.5, abs=0.1), pytest.approx(29.5, abs=0.1))
     assert flown.reasons[0].startswith("the first 10.5 s are cut: ")
     assert flown.reasons[1].endswith(" s are cut: the rotors stand still or idle")
@@ -154,9 +155,8 @@ def test_a_stand_feels_the_weight_turn_and_a_flight_does_not(turns_rad_s):
 def test_vibration_on_the_ground_is_no_thrust():
     rng = np.random.default_rng(2)
     level = between(18, 32, 0.5, 0.22)
-    rate = np.column_stack([turning(18, 32, 0.6), 0 * TIME, 0 * TIME])
     force = np.array([0.0, 0.0, 1.0]) + rng.standard_normal((len(TIME), 3))
-    flown = find_flown(Signs(time=TIME, rotors=np.repeat(level[:, None], 4, axis=1), body_rate=rate, force=force))
+    flown = flown_by(level, None, turning(18, 32, 0.6), force)
     assert flown.span_s == (pytest.approx(18.0, abs=1.0), pytest.approx(32.0, abs=1.0))
 
 
@@ -224,31 +224,20 @@ def test_a_height_that_hardly_changes_is_one_without_other_signs_too():
 
 def test_a_cut_throttle_in_free_fall_is_part_of_the_flight():
     level = between(5, 35, 0.5) - between(15, 17, 0.5)
-    falls = between(15.1, 17, -0.95)
-    signs = Signs(
-        time=TIME,
-        rotors=np.repeat(level[:, None], 4, axis=1),
-        body_rate=(turning(5, 15, 3.0) + turning(17, 35, 3.0))[:, None] * [1.0, 0.0, 0.0],
-        force=(1 + falls)[:, None] * [0.0, 0.0, 1.0],
-    )
-    flown = find_flown(signs)
+    flown = flown_by(level, None, turning(5, 15, 3.0) + turning(17, 35, 3.0), 1 + between(15.1, 17, -0.95))
     assert flown.moments == ()
     assert len(flown.stretches_s) == 1
 
 
 def test_rotors_that_rise_on_the_ground_do_not_fly_before_it_moves():
-    flown = flown_by(between(5, 35, 0.5), None, turning(20, 35))
-    assert flown.stretches_s[0][0] == pytest.approx(20.5, abs=0.4)
+    assert flown_by(between(5, 35, 0.5), None, turning(20, 35)).stretches_s[0][0] == pytest.approx(20.5, abs=0.4)
 
 
 def test_who_mostly_climbs_hovers_below_the_usual_level():
     """Rotors at three times the level of hover in punch-outs; at the end the vehicle hovers and hardly turns."""
     climbs = (TIME > 3) & (TIME < 30) & (TIME % 4 < 1.5)
     level = np.where(climbs, 0.8, between(2, 38, 0.26))
-    rate = np.column_stack([turning(2, 30, 4.0) + turning(30, 38, 0.15), 0 * TIME, 0 * TIME])
-    force = np.column_stack([0 * TIME, 0 * TIME, np.where(climbs, 9.4, 1.0)])
-    rotors = np.repeat(level[:, None], 4, axis=1)
-    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=force))
+    flown = flown_by(level, None, turning(2, 30, 4.0) + turning(30, 38, 0.15), np.where(climbs, 9.4, 1.0))
     assert flown.span_s == (pytest.approx(2.5, abs=0.1), pytest.approx(37.5, abs=0.1))
 
 
@@ -258,20 +247,15 @@ def test_who_climbs_fast_for_most_of_a_flight_hovers_below_what_the_climb_takes(
     level = np.interp(TIME, times, [0, 0, 0.3, 0.36, 0.6, 1.0, 0.1, 0.1, 0.3, 0.28, 0])
     force = np.interp(TIME, [0, 3, 3.5, 20, 20.5, 22.5, 23], [1, 1, 1.35, 1.25, 0.2, 0.2, 1.0])
     wobbles = between(4, 37, 0.1) * np.sin(2 * TIME)
-    rate = np.column_stack([turning(3, 38.2, 0.3) + between(20.5, 22.5, 8.0), 0 * TIME, 0 * TIME])
-    level, force = level * (1 + wobbles), force * (1 + 2 * wobbles)
-    rotors, felt = np.repeat(level[:, None], 4, axis=1), np.column_stack([0 * TIME, 0 * TIME, force])
-    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=felt))
+    rate = turning(3, 38.2, 0.3) + between(20.5, 22.5, 8.0)
+    flown = flown_by(level * (1 + wobbles), None, rate, force * (1 + 2 * wobbles))
     assert flown.span_s == (pytest.approx(3.5, abs=0.3), pytest.approx(37.7, abs=0.3))
 
 
 def test_what_idles_for_long_under_an_accelerometer_that_reads_too_much_stands():
     level = np.interp(TIME, [0, 1, 18, 19, 36, 36.5, 39, 40], [0, 0.2, 0.2, 0.5, 0.5, 0.2, 0.2, 0])
     wobbles = between(19, 36, 0.1) * np.sin(2 * TIME)
-    rate = np.column_stack([turning(18, 36.5, 0.4), 0 * TIME, 0 * TIME])
-    felt = np.column_stack([0 * TIME, 0 * TIME, 1.2 * (1 + 2 * wobbles)])
-    rotors = np.repeat((level * (1 + wobbles))[:, None], 4, axis=1)
-    flown = find_flown(Signs(time=TIME, rotors=rotors, body_rate=rate, force=felt))
+    flown = flown_by(level * (1 + wobbles), None, turning(18, 36.5, 0.4), 1.2 * (1 + 2 * wobbles))
     assert flown.span_s == (pytest.approx(18.5, abs=0.4), pytest.approx(36.2, abs=0.4))
 
 
@@ -364,8 +348,7 @@ def acrobatics(*known, idle=0.06, noise=0.0, hand=0.0):
         flies = inside(time, 3, 30, 1) + inside(time, 50, 77, 1) > 0
         force = np.outer(np.where(flies, 1 + 0.8 * np.sin(2 * time), 1.0), UP)
         signs = {"force": force, "height": np.convolve(np.where(flies, 5.0, 0.0), np.ones(100) / 100, "same")}
-        level = np.where(flies, 0.5, idle)
-        return {"rotors": level, "rate": np.where(flies, 3.0, hand), "noise": noise} | {
+        return {"rotors": np.where(flies, 0.5, idle), "rate": np.where(flies, 3.0, hand), "noise": noise} | {
             name: signs[name] for name in known
         }
 
@@ -376,8 +359,7 @@ def profile(drag):
     """Up at 10 m/s and down at 8 m/s by turns, with a drag so large, 1/m."""
 
     def made(time):
-        asked = np.where(time % 150 < 75, 10.0, -8.0)
-        speed = lfilter([0.01], [1, -0.99], asked)
+        speed = lfilter([0.01], [1, -0.99], np.where(time % 150 < 75, 10.0, -8.0))
         felt = 1 + np.gradient(speed, time) / 9.81
         level = 0.4 * np.sqrt(np.maximum(felt + drag * speed * np.abs(speed) / 9.81, 0.05))
         height = 100 + 0.01 * np.cumsum(speed)

@@ -14,9 +14,13 @@ def settings(**changes):
     return ImportSettings(**({"signals": RATE, "torque_source": None} | changes))
 
 
-def log(samples=201, period=0.01):
+def log(samples=201, period=0.01, **broken):
+    """Columns of a log; of some the rows that are broken, and what they hold."""
     time = period * np.arange(samples)
-    return {"t": time, "p": np.sin(time), "q": np.cos(2 * time), "r": 0.3 * time}
+    columns = {"t": time.copy(), "p": np.sin(time), "q": np.cos(2 * time), "r": 0.3 * time}
+    for name, (rows, value) in broken.items():
+        columns[name][rows] = value
+    return columns
 
 
 def without(columns, rows):
@@ -59,18 +63,13 @@ def test_of_repeated_time_stamps_the_first_counts():
 
 
 def test_samples_that_go_backward_are_dropped():
-    columns = log()
-    columns["t"][50:53] = 0.1
-    columns["p"][50:53] = 99.0
-    signals = read_signals(columns, settings())
+    signals = read_signals(log(t=(slice(50, 53), 0.1), p=(slice(50, 53), 99.0)), settings())
     assert signals.dropped["backward_time"] == 3
     np.testing.assert_allclose(signals.body_rate[:, 0], np.sin(signals.time), atol=1e-4)
 
 
 def test_a_time_stamp_that_is_not_a_number_drops_its_row():
-    columns = log()
-    columns["t"][50] = np.nan
-    assert read_signals(columns, settings()).dropped["time_not_finite"] == 1
+    assert read_signals(log(t=(50, np.nan)), settings()).dropped["time_not_finite"] == 1
 
 
 def test_columns_with_fewer_than_two_values_are_all_named():
@@ -108,35 +107,26 @@ def test_or_the_longest_part_is_kept():
 
 
 def test_absent_values_are_interpolated_and_counted_by_column():
-    columns = log()
-    columns["q"][[40, 41, 42]] = np.nan
-    columns["r"][7] = np.inf
-    signals = read_signals(columns, settings())
+    signals = read_signals(log(q=([40, 41, 42], np.nan), r=(7, np.inf)), settings())
     assert signals.missing == {"q": 3, "r": 1}
     np.testing.assert_allclose(signals.body_rate[:, 1], np.cos(2 * signals.time), atol=2e-3)
 
 
 def test_absent_values_for_longer_than_the_gap_are_a_gap():
-    columns = log()
-    columns["q"][40:60] = np.nan
     with pytest.raises(InputError, match=r"gap of 0\.21 s"):
-        read_signals(columns, settings())
+        read_signals(log(q=(slice(40, 60), np.nan)), settings())
 
 
 def test_a_column_that_begins_late_and_ends_early_sets_the_span():
-    columns = log()
-    columns["r"][:20] = np.nan
-    columns["r"][-5:] = np.nan
-    signals = read_signals(columns, settings())
+    signals = read_signals(log(r=(np.r_[0:20, -5:0], np.nan)), settings())
     assert signals.dropped["incomplete_ends"] == 25
     assert signals.span_s == pytest.approx((0.2, 1.95))
     np.testing.assert_allclose(signals.body_rate[:, 2], 0.3 * (signals.time + 0.2), atol=1e-12)
 
 
 def test_a_sensor_of_a_lower_rate_is_interpolated():
-    columns = log()
-    columns["r"][np.arange(201) % 4 != 0] = np.nan
-    np.testing.assert_allclose(read_signals(columns, settings()).body_rate[:, 2], 0.3 * log()["t"], atol=1e-12)
+    signals = read_signals(log(r=(np.arange(201) % 4 != 0, np.nan)), settings())
+    np.testing.assert_allclose(signals.body_rate[:, 2], 0.3 * log()["t"], atol=1e-12)
 
 
 def test_spikes_are_found_counted_and_interpolated():
@@ -299,10 +289,8 @@ def test_a_clock_that_no_sensor_has_asks_for_the_unit_of_time(factor, said):
 
 
 def test_a_slow_column_in_a_fast_log_is_distinguished_from_a_wrong_clock():
-    columns = log()
-    columns["r"][np.arange(201) % 20 != 0] = np.nan
     with pytest.raises(InputError, match=r"a mapped column has a value only every 0\.2 s"):
-        read_signals(columns, settings())
+        read_signals(log(r=(np.arange(201) % 20 != 0, np.nan)), settings())
 
 
 def test_a_signal_whose_rows_repeat_updates_is_known():

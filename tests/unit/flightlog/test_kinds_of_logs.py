@@ -34,8 +34,7 @@ def test_a_log_of_ardupilot_names_its_motors_by_the_functions_of_its_outputs(own
 def test_parameters_that_the_motion_contradicts_are_warned_of(own):
     swapped = ardupilot(own)
     swapped["ESC"], swapped["ESC[1]"] = swapped["ESC[1]"], swapped["ESC"]
-    proposal = proposed(swapped, "ArduCopter 4.5.1", {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0})
-    (warning,) = proposal.warnings
+    (warning,) = proposed(swapped, "ArduCopter 4.5.1", {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0}).warnings
     assert warning.startswith(
         "the rotors are taken from FRAME_CLASS and FRAME_TYPE in the log: quad X, which contradicts"
     )

@@ -215,8 +215,7 @@ def test_a_letter_alone_is_of_another_thing_in_capitals():
     ],
 )
 def test_what_is_commanded_may_be_a_setpoint(names, signal):
-    own = wished_signals(column_groups(tuple(names.split())))
-    assert [named.signal for named in own] == [signal]
+    assert [named.signal for named in wished_signals(column_groups(tuple(names.split())))] == [signal]
 
 
 @pytest.mark.parametrize(

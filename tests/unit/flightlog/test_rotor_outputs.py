@@ -87,8 +87,7 @@ def test_outputs_that_stand_in_their_middle_before_take_off_are_no_rotors(own):
         recognise(flat_log(own, speed=plane).topics, {}, {}, "")
     # So do sticks; the motors of a log are found all the same.
     sticks = named(np.column_stack(list(plane.values())), *(f"servo{number}" for number in range(1, 5)))
-    motors = named(pulses(own), *PWM)
-    recognition = recognise(flat_log(own, speed={**sticks, **motors}).topics, {}, {}, "")
+    recognition = recognise(flat_log(own, speed={**sticks, **named(pulses(own), *PWM)}).topics, {}, {}, "")
     assert recognition.signal("rotor_command").columns.columns == PWM
 
 
@@ -143,9 +142,8 @@ def test_a_stick_that_is_calibrated_anew_makes_no_other_vehicle(own):
 
 def px4(own, instances, parameters):
     """A log of PX4 with outputs of one or two instances."""
-    turned = own.rotation
     topics = {
-        "vehicle_attitude": topic(own, 2, named(quaternion(turned), *(f"q[{index}]" for index in range(4)))),
+        "vehicle_attitude": topic(own, 2, named(quaternion(own.rotation), *(f"q[{index}]" for index in range(4)))),
         "vehicle_angular_velocity": topic(own, 1, named(own.rate @ FLIP, *(f"xyz[{axis}]" for axis in range(3)))),
     }
     for number, values in enumerate(instances):

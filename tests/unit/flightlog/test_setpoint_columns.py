@@ -29,8 +29,7 @@ def ahead(values):
 def asked(own):
     """Setpoints in FLU and ENU, and sticks as shares."""
     angles = ahead(own.angles)
-    rng = np.random.default_rng(5)
-    waves = np.sin(np.outer(own.time, rng.uniform(0.5, 3.0, 4)))
+    waves = np.sin(np.outer(own.time, np.random.default_rng(5).uniform(0.5, 3.0, 4)))
     return SimpleNamespace(
         angles=angles,
         rotation=Rotation.from_euler("ZYX", angles[:, ::-1]),
@@ -245,8 +244,7 @@ def test_columns_with_a_word_for_a_wish(own, asked, word):
         thrust_asked={f"{word.format('thrust')} [N]": 8 * asked.thrust},
     ).topics
     known, proposal = found(columns, "")
-    units = {name: guess.columns.unit for name, guess in known.items()}
-    assert units == {
+    assert {name: guess.columns.unit for name, guess in known.items()} == {
         "setpoint_position": "mm",
         "setpoint_velocity": "m/s",
         "setpoint_attitude": "deg",
@@ -272,9 +270,8 @@ def test_a_wish_that_runs_backward_is_turned_and_said(own, asked):
 
 @pytest.mark.parametrize("kind", ["unlike", "too large", "of nothing"])
 def test_what_is_unclear_is_left_out_and_said(own, asked, kind):
-    rng = np.random.default_rng(7)
     wished = {
-        "unlike": rng.standard_normal(asked.angles.shape).cumsum(axis=0) / 30,
+        "unlike": np.random.default_rng(7).standard_normal(asked.angles.shape).cumsum(axis=0) / 30,
         "too large": 7 * asked.angles,
         "of nothing": asked.velocity,
     }[kind]
@@ -321,8 +318,7 @@ def test_logs_flown_in_other_modes_share_a_config(own, asked):
     by_hand = plain | named(asked.position * [[1, -1, 1]], "x_sp", "y_sp", "z_sp")
     other = plain | named(asked.angles, "roll_des", "pitch_des", "yaw_des")
     known = [known_log(name, {"": c}, {}, {}, "") for name, c in (("a", by_position), ("b", by_hand), ("c", other))]
-    proposal = propose(known, None, None)
-    found = setpoints(proposal)
+    found = setpoints(propose(known, None, None))
     attitude = found["setpoint_attitude"].columns
     assert not attitude.required
     assert [own.columns for own in attitude.otherwise] == [("roll_des", "pitch_des", "yaw_des")]

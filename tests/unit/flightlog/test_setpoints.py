@@ -99,8 +99,7 @@ def test_what_is_nowhere_asked_for_drops_no_sample():
 
 def test_setpoints_are_neither_filtered_nor_shifted_and_keep_the_previous_value_at_another_rate():
     steps = (np.arange(SAMPLES) // 20)[:, None].astype(float)
-    signals = {"sticks": mapped("1", "s0", "s1", "s2", scale=0.01)}
-    own = settings(signals, lowpass_hz=5.0, rate_hz=250.0)
+    own = settings({"sticks": mapped("1", "s0", "s1", "s2", scale=0.01)}, lowpass_hz=5.0, rate_hz=250.0)
     flight = import_log(log(s=np.hstack([steps, -steps, 0 * steps])), own)
     np.testing.assert_allclose(flight.sticks[:, 0], 0.01 * np.floor(flight.time / 0.2 + 1e-6), atol=1e-12)
     delayed = import_log(log(s=np.hstack([steps, -steps, 0 * steps])), replace(own, delay_s=0.05, rate_hz=None))
@@ -109,8 +108,7 @@ def test_setpoints_are_neither_filtered_nor_shifted_and_keep_the_previous_value_
 
 def test_a_setpoint_is_held_for_three_of_its_steps():
     time, values = np.array([1.0, 1.2, 1.4, 1.6, 3.0]), np.array([1.0, 2.0, np.nan, 4.0, 5.0])
-    target = np.array([0.3, 0.5, 1.1, 1.3, 1.5, 1.7, 2.1, 2.5, 2.95, 3.3, 4.0])
-    held = hold_asked(time, values, target, 0.1)
+    held = hold_asked(time, values, np.array([0.3, 0.5, 1.1, 1.3, 1.5, 1.7, 2.1, 2.5, 2.95, 3.3, 4.0]), 0.1)
     # The steps that are known are 0.2, 0.4 and 1.4 s.
     np.testing.assert_array_equal(held, [1.0, 1.0, 1.0, 2.0, 2.0, 4.0, 4.0, 4.0, np.nan, 5.0, 5.0])
     often = hold_asked(np.append(0.01 * np.arange(50), 9.0), np.arange(51.0), np.array([0.5, 0.6, 8.0, 9.05, 9.2]), 0.1)
@@ -153,11 +151,10 @@ def test_a_map_of_setpoints_that_cannot_be_is_refused_at_its_key(key, signals):
 
 
 def test_a_flight_holds_its_setpoints_and_counts_where_they_are_known():
-    wished = np.column_stack([TIME, TIME, TIME])
     thrust = np.linspace(0.2, 0.6, SAMPLES)[:, None].copy()
     thrust[:21] = np.nan
     signals = {"setpoint_position": mapped("m", *columns_of("x")), "setpoint_thrust": mapped("1", "f0")}
-    record = import_log(log(x=wished, f=thrust), settings(signals))
+    record = import_log(log(x=np.column_stack([TIME, TIME, TIME]), f=thrust), settings(signals))
     assert record.setpoint_thrust is not None
     assert record.setpoint_thrust.shape == (SAMPLES,)
     # The first value goes back by import.gap_s, and no further.

@@ -68,8 +68,7 @@ def test_dead_columns_are_named_once():
 def test_a_clipped_gyroscope_is_named_with_its_limit():
     rate = 2 * np.sin(8 * TIME) + NOISE[:, 0]
     (warning,) = warnings(flying(w0=np.clip(rate, -1.7, 1.9)))
-    count = int((rate >= 1.9).sum())
-    assert warning == f"column w0 is clipped at 1.9 rad/s, for {count} samples: the rest is lost"
+    assert warning == f"column w0 is clipped at 1.9 rad/s, for {int((rate >= 1.9).sum())} samples: the rest is lost"
 
 
 def test_a_signal_that_falls_silent_is_said_with_place():

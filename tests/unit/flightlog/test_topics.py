@@ -122,8 +122,7 @@ def test_another_stamp_is_used_by_the_topics_that_have_it():
 
 
 def test_what_is_not_there_is_only_named():
-    topics = {"gyro": gyro()}
-    columns, _ = put(topics, body_rate=("gyro.x", "gyro.y", "other.z"))
+    columns, _ = put({"gyro": gyro()}, body_rate=("gyro.x", "gyro.y", "other.z"))
     assert "other.z" not in columns
     assert columns["gyro.z"].size == 0
 
@@ -217,8 +216,7 @@ def test_signals_that_a_log_may_lack_are_left_out_where_they_say_nothing():
 
 def test_maps_that_stand_in_for_each_other_have_one_number_of_columns_and_one_kind_of_unit():
     def command(unit, *columns):
-        other = ColumnMap(columns=columns, unit=unit)
-        mapped = SignalMap(columns=("a", "b"), unit="1", otherwise=(other,))
+        mapped = SignalMap(columns=("a", "b"), unit="1", otherwise=(ColumnMap(columns=columns, unit=unit),))
         return ImportSettings(torque_source=None, signals={"rotor_command": mapped})
 
     assert command("1", "c", "d").mapped_columns == ("t", "a", "b", "c", "d")
@@ -246,8 +244,7 @@ def test_clock_that_is_too_slow_is_warned_of():
 def test_pauses_are_absent_and_absent_values_are_passed_over(between):
     time = np.array([0.0, 0.1, 0.2, 0.9, 1.0, 1.1])
     values = np.array([1.0, np.nan, 3.0, 4.0, 5.0, 5.0])
-    target = np.array([-0.05, 0.0, 0.1, 0.2, 0.3, 0.9, 0.95, 1.1, 1.2])
-    result = between(time, values, target, 0.2)
+    result = between(time, values, np.array([-0.05, 0.0, 0.1, 0.2, 0.3, 0.9, 0.95, 1.1, 1.2]), 0.2)
     np.testing.assert_array_equal(np.isnan(result), [True, False, False, False, True, False, False, False, True])
     assert result[2] == (2.0 if between is interpolate else 1.0)
     assert result[6] == pytest.approx(4.5 if between is interpolate else 4.0, abs=1e-9)

@@ -72,9 +72,8 @@ def test_a_gyroscope_in_frd_does_not_turn_the_vehicle():
 
 
 def test_an_altitude_in_a_log_of_frd_and_ned_turns_nothing():
-    turned = Rotation.from_matrix(NED @ OWN.rotation.as_matrix() @ FLIP)
     proposal = proposed(
-        attitude=named(quaternion(turned), *Q),
+        attitude=named(quaternion(Rotation.from_matrix(NED @ OWN.rotation.as_matrix() @ FLIP)), *Q),
         rate=named(OWN.rate @ FLIP, *GYRO),
         force=named(OWN.specific_force @ FLIP, *ACC),
         position=named(OWN.position @ NED.T * UP_DOWN, *PLACE),
@@ -229,8 +228,7 @@ def test_what_is_chosen_is_no_rival_of_itself():
     ("columns", "said"), [([0, 1, 1], "gyro_y and gyro_z have the same values"), ([0, 1, 3], "gyro_z never changes")]
 )
 def test_a_column_that_is_another_one_or_nothing_makes_a_guess(columns, said):
-    rate = np.column_stack([OWN.rate, np.zeros(len(OWN.time))])[:, columns]
-    proposal = proposed(rate=named(rate, *GYRO))
+    proposal = proposed(rate=named(np.column_stack([OWN.rate, np.zeros(len(OWN.time))])[:, columns], *GYRO))
     assert signal(proposal, "body_rate").sure == "guess"
     assert any(said in warning for warning in proposal.warnings)
 
@@ -306,8 +304,7 @@ def test_axes_that_an_autopilot_states_are_not_turned():
         "vehicle_angular_velocity": {"timestamp": OWN.time, **named(OWN.rate @ FLIP, "xyz[0]", "xyz[1]", "xyz[2]")},
     }
     log = known_log("log", topics, {}, {}, "PX4 1.14.0")
-    velocity = log.recognition.signal("velocity")
-    assert velocity.columns.sign is None
+    assert log.recognition.signal("velocity").columns.sign is None
     assert not any("opposite" in warning for warning in log.recognition.warnings)
 
 
@@ -388,20 +385,16 @@ def test_logs_of_one_logger_without_stamps_have_one_clock():
 def test_charge_is_no_voltage():
     level = np.round(np.linspace(42, 40, len(OWN.time)))
     assert "voltage" not in {guess.signal for guess in proposed(battery={"battery": level}).signals}
-    volts = np.linspace(16.2, 15.4, len(OWN.time))
-    proposal = proposed(battery={"battery": level, "battery_voltage": volts})
+    proposal = proposed(battery={"battery": level, "battery_voltage": np.linspace(16.2, 15.4, len(OWN.time))})
     assert signal(proposal, "voltage").columns.columns == ("battery_voltage",)
 
 
 def test_rotors_by_place_are_taken_in_the_order_of_their_places():
     front_left_first = OWN.speed[:, [2, 0, 1, 3]] * RPM
-    proposal = proposed(speed=named(front_left_first, "rpm_fl", "rpm_fr", "rpm_rl", "rpm_rr"))
-    assert [rotor.name for rotor in proposal.airframe.rotors] == [
-        "front left",
-        "front right",
-        "rear left",
-        "rear right",
-    ]
+    assert [
+        rotor.name
+        for rotor in proposed(speed=named(front_left_first, "rpm_fl", "rpm_fr", "rpm_rl", "rpm_rr")).airframe.rotors
+    ] == ["front left", "front right", "rear left", "rear right"]
 
 
 def test_north_east_down_need_no_motion_to_count_downward():

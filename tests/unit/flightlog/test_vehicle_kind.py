@@ -83,8 +83,7 @@ def test_a_vtol_hovers(system, parameters, topics):
 
 def test_forward_flight_is_said_by_states_and_modes():
     grid = np.array([0.5, 1.5, 2.5])
-    by_type = forward_flight(status(vehicle_type=[1, 2, 1]), grid)
-    assert by_type.tolist() == [False, True, False]
+    assert forward_flight(status(vehicle_type=[1, 2, 1]), grid).tolist() == [False, True, False]
     by_mode = forward_flight({"MODE": {"timestamp": np.arange(3.0), "Mode": np.array([18.0, 5.0, 19.0])}}, grid)
     assert by_mode.tolist() == [False, True, False]
     assert forward_flight({}, grid) is None

@@ -242,8 +242,7 @@ def source(tmp_path, monkeypatch):
     """As a worker gets it: pickled here, and read there."""
     monkeypatch.setattr(sources, "IN_MEMORY", 10)
     write_flight(tmp_path / "flight.h5", LENGTH)
-    opened = sources.part_of(sources.flight_source(tmp_path / "flight.h5"), slice(5, 20))
-    return pickle.loads(pickle.dumps(opened))
+    return pickle.loads(pickle.dumps(sources.part_of(sources.flight_source(tmp_path / "flight.h5"), slice(5, 20))))
 
 
 def test_it_is_read_where_the_same_file_lies(source):

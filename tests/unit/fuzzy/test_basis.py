@@ -132,8 +132,7 @@ def test_all_zero_weights_have_no_breakpoints(functions):
 @pytest.mark.parametrize("weights", [[0, 1, 1], [1, 0, 1], [1, 1, 0], [0, 0, 1], [0, 1, 0], [1, 0, 0]])
 def test_zero_widths_are_finite_steps(weights):
     b = breakpoints(np.array(weights, dtype=float))
-    x = np.concatenate([np.linspace(0, 1, 41), b])
-    degrees = memberships(x, b)
+    degrees = memberships(np.concatenate([np.linspace(0, 1, 41), b]), b)
     assert np.isfinite(degrees.value).all()
     assert np.isfinite(degrees.slope).all()
     np.testing.assert_allclose(degrees.value.sum(axis=1), 1.0, atol=1e-15)
@@ -142,8 +141,7 @@ def test_zero_widths_are_finite_steps(weights):
 def test_functions_hold_at_their_ends_and_never_fire_between_two_empty_intervals():
     """b = 0, 1/2, 1/2, 1/2, 1: the middle function has no width on either side."""
     b = breakpoints(np.array([1.0, 0.0, 0.0, 1.0]))
-    inside = np.setdiff1d(np.linspace(0, 1, 101), [0.5])
-    np.testing.assert_array_equal(memberships(inside, b).value[:, 2], 0.0)
+    np.testing.assert_array_equal(memberships(np.setdiff1d(np.linspace(0, 1, 101), [0.5]), b).value[:, 2], 0.0)
     degrees = memberships(np.linspace(-1, 2, 7), breakpoints(np.empty(0)))
     np.testing.assert_array_equal(degrees.value, np.ones((7, 1)))
     np.testing.assert_array_equal(degrees.slope, np.zeros((7, 1)))

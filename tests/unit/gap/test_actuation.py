@@ -106,62 +106,48 @@ def test_a_lag_and_a_filter_do_not_trade(best, sizes, numbers, monkeypatch):
     assert [(each.value, each.low, each.high) for each in own] == [pytest.approx(each) for each in numbers]
 
 
-def test_where_nothing_is_late_nothing_trades(monkeypatch):
-    left = {(): LITTLE, LAG: 9.0, DELAY: 9.0, BOTH: LITTLE}
-    unsure = [(0.03, 0.06), (0.02, 0.035)]
-    names, *_ = apart(monkeypatch, (), left, {LAG: [(0.001, 0.05)], DELAY: [(0.001, 0.05)], BOTH: unsure})
-    assert names == ()
+FILTER, NOTCH = ("low_pass_filter",), ("notch_filter",)
+FILTER_FOR_DELAY, DELAY_FOR_LAG = (("low_pass_filter", "command_delay", ""), ("command_delay", "motor_lag", ""))
+ALONE, LATER = {(): 90.0, BOTH: LITTLE, LAG: 9.0, DELAY: LITTLE}, {(): 90.0, BOTH: LITTLE, LAG: 9.0, DELAY: 9.0}
+CASES = {
+    "where nothing is late nothing trades": (
+        (),
+        LATER | {(): LITTLE},
+        {LAG: [(0.001, 0.05)], DELAY: [(0.001, 0.05)], BOTH: [(0.03, 0.06), (0.02, 0.035)]},
+        (),
+        None,
+    ),
+    "the one that leaves more is no rival": (LAG, ALONE, {BOTH: [ABSENT, ABSENT]}, DELAY, set()),
+    "a delay with a lag that nothing excludes": (DELAY, ALONE, {BOTH: [OPEN, SURE]}, BOTH, None),
+    "a delay with no lag that anybody has": (DELAY, ALONE, {BOTH: [ABSENT, SURE]}, DELAY, None),
+    "a lag that is surely not 0, however little is left": (LAG, {(): LITTLE, LAG: LITTLE[::-1]}, {}, LAG, None),
+    "each is surely not 0 next to the other, though one alone leaves nothing": (
+        LAG, ALONE | {LAG: LITTLE, DELAY: LITTLE[::-1]}, {BOTH: [SURE, SURE]}, BOTH, set(),
+    ),
+    "what is less than nothing is nothing": (
+        LAG, ALONE | {LAG: -2.0}, {BOTH: [ABSENT, ABSENT]}, LAG, {DELAY_FOR_LAG},
+    ),
+    "what formulas are off by is nothing": (
+        LAG, ALONE | {(): 9000.0, DELAY: 1.0}, {BOTH: [ABSENT, ABSENT]}, LAG, {DELAY_FOR_LAG},
+    ),
+    "a filter that leaves nothing is a rival of one that surely leaves something": (
+        DELAY,
+        {(): 90.0, DELAY: np.where(np.arange(BLOCKS) < 10, 3.0, -2.0), FILTER: 4.5 * LITTLE + 0.5, NOTCH: 30.0},
+        {},
+        DELAY,
+        {FILTER_FOR_DELAY},
+    ),
+    "a filter that leaves as little is a rival of a delay without a lag": (
+        DELAY, ALONE | {FILTER: LITTLE, NOTCH: 30.0}, {BOTH: [ABSENT, SURE]}, DELAY, {FILTER_FOR_DELAY},
+    ),
+    "a delay of a third of a sample is none": (LAG, LATER, {BOTH: [SURE, (0.0035, 0.001)]}, LAG, None),
+}  # fmt: skip
 
 
-def test_the_one_that_leaves_more_is_no_rival(monkeypatch):
-    left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
-    assert apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})[:2] == (DELAY, set())
-
-
-@pytest.mark.parametrize(
-    ("together", "names"),
-    [([OPEN, SURE], BOTH), ([ABSENT, SURE], DELAY)],
-    ids=["a lag that nothing excludes", "no lag that anybody has"],
-)
-def test_a_delay_alone_has_to_show_that_rotors_do_not_lag(together, names, monkeypatch):
-    left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE}
-    assert apart(monkeypatch, DELAY, left, {BOTH: together})[0] == names
-
-
-def test_a_lag_that_is_surely_not_0_stands_however_little_what_is_left_without_it_shows(monkeypatch):
-    assert apart(monkeypatch, LAG, {(): LITTLE, LAG: LITTLE[::-1]})[0] == LAG
-
-
-def test_both_stand_where_each_is_surely_not_0_next_to_the_other_though_one_alone_leaves_nothing(monkeypatch):
-    left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
-    assert apart(monkeypatch, LAG, left, {BOTH: [SURE, SURE]})[:2] == (BOTH, set())
-
-
-@pytest.mark.parametrize(
-    ("nothing", "lag", "delay"), [(90.0, -2.0, LITTLE), (9000.0, 9.0, 1.0)], ids=["less than nothing", "formulas"]
-)
-def test_what_formulas_are_off_by_and_less_than_nothing_are_nothing(nothing, lag, delay, monkeypatch):
-    left = {(): nothing, LAG: lag, DELAY: delay, BOTH: LITTLE}
-    names, rivals, *_ = apart(monkeypatch, LAG, left, {BOTH: [ABSENT, ABSENT]})
-    assert (names, rivals) == (LAG, {("command_delay", "motor_lag", "")})
-
-
-def test_a_filter_that_leaves_nothing_is_a_rival_of_one_that_surely_leaves_something(monkeypatch):
-    some = np.where(np.arange(BLOCKS) < 10, 3.0, -2.0)
-    left = {(): 90.0, DELAY: some, ("low_pass_filter",): 4.5 * LITTLE + 0.5, ("notch_filter",): 30.0}
-    names, rivals, *_ = apart(monkeypatch, DELAY, left)
-    assert (names, rivals) == (DELAY, {("low_pass_filter", "command_delay", "")})
-
-
-def test_a_filter_that_leaves_as_little_is_a_rival_of_a_delay_without_a_lag(monkeypatch):
-    left = {(): 90.0, LAG: 9.0, DELAY: LITTLE, BOTH: LITTLE, ("low_pass_filter",): LITTLE, ("notch_filter",): 30.0}
-    names, rivals, *_ = apart(monkeypatch, DELAY, left, {BOTH: [ABSENT, SURE]})
-    assert (names, rivals) == (DELAY, {("low_pass_filter", "command_delay", "")})
-
-
-def test_a_delay_of_a_third_of_a_sample_is_none(monkeypatch):
-    left = {(): 90.0, LAG: 9.0, DELAY: 9.0, BOTH: LITTLE}
-    assert apart(monkeypatch, LAG, left, {BOTH: [SURE, (0.0035, 0.001)]})[0] == LAG
+@pytest.mark.parametrize(("own", "left", "sizes", "names", "rivals"), CASES.values(), ids=CASES)
+def test_which_of_lag_delay_and_filter_are_named(own, left, sizes, names, rivals, monkeypatch):
+    found, alike, *_ = apart(monkeypatch, own, left, sizes)
+    assert (found, alike if rivals is not None else None) == (names, rivals)
 
 
 @pytest.mark.parametrize(

@@ -40,8 +40,7 @@ def crossed(values, rng):
     known = rng.standard_normal((BLOCKS, WINDOWS, 2)) @ np.array([[1.0, 0.8], [0.0, 0.6]])
     gust = rng.standard_normal((BLOCKS, WINDOWS, 1))
     moved = known + gust * [0.7, -0.5]
-    left = gust[..., 0]
-    rows = np.concatenate([moved, (left + moved @ np.array(values))[..., None]], axis=2)
+    rows = np.concatenate([moved, (gust[..., 0] + moved @ np.array(values))[..., None]], axis=2)
     known = np.concatenate([known, np.zeros((BLOCKS, WINDOWS, 1))], axis=2)
     return np.einsum("bwk,bwl->bkl", known, rows)
 
@@ -54,9 +53,8 @@ def test_what_is_nothing_is_taken_for_something_as_often_as_chance_does():
     assert 0.4 < chances.mean() < 0.6
     assert _chance(crossed([2.0, 2.0], rng), OWN, OTHER, np.zeros(2)) < 1e-3
     products = crossed([0.2, 0.0], np.random.default_rng(2))
-    nothing = np.zeros(2, dtype=bool)
     expected = ttest_1samp(products[:, 0, -1], 0.0).pvalue
-    assert _chance(products, OWN, nothing, np.zeros(2)) == pytest.approx(expected)
+    assert _chance(products, OWN, np.zeros(2, dtype=bool), np.zeros(2)) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("apart", "result"), [(0.6, [True, True, False]), (0.02, [True, False, False])])
@@ -95,8 +93,7 @@ def test_an_effect_stands_where_any_source_shows_it_and_what_it_holds_where_that
     found, stand = np.array(true) + 0.02, []
     wind = Candidate(CATALOGUE["wind"].exact, {"W_x": found[1], "W_y": found[2]})
     hypothesis = SimpleNamespace(chosen=[wind], places=((wind, slice(1)),), shape_values=found[1:])
-    numbers = SimpleNamespace(linear=found[:1], effects=[()])
-    fit = NamedFit(hypothesis, numbers, np.ones(6), GapSettings())
+    fit = NamedFit(hypothesis, SimpleNamespace(linear=found[:1], effects=[()]), np.ones(6), GapSettings())
     for seed in range(20):
         rng = np.random.default_rng(seed)
         sources = [result(true, found, 1.0 if knows else 0.03, rng), result(true, found, 1.0, rng)]
@@ -139,8 +136,7 @@ def test_runs_that_are_too_short_tell_nothing_of_what_was_before():
 @pytest.mark.parametrize(("across", "more"), [((0.3, 0.4), 0.0025), ((0.3, np.inf), 0.0009), ((np.nan, np.nan), 0.0)])
 def test_a_vehicle_that_leans_against_gusts_may_have_more_thrust(across, more):
     """Of 1 kg at 10 m/s^2: gusts of 0.5 N that are fixed in the world push it down by 0.025 N on the mean."""
-    vehicle = SimpleNamespace(mass_kg=1.0, gravity_m_s2=10.0)
-    flights = [SimpleNamespace(signals=SimpleNamespace(vehicle=vehicle))]
+    flights = [SimpleNamespace(signals=SimpleNamespace(vehicle=SimpleNamespace(mass_kg=1.0, gravity_m_s2=10.0)))]
     numbers = [Estimate(name, "1", 0.2, 0.19, 0.21, (-0.9, 3.0)) for name in ("inertia_x", "thrust_scale")]
     given = NamedFit(SimpleNamespace(flights=flights), Estimates(np.zeros(0), (), tuple(numbers), ()), None, None)
     inertia, thrust = with_lean(given, np.array(across)).estimates.parameters

@@ -115,9 +115,8 @@ def test_momentum_of_an_effect_is_differentiated():
     signals = recording_of_sines(3)
     time = signals.time
     speed = 350 + 20 * np.sin(2 * np.pi * 0.7 * time)[:, None] * [1.0, -1.0, 1.0, -1.0]
-    turning = replace(signals, rotor_speed=speed, stated_torque=None)
     (effect,) = with_effect("rotor_acceleration", 5e-4).effects
-    found = effect.wrench(turning)
+    found = effect.wrench(replace(signals, rotor_speed=speed, stated_torque=None))
     slope = 20 * 2 * np.pi * 0.7 * np.cos(2 * np.pi * 0.7 * time)
     # Spins are + - + -, so all four rotors add up.
     assert found[5:-5, 2] == pytest.approx(-5e-4 * 4 * slope[5:-5], abs=1e-5)

@@ -96,8 +96,7 @@ def test_the_share_is_that_of_an_explicit_cross_validation():
     error = 0.0
     for block in range(BLOCK.max() + 1):
         out = block == BLOCK
-        fitted = np.linalg.lstsq(powers[~out], right[~out], rcond=None)[0]
-        error += ((right[out] - powers[out] @ fitted) ** 2).sum()
+        error += ((right[out] - powers[out] @ np.linalg.lstsq(powers[~out], right[~out], rcond=None)[0]) ** 2).sum()
     found = next(one for one in ranked(residual, state, rng) if (one.channel, one.signal) == ("torque x", "speed"))
     assert found.r2 == pytest.approx(1 - error / (right**2).sum(), abs=1e-5)
 
@@ -116,8 +115,7 @@ def test_a_signal_that_one_flight_lacks_is_judged_on_the_others():
 
 def test_nothing_to_judge_ranks_nothing():
     rng = np.random.default_rng(5)
-    state = state_of(rng)
-    assert ranked(np.zeros((FLIGHTS * LENGTH, 6)), state, rng) == ()
+    assert ranked(np.zeros((FLIGHTS * LENGTH, 6)), state_of(rng), rng) == ()
     assert ranked(residual_of(rng), {"height": np.ones(FLIGHTS * LENGTH)}, rng) == ()
 
 
@@ -125,8 +123,7 @@ def test_shifted_residuals_keep_neighbours_together():
     rng = np.random.default_rng(6)
     line = np.linspace(0, 1, FLIGHTS * LENGTH)[:, None]
     draws = mirror_shifted(line, FLIGHT_INDEX, 20, rng)
-    steps = np.abs(np.diff(draws.reshape(FLIGHTS, LENGTH, 20), axis=1))
-    assert steps.max() < 1.01 * np.diff(line[:, 0]).max()
+    assert np.abs(np.diff(draws.reshape(FLIGHTS, LENGTH, 20), axis=1)).max() < 1.01 * np.diff(line[:, 0]).max()
     np.testing.assert_allclose(draws.reshape(FLIGHTS, LENGTH, 20).mean(axis=1), 0, atol=1e-12)
 
 
@@ -137,10 +134,9 @@ def windowed_flight(**given):
 
 
 def test_a_full_flight_has_every_signal_and_a_bare_one_its_rates():
-    turning = np.column_stack([0.1 * np.ones(1000), np.zeros(1000), 0.9 * TIME])
     full = state_signals(
         *windowed_flight(
-            attitude=turning,
+            attitude=np.column_stack([0.1 * np.ones(1000), np.zeros(1000), 0.9 * TIME]),
             velocity=np.column_stack([3 + 0 * TIME, 4 + 0 * TIME, 0.5 + 0 * TIME]),
             position=np.column_stack([TIME, TIME, 2 * TIME]),
             rotor_speed=np.full((1000, 4), 348.0),
@@ -151,8 +147,7 @@ def test_a_full_flight_has_every_signal_and_a_bare_one_its_rates():
     assert full["vertical speed"] == pytest.approx(0.5)
     assert full["thrust"] == pytest.approx(4 * 121.5e-6 * 348.0**2)
     assert full["height"] == pytest.approx(2 * (full["time"] + TIME[0]))
-    bare = state_signals(*windowed_flight())
-    assert set(bare) == {"time", "body rate x", "body rate y", "body rate z"}
+    assert set(state_signals(*windowed_flight())) == {"time", "body rate x", "body rate y", "body rate z"}
 
 
 def test_a_turn_through_half_a_turn_does_not_average_to_zero():
@@ -175,8 +170,7 @@ def quiet():
 
 def test_a_burst_is_one_stretch_with_its_flight_and_times():
     residual = quiet()
-    swing = 8 * (-1.0) ** np.arange(20)
-    residual[260:280, 2] += swing
+    residual[260:280, 2] += 8 * (-1.0) ** np.arange(20)
     (found,) = stretches(residual, CENTRES, OF_FLIGHT)
     assert (found.flight, found.channel) == (1, "torque z")
     assert found.start_s == pytest.approx(CENTRES[260], abs=3 * HOP)

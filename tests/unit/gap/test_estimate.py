@@ -115,8 +115,7 @@ def test_a_set_alone_is_certain_two_that_predict_alike_are_not_and_even_odds_mul
     # How far blocks differ is not known of one.
     assert likely([np.array([5.0])]) == pytest.approx([0.5, 0.5])
     # Where all blocks say the same their weights do not matter: Bayes' rule remains.
-    odds = np.log([1 / 4, 1 / 19])
-    assert likely([np.full(12, each / 12) for each in odds]) == pytest.approx(
+    assert likely([np.full(12, each / 12) for each in np.log([1 / 4, 1 / 19])]) == pytest.approx(
         [1 / 1.302632, 0.25 / 1.302632, 0.052632 / 1.302632], abs=1e-5
     )
 
@@ -156,8 +155,7 @@ def test_a_damping_beyond_all_bodies_is_refused_and_one_that_is_open_is_not():
     ids=["usual", "storm", "storm not sure", "drag that pushes"],
 )
 def test_wind_is_bounded_by_its_speed_not_by_its_column(drag, wind, error, admissible):
-    linear = np.array([drag, drag * wind, 0.0])
-    keep, found = within_bounds(WIND, linear, np.full(3, error), VEHICLE)
+    keep, found = within_bounds(WIND, np.array([drag, drag * wind, 0.0]), np.full(3, error), VEHICLE)
     assert keep.all()
     assert found == admissible
 
@@ -208,10 +206,9 @@ def test_no_more_than_half_of_any_combination_is_taken_for_noise():
     rows = drawn(5.0)
     assert 0.0 < rows.trusted < 1.0
     columns, _ = rows.root
-    left = np.linalg.eigvals(
+    assert np.linalg.eigvals(
         np.linalg.solve(rows.columns[:, :3].T @ rows.columns[:, :3], (columns.T @ columns)[:3, :3])
-    )
-    assert left.real.min() == pytest.approx(0.5, rel=1e-6)
+    ).real.min() == pytest.approx(0.5, rel=1e-6)
 
 
 def test_about_a_solution_nothing_is_left_to_do():
@@ -224,8 +221,7 @@ def test_a_column_that_shows_nothing_gets_0_and_not_its_rounding():
     rng = np.random.default_rng(1)
     matrix = rng.standard_normal((400, 12)) * 10.0 ** rng.integers(-6, 6, 12)
     matrix[:, [3, 8]] = 0.0
-    found = least_squares(matrix, matrix @ np.ones(12) + rng.standard_normal(400))
-    assert found[[3, 8]].tolist() == [0.0, 0.0]
+    assert least_squares(matrix, matrix @ np.ones(12) + rng.standard_normal(400))[[3, 8]].tolist() == [0.0, 0.0]
 
 
 @pytest.mark.parametrize(("offset", "rivals"), [((0.0, 0.0), ["flapping_moment"]), ((0.01, 0.0), [])])

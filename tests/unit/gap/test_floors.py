@@ -38,8 +38,7 @@ def averages(seconds, draws):
 @pytest.fixture
 def air():
     found = SimpleNamespace(size=np.full(6, SIZE), memory=np.full(6, MEMORY), noise=np.zeros((6, 2)))
-    split = np.arange(6) < 3
-    return Air(found, gusts_only=np.zeros(6, dtype=bool), split=split)
+    return Air(found, gusts_only=np.zeros(6, dtype=bool), split=np.arange(6) < 3)
 
 
 def test_the_floor_of_flights_in_gusts_is_their_size_and_seldom_exceeded_by_others(air):
@@ -50,8 +49,7 @@ def test_the_floor_of_flights_in_gusts_is_their_size_and_seldom_exceeded_by_othe
     np.testing.assert_array_equal(floor[3:], 0.0)
     assert np.isinf(air.noise(WINDOWS)[3:]).all()
     floor = air.floor(flights(1e6), flights(30.0))[0]
-    above = (averages(30.0, 400) ** 2).mean(axis=1) > floor**2
-    assert 0.01 < above.mean() < 0.08
+    assert 0.01 < ((averages(30.0, 400) ** 2).mean(axis=1) > floor**2).mean() < 0.08
     # The shorter the flights, the more one differs from the next.
     assert air.floor(flights(1e6), flights(5.0))[0] > floor > air.floor(flights(1e6), flights(300.0))[0]
 
@@ -69,8 +67,7 @@ def test_of_gusts_and_noise_the_rows_before_leave_innovations_alike_and_independ
     # A channel without gusts keeps its rows.
     white = flight.innovations.of_channels(np.repeat(rows[:, None], 6, axis=1))
     np.testing.assert_array_equal(white[:, 5], rows)
-    spread = np.cov(white[:, 0]) / rows.var()
-    np.testing.assert_allclose(spread, np.eye(count), atol=0.12)
+    np.testing.assert_allclose(np.cov(white[:, 0]) / rows.var(), np.eye(count), atol=0.12)
     assert np.abs(np.cov(rows) / rows.var() - np.eye(count)).max() > 0.8
 
 
@@ -105,8 +102,7 @@ def red(rng, amplitude=0.0):
 
 def test_the_background_is_that_of_the_process_and_does_not_see_a_line():
     on = grid(LENGTHS, 0.2)
-    series = red(np.random.default_rng(0), amplitude=3.0)
-    smooth = background(pooled_power(series, on), on)[0]
+    smooth = background(pooled_power(red(np.random.default_rng(0), amplitude=3.0), on), on)[0]
     # Two flights: half the sum of two squared amplitudes, each exponential, has its median at 0.839.
     exact = 2 * 0.839 / np.abs(1 - 0.8 * np.exp(-2j * np.pi * on.frequency * 0.2)) ** 2
     away = np.log(smooth / exact)[LOWEST:]
@@ -123,8 +119,7 @@ def test_drawn_noise_has_the_background_it_was_drawn_from():
     smooth = 1 / np.abs(1 - 0.8 * np.exp(-2j * np.pi * on.frequency * 0.2))[None] ** 2
     present = np.ones((2, 1), dtype=bool)
     drawn = np.mean([noise_like(smooth, LENGTHS, present, on, rng) for _ in range(200)], axis=0)
-    ratio = (drawn / (2 * smooth))[0, LOWEST:]
-    assert ratio.mean() == pytest.approx(1, abs=0.05)
+    assert (drawn / (2 * smooth))[0, LOWEST:].mean() == pytest.approx(1, abs=0.05)
 
 
 def test_nothing_to_search_finds_nothing():
@@ -170,8 +165,7 @@ def test_variance_is_there_where_the_vehicle_sinks():
     signals = sinking()
     flight = weak(signals)
     variance = scatter_variance(system([flight], [RING]))
-    centre = flight.windows.centres(signals.time)
-    inside = np.interp(centre, signals.time, signals.velocity[:, 2]) < -3
+    inside = np.interp(flight.windows.centres(signals.time), signals.time, signals.velocity[:, 2]) < -3
     assert variance[inside, 0].min() > 0.1
     assert np.median(variance[~inside, 0]) == 0.0
     assert not variance[:, 2:].any()

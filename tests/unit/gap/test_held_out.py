@@ -170,8 +170,7 @@ def result(monkeypatch):
     def numbers(recording):
         load, rough = map(float, recording.name.split())
         values = [*(0.01 * rng.normal(size=4) + [0, 0, load, 0]), *(0.1 * rng.normal(size=3) + rough)]
-        names = [*LOADS, *GUSTS]
-        return flight_of(recording.name, dict(zip(names, values, strict=True)))
+        return flight_of(recording.name, dict(zip([*LOADS, *GUSTS], values, strict=True)))
 
     monkeypatch.setattr(diagnose, "flight_numbers", numbers)
     return lambda *names: diagnose._changed_between(

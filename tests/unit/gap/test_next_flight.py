@@ -73,8 +73,7 @@ def result(asked, *paths):
 def thrusts(path):
     """Thrust of each window of a flight straight up and down, by Newton's law."""
     signals = along(path)
-    through = windows(signals.period, 0.4, 0.5)
-    return through.average(VEHICLE.mass_kg * (9.81 + signals.acceleration[:, 2]))
+    return windows(signals.period, 0.4, 0.5).average(VEHICLE.mass_kg * (9.81 + signals.acceleration[:, 2]))
 
 
 def test_an_offset_is_distinguished_from_a_bias_by_changes_of_thrust_alone():
@@ -213,8 +212,7 @@ def test_in_gusts_the_share_of_right_answers_is_that_of_draws(gust):
 
 def test_neighbouring_windows_share_noise_as_draws_do():
     through = windows(0.01, 0.4, 0.5)
-    noise = np.random.default_rng(4).standard_normal((6000, 200))
-    sums = through.average(noise)
+    sums = through.average(np.random.default_rng(4).standard_normal((6000, 200)))
     single = float((through.weight**2).sum())
     assert sums.sum(axis=0).var() / (len(sums) * single) == pytest.approx(shared_noise(through), rel=0.3)
     assert shared_noise(windows(0.01, 0.4, 0.0)) == 1.0
@@ -378,8 +376,7 @@ def test_noise_of_the_sensors_makes_the_floors():
         for size in (0.3, 0.6)
     )
     # White noise of 0.3 m/s^2 on 6 kg, averaged over a window.
-    through = windows(0.01, 0.4, 0.5)
-    expected = 0.3 * VEHICLE.mass_kg * np.sqrt((through.weight**2).sum())
+    expected = 0.3 * VEHICLE.mass_kg * np.sqrt((windows(0.01, 0.4, 0.5).weight ** 2).sum())
     np.testing.assert_allclose(quiet[3:], expected, rtol=0.35)
     np.testing.assert_allclose(loud[3:] / quiet[3:], 2.0, rtol=0.15)
 

@@ -58,8 +58,7 @@ def test_what_to_log_is_what_the_log_lacks():
 
 
 def test_hover_shows_a_bias_but_not_the_motion_that_is_missing():
-    still = fly(1, tilt=1e-4, yaw=1e-4, speed=1e-3)
-    found = reasons([still])
+    found = reasons([fly(1, tilt=1e-4, yaw=1e-4, speed=1e-3)])
     for hidden in ("linear_damping", "quadratic_damping", "products_of_inertia", "rotor_drag", "rotor_gyroscopic"):
         assert found[hidden].startswith("it would not show; ")
     assert "torque_bias" not in found
@@ -74,8 +73,7 @@ def test_what_is_chosen_is_not_unseen_and_more_noise_hides_more():
 
 
 def test_damping_drains_its_opposite_feeds_and_what_is_constant_or_noise_does_neither():
-    noise = RNG.normal(size=(400, 3))
-    torque = np.column_stack([-0.5 * RATE[:, 0], 0.5 * RATE[:, 1], np.zeros(400)]) + noise
+    torque = np.column_stack([-0.5 * RATE[:, 0], 0.5 * RATE[:, 1], np.zeros(400)]) + RNG.normal(size=(400, 3))
     assert energy_directions(torque, RATE, BLOCK) == ["drains", "feeds", "neither"]
     assert energy_directions(np.ones((400, 3)), RATE + 1, BLOCK) == ["neither"] * 3
     assert energy_directions(-RATE, RATE, BLOCK // 4) == ["neither"] * 3
@@ -90,8 +88,7 @@ def carried(size, share, highest_hz):
     acceleration, _, _ = sines(time, [size, size, 0.5 * size], 0.2, highest_hz, rng)
     felt = acceleration + np.array([0.0, 0.0, 9.81])
     length = np.linalg.norm(felt, axis=1)
-    angles = -np.arcsin(felt[:, 1] / length), np.arctan2(felt[:, 0], felt[:, 2]), 0.0 * time
-    attitude = np.stack(angles, axis=1)
+    attitude = np.stack((-np.arcsin(felt[:, 1] / length), np.arctan2(felt[:, 0], felt[:, 2]), 0.0 * time), axis=1)
     noise = rng.standard_normal((2, *acceleration.shape))
     speed = np.sqrt((1 + share) * VEHICLE.mass_kg * length / sum(r.thrust_factor_n_s2 for r in VEHICLE.rotors))
     return Signals(
@@ -120,8 +117,7 @@ def test_a_load_that_hardly_swings_is_a_double_of_too_little_thrust(size, share,
     found, wrong = with_wrong_thrust(carried(size, share, highest_hz))
     assert wrong.numbers[0].value == pytest.approx(1 / (1 + share) - 1, abs=0.003)
     assert [each.name for each in not_separated(found, wrong)] == rivals
-    ignoring = found._replace(settings=GapSettings(ignore=("payload",)))
-    assert list(not_separated(ignoring, wrong)) == []
+    assert list(not_separated(found._replace(settings=GapSettings(ignore=("payload",))), wrong)) == []
 
 
 def test_a_flight_of_one_block_shows_no_error_and_beats_no_rival():

@@ -132,8 +132,7 @@ def test_stretches_are_played_apart():
     assert [part.stop - part.start for part in flight.stretches] == [120, 150]
     found = replay([Played(flight, player, player)], 30, 5)
     whole, _ = played_back(model, signals)
-    rates = mean_errors(found, "body_rate").sum(axis=1)
-    assert rates[0] < 2 * whole["body_rate"][0]
+    assert mean_errors(found, "body_rate").sum(axis=1)[0] < 2 * whole["body_rate"][0]
 
 
 class Repairing(NamedTuple):
@@ -146,8 +145,7 @@ class Repairing(NamedTuple):
 def test_before_and_after_are_those_of_each_model_alone():
     signals = signals_of(flown(effects={"linear_damping": {"d_x": 0.3, "d_y": 0.3, "d_z": 0.2}}))
     model, given = model_of({"linear_damping": {"d_x": 0.3, "d_y": 0.3, "d_z": 0.2}}), model_of({})
-    pairs = played_pairs([replace(signals, name="flight")], model, given)
-    found = errors_by_horizon(pairs, 0.3)
+    found = errors_by_horizon(played_pairs([replace(signals, name="flight")], model, given), 0.3)
     after, before = (played_back(each, signals)[0] for each in (model, given))
     for name in found.models[MODEL].signals:
         sums = mean_errors(found, name).sum(axis=1)
@@ -160,8 +158,7 @@ def test_before_and_after_are_those_of_each_model_alone():
 def test_the_model_as_given_takes_the_log_with_its_faults():
     exact = signals_of(flown())
     faulty = replace(exact, body_rate=exact.body_rate + BIAS)
-    model = replace(model_of({}), repairs=Repairing())
-    pairs = played_pairs([replace(faulty, name="flight")], model, model_of({}))
+    pairs = played_pairs([replace(faulty, name="flight")], replace(model_of({}), repairs=Repairing()), model_of({}))
     after, _, _, before = mean_errors(errors_by_horizon(pairs, 0.3), "attitude")[:, -1]
     assert before == pytest.approx(np.linalg.norm(BIAS) * 0.3, rel=0.2)
     assert after < 0.02 * before

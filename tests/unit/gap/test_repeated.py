@@ -90,10 +90,8 @@ def test_each_band_holds_what_its_windows_see(of_two_paths, band):
 def test_the_noise_of_the_gyroscope_is_distinguished():
     """Runs without anything else: what does not come again is what white noise leaves of it."""
     runs = [run(0, draw) for draw in range(2)]
-    still = [sines(1000 + draw, OWN)[0] + missing(0) for draw in range(2)]
-    pairs = zip(runs, still, strict=True)
-    exact = [replace(each, stated_torque=each.stated_torque + own) for each, own in pairs]
-    found = split(exact)
+    pairs = zip(runs, [sines(1000 + draw, OWN)[0] + missing(0) for draw in range(2)], strict=True)
+    found = split([replace(each, stated_torque=each.stated_torque + own) for each, own in pairs])
     assert found.noise[:3, 0] == pytest.approx(found.total[:3, 0], rel=0.2)
     slope = band_windows(0.01, 0.15, None).slope
     assert found.noise[:3, 0] == pytest.approx((INERTIA * NOISE) ** 2 * (slope**2).sum(), rel=0.1)
@@ -104,8 +102,7 @@ def test_what_is_explained_is_the_share_of_the_motion():
     rate, slope = sines(0, 0.3)
     lacks = 0.1 * (INERTIA * slope + np.cross(rate, INERTIA * rate))
     runs = [run(0, draw, lacks=0.0) for draw in range(4)]
-    weak = [replace(r, stated_torque=r.stated_torque - lacks) for r in runs]
-    found = split(weak)
+    found = split([replace(r, stated_torque=r.stated_torque - lacks) for r in runs])
     known = found.explained_error[:3] < 0.05
     assert known.sum() >= 6
     assert found.explained[:3][known] == pytest.approx(0.9, abs=0.1)

@@ -133,8 +133,7 @@ def refused(raised, after, monkeypatch, beyond=None):
     floors = np.full(6, after)
     held_out = SimpleNamespace(after=None, size=lambda _: SimpleNamespace(floors=floors))
     monkeypatch.setattr(unseen, "on_bound", lambda _found: beyond)
-    found = SimpleNamespace(hypothesis=SimpleNamespace(chosen=chosen))
-    judgement = SimpleNamespace(found=found, held_out=held_out)
+    judgement = SimpleNamespace(found=SimpleNamespace(hypothesis=SimpleNamespace(chosen=chosen)), held_out=held_out)
     without = {
         name: Without(channel(*value), NOTHING, np.sqrt(np.maximum(floors**2 + channel(*value), 0.0)))
         for name, value in raised.items()

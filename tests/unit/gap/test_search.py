@@ -46,10 +46,7 @@ OTHER = hand_made("other", (2.9, 0))
 
 @pytest.fixture(scope="module")
 def step():
-    known = []
-    for seed in (1, 2):
-        signals = fly(seed, [(Candidate(SPECIAL, {}), [0.3])], gyro=0.003, rotor=0.5)
-        known.append(weak(signals))
+    known = [weak(fly(seed, [(Candidate(SPECIAL, {}), [0.3])], gyro=0.003, rotor=0.5)) for seed in (1, 2)]
     return rank_effects(known, (), [SPECIAL, TWIN, GENERAL, OTHER], SETTINGS, None)
 
 
@@ -58,8 +55,7 @@ def of(step, name):
 
 
 def rivals(step, own):
-    found = alternatives(of(step, own), step.ranking, step.above_floor, SETTINGS)
-    return {each.name: each for each in found}
+    return {each.name: each for each in alternatives(of(step, own), step.ranking, step.above_floor, SETTINGS)}
 
 
 def test_a_column_that_is_the_same_is_an_alternative_and_a_superset_is_none(step):
@@ -84,8 +80,7 @@ def test_the_fewest_numbers_win_among_equals(step):
 
 
 def with_errors(name, gain, errors):
-    effect = hand_made(name, (1.3, 0))
-    return Scored((Candidate(effect, {}),), gain, np.asarray(errors, dtype=float), np.ones(1))
+    return Scored((Candidate(hand_made(name, (1.3, 0)), {}),), gain, np.asarray(errors, dtype=float), np.ones(1))
 
 
 BLOCKS = 12
@@ -236,8 +231,7 @@ def test_of_equally_sure_ones_the_first_is_chosen(rounded):
 @pytest.mark.parametrize("rounded", [*permutations(ROUNDED)])
 def test_of_those_that_replace_each_other_the_first_of_the_catalogue_is_chosen(rounded):
     # The second and the third do without each other, the first is less sure.
-    both = [NAMES[1:], NAMES[:0:-1]]
-    assert chosen(both, tried(1e-5 * np.array(rounded) * [10, 1, 1])) == (NAMES[1], [NAMES[2]])
+    assert chosen([NAMES[1:], NAMES[:0:-1]], tried(1e-5 * np.array(rounded) * [10, 1, 1])) == (NAMES[1], [NAMES[2]])
 
 
 def test_what_another_one_replaces_is_not_chosen():

@@ -48,8 +48,7 @@ AVERAGED = windows(0.005, 0.4, 0.5)
 
 def test_nothing_is_left_of_a_flight_without_an_effect():
     flight = weak(fly(0), force=True)
-    left = flight.averaged(flight.residual(flight.signals))
-    np.testing.assert_allclose(left, 0.0, atol=2e-5)
+    np.testing.assert_allclose(flight.averaged(flight.residual(flight.signals)), 0.0, atol=2e-5)
     assert np.abs(flight.averaged(flight.inertial)).max() > 1
 
 
@@ -113,8 +112,7 @@ def test_actuators_that_lack_their_signals_leave_a_flight_alone():
     lag, delay = candidate("motor_lag", time_constant_s=0.05), candidate("channel_delay", delay_s=0.02)
     assert actuated(signals, [lag, candidate("battery_sag", exponent=2.0)]) is signals
     assert actuated(signals, [candidate("rotor_drag")]) is signals
-    moved = actuated(signals, [delay, lag])
-    np.testing.assert_allclose(moved.speed[2:], signals.speed[:-2])
+    np.testing.assert_allclose(actuated(signals, [delay, lag]).speed[2:], signals.speed[:-2])
     commanded = replace(signals, commanded=True)
     assert actuated(commanded, [lag]) is not commanded
 
@@ -147,8 +145,7 @@ def test_an_effect_of_unit_coefficient_is_subtracted_and_a_free_one_becomes_colu
 def test_momentum_is_never_differentiated(noise):
     """Noise of a gyroscope of white samples would give 0.6 * 0.01 / 0.01 = 0.6 N m if it were."""
     flight = weak(fly(7, gyro=noise))
-    left = flight.averaged(flight.residual(flight.signals))[:, :3]
-    assert left.std() < 0.05
+    assert flight.averaged(flight.residual(flight.signals))[:, :3].std() < 0.05
 
 
 def averaged(balance):
@@ -167,8 +164,7 @@ class Patterned:
     """A positive definite J(q) that belongs to no body: constants plus waves along each angle."""
 
     def __init__(self):
-        rng = np.random.default_rng(2)
-        self.waves = [0.05 * (wave + wave.T) for wave in rng.standard_normal((3, 3, 3))]
+        self.waves = [0.05 * (wave + wave.T) for wave in np.random.default_rng(2).standard_normal((3, 3, 3))]
 
     def inertia(self, attitude):
         value = np.tile(TENSOR, (len(attitude), 1, 1))

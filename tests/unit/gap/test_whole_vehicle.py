@@ -180,15 +180,13 @@ def test_flights_are_compared_with_the_numbers_of_a_vehicle_that_was_found_witho
     flown = signals()
     found = replace(QUAD, rotors=tuple(replace(each, thrust_factor_n_s2=1e-5) for each in QUAD.rotors))
     (given,) = with_known_wrench([replace(flown, name="flight")], VehicleModel(vehicle=found))
-    expected = 1e-5 * (flown.rotor_speed**2).sum(axis=1)
-    np.testing.assert_allclose(given.wrench[:, 5], expected)
+    np.testing.assert_allclose(given.wrench[:, 5], 1e-5 * (flown.rotor_speed**2).sum(axis=1))
     (same,) = with_known_wrench([flown], VehicleModel(vehicle=QUAD))
     assert same is flown
 
 
 def test_what_one_model_knew_is_no_part_of_what_the_next_one_does():
-    drag = ModelEffect("rotor_drag", {}, np.array([1e-4]))
-    model = VehicleModel(vehicle=QUAD, effects=(drag,))
+    model = VehicleModel(vehicle=QUAD, effects=(ModelEffect("rotor_drag", {}, np.array([1e-4])),))
     stronger = replace(model, vehicle=with_factors(QUAD, 1.2, 1.1))
     once = with_known_wrench([replace(signals(), name="flight")], stronger)
     again = with_known_wrench(with_known_wrench([replace(signals(), name="flight")], model), stronger)

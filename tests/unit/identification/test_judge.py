@@ -150,9 +150,7 @@ def score(data, predicted):
 
 
 def test_by_hand():
-    data = still_flight([[1, 0, 2], [3, 0, 2], [5, 0, 2]])
-    predicted = np.array([[1, 1, 2], [2, 0, 2], [7, 0, 1]])
-    judged = score(data, predicted)
+    judged = score(still_flight([[1, 0, 2], [3, 0, 2], [5, 0, 2]]), np.array([[1, 1, 2], [2, 0, 2], [7, 0, 1]]))
     np.testing.assert_allclose(judged.mse, [5 / 3, 1 / 3, 1 / 3])
     np.testing.assert_allclose(judged.max_error, [2, 1, 1])
     np.testing.assert_allclose(judged.relative_error, [2 / 5, np.nan, 1 / 2])
@@ -400,8 +398,7 @@ def test_a_structure_that_fails_on_a_good_flight_is_not_blamed_on_the_log():
 def test_noise_near_a_vertical_pitch_does_not_make_an_axis_badly_explained():
     data = rotations()
     noise = 0.02 * np.random.default_rng(6).standard_normal(data.torque.shape)
-    evidence = axis_evidence(with_torque(data, data.torque + noise), 1e-10)
-    assert np.all(evidence.r2 > 0.99)
+    assert np.all(axis_evidence(with_torque(data, data.torque + noise), 1e-10).r2 > 0.99)
 
 
 def test_constant_and_inertial_torque_are_distinguished():

@@ -215,8 +215,7 @@ def test_workers_are_sent_the_same_whether_or_not_samples_were_made_ready():
     assert pickle.dumps(ready) == before
     (again,) = pickle.loads(before)
     np.testing.assert_array_equal(again[1], kept[0][1])
-    attitude = flight_of_noise().motion.attitude
-    samples = Samples.of(ready, STRUCTURE, data_ranges(STRUCTURE, attitude))
+    samples = Samples.of(ready, STRUCTURE, data_ranges(STRUCTURE, flight_of_noise().motion.attitude))
     before, partitions = pickle.dumps(samples), uniform_breakpoints(STRUCTURE)
     square = samples.products(partitions).square
     assert (pickle.dumps(samples), pickle.loads(before).products(partitions).square) == (before, square)
@@ -261,8 +260,7 @@ def evaluator(source, base, **changed):
 def evaluated(source, base):
     """Objectives of some chromosomes, unrefined."""
     evaluate = evaluator(source, base, local_search=LocalSearchSettings(enabled=False))
-    genes = np.random.default_rng(41).integers(1, 65536, (6, evaluate.structure.genes))
-    return evaluate(genes).objectives
+    return evaluate(np.random.default_rng(41).integers(1, 65536, (6, evaluate.structure.genes))).objectives
 
 
 def identified(source, base, held_out):
@@ -371,8 +369,7 @@ def test_final_model_is_that_of_all_rows_at_once(monkeypatch, case, block):
         # The others carry what the cross-validation found.
         assert exact.mean_squared_error == pytest.approx(np.mean((y - A @ expected) ** 2), rel=1e-9)
     divided = A / np.append(np.ones(rigid), fit.column_size[:held])
-    singular_values = np.linalg.svd(divided, compute_uv=False)
-    np.testing.assert_allclose(unpenalised.singular_values, singular_values, rtol=1e-9)
+    np.testing.assert_allclose(unpenalised.singular_values, np.linalg.svd(divided, compute_uv=False), rtol=1e-9)
 
 
 @pytest.mark.parametrize("chunk", CHUNKS)

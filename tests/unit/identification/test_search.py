@@ -61,8 +61,7 @@ def assert_same(one, other):
 
 def states():
     kept = []
-    whole = searched(on_generation=lambda state: kept.append(copy.deepcopy(state)))
-    return whole, kept
+    return searched(on_generation=lambda state: kept.append(copy.deepcopy(state))), kept
 
 
 def test_continued_from_any_generation_it_ends_as_if_it_had_not_stopped():
@@ -218,8 +217,7 @@ def one_by_one(weights):
         return np.zeros(1), np.zeros((0, 0))
     ends = np.concatenate([[0.0], np.cumsum(weights) / np.sum(weights)])
     ends[-1] = 1.0
-    counted = np.tri(max(len(weights) - 1, 0), len(weights))
-    return ends, (counted - ends[1:-1, None]) / np.sum(weights)
+    return ends, (np.tri(max(len(weights) - 1, 0), len(weights)) - ends[1:-1, None]) / np.sum(weights)
 
 
 @pytest.mark.parametrize("functions", [1, 2, 5, 9, 15, (1, 2, 3, 4, 15, 2), (15, 14, 9, 2, 9, 3)])
@@ -271,11 +269,10 @@ def nearly_rigid_flight(samples=100, noise=0.02, seed=22, limit=np.pi):
 
 def identified(settings, data=None, progress=None, seed=1):
     data = nearly_rigid_flight() if data is None else data
-    held_out = {"held out": nearly_rigid_flight(seed=23)}
     return identify(
         data,
         data,
-        held_out,
+        {"held out": nearly_rigid_flight(seed=23)},
         IdentificationSettings(**settings),
         np.random.default_rng(seed),
         SearchRun(progress=progress or (lambda _: None)),
@@ -290,8 +287,7 @@ def test_result_hangs_together(base):
     assert np.isfinite(found.history.best).all()
     assert np.all(np.diff(found.history.best, axis=0) <= 0)
     assert len(calls) == found.history.evaluations[-1]
-    done = [step.generation + step.share for step in calls]
-    assert np.all(np.diff(done) > 0)
+    assert np.all(np.diff([step.generation + step.share for step in calls]) > 0)
     assert {step.generations for step in calls} == {2}
     for step in calls:
         if step.generation > 0:
@@ -329,8 +325,7 @@ def test_model_learned_from_a_selection_is_judged_on_all_of_training():
     settings = IdentificationSettings(**{**SMALL, "base": "rigid-body"})
     found = identify(data, data[selected], {}, settings, np.random.default_rng(0))
     assert dict(found.samples) == {"training": 100}
-    inertia = np.linalg.norm(found.fit.rigid_body - [0.6, 0.7, 1.2, 0, 0, 0])
-    assert inertia < 0.05
+    assert np.linalg.norm(found.fit.rigid_body - [0.6, 0.7, 1.2, 0, 0, 0]) < 0.05
 
 
 def test_objectives_are_judged_on_all_of_training():
@@ -345,8 +340,7 @@ def test_objectives_are_judged_on_all_of_training():
 
 
 def test_search_that_starts_with_the_uniform_partitions_is_never_worse():
-    settings = {**SEARCHED, "base": "none", "choice": "mse", "start": "with-uniform"}
-    training = identified(settings).scores["training"]
+    training = identified({**SEARCHED, "base": "none", "choice": "mse", "start": "with-uniform"}).scores["training"]
     assert training["model"].mse.sum() <= training["uniform-partitions"].mse.sum()
     assert "uniform-partitions" not in identified({**SMALL, "membership_functions": 1}).scores["training"]
 
@@ -379,7 +373,6 @@ def test_nothing_is_identified_from_a_torque_of_zero_or_a_vehicle_that_never_tur
 
 
 def test_rules_without_excitation_and_rank_are_reported():
-    small_angles = nearly_rigid_flight(limit=0.2)
-    found = identified({**SEARCHED, "base": "none", "membership_functions": 5}, small_angles)
+    found = identified({**SEARCHED, "base": "none", "membership_functions": 5}, nearly_rigid_flight(limit=0.2))
     assert any(finding.startswith("rank ") for finding in found.findings)
     assert any("rules not excited" in finding and "D22 rule" in finding for finding in found.findings)

@@ -27,15 +27,7 @@ from tests.builders.blackbox_logs import (
     unsigned,
 )
 
-
-@pytest.fixture
-def read(tmp_path):
-    def call(content):
-        path = tmp_path / "LOG00001.TXT"
-        path.write_bytes(content)
-        return log_contents(path)
-
-    return call
+NAME = "LOG00001.TXT"
 
 
 FACTORS = {"gyroADC[0]": 1.0, "accSmooth[2]": 1 / 2048, "vbatLatest": 0.01, "eRPM[0]": 200 / 14}
@@ -63,8 +55,7 @@ def test_every_encoding_and_prediction_comes_back(read, seed):
 def test_frames_are_as_long_as_their_fields_are_many(read):
     names = ",".join(["loopIteration", "time", *(f"debug[{number}]" for number in range(300))])
     ways = {f"Field {kind} {what}": ",".join(["0"] * 302) for kind in "IP" for what in ("predictor", "encoding")}
-    signs = ",".join(["1"] * 302)
-    content = header(**{"Field I name": names, "Field I signed": signs, **ways})
+    content = header(**{"Field I name": names, "Field I signed": ",".join(["1"] * 302), **ways})
     for row in range(20):
         content += b"I" + b"".join(signed(value) for value in (row, 1000 * row, *range(1000, 1300)))
     contents = read(content + END)
@@ -186,8 +177,7 @@ def test_a_jump_in_time_is_a_broken_frame_unless_the_recorder_paused(read):
     contents = read(header() + b"".join(parts))
     held(contents, np.delete(rows, range(32, 40), axis=0))
     assert contents.warnings == ("1 frames are broken; everything up to the next whole frame is missing",)
-    paused = read(header() + b"".join([*parts[:32], RESUMED, *parts[32:]]))
-    held(paused, rows)
+    held(read(header() + b"".join([*parts[:32], RESUMED, *parts[32:]])), rows)
 
 
 def test_a_log_that_was_cut_off_is_read_up_to_there(read):
@@ -289,9 +279,7 @@ def test_what_the_log_viewer_exports_is_read_as_the_log(read, tmp_path):
     text += ",".join(f'"{name}"' for name in (*NAMES, "flightModeFlags", "heading[0]")) + "\n"
     for number, row in enumerate(rows.tolist()):
         text += ",".join(map(str, [*row, "NaN" if number < 3 else 1, 0.25])) + "\n"
-    path = tmp_path / "log.bbl.csv"
-    path.write_text(text)
-    exported = log_contents(path)
+    exported = read(text, "log.bbl.csv")
     for name, values in log.topics[""].items():
         np.testing.assert_allclose(exported.topics[""][name], values, rtol=1e-6, atol=1e-9, err_msg=name)
     assert exported.topics[""]["flightModeFlags"].tolist() == [1.0] * len(rows)
@@ -325,17 +313,14 @@ def test_an_export_that_is_broken_is_refused(tmp_path, line, names, what):
         log_contents(tmp_path / "log.csv")
 
 
-def test_what_an_export_never_knows_is_no_column(tmp_path):
+def test_what_an_export_never_knows_is_no_column(read):
     rows = "".join(f"{row},{1000 * row},{row % 3},NaN\n" for row in range(40))
     text = f'"Product","{PRODUCT}"\n"acc_1G",2048\nloopIteration,time,motor[0],flightModeFlags\n{rows}'
-    (tmp_path / "log.csv").write_text(text)
-    assert log_contents(tmp_path / "log.csv").topics[""].keys() == {"time", "motor[0]"}
+    assert read(text, "log.csv").topics[""].keys() == {"time", "motor[0]"}
 
 
-def test_rows_that_an_export_holds_twice_are_said_and_nothing_is_called_missing(tmp_path):
+def test_rows_that_an_export_holds_twice_are_said_and_nothing_is_called_missing(read):
     rows = "".join((1 + (row % 10 == 0)) * f"{row},{1000 * row},{row % 3}\n" for row in range(40))
-    text = f'"Product","{PRODUCT}"\n"acc_1G",2048\nloopIteration,time,motor[0]\n{rows}'
-    (tmp_path / "log.csv").write_text(text)
-    contents = log_contents(tmp_path / "log.csv")
+    contents = read(f'"Product","{PRODUCT}"\n"acc_1G",2048\nloopIteration,time,motor[0]\n{rows}', "log.csv")
     assert contents.topics[""]["motor[0]"].tolist() == [float(row % 3) for row in range(40)]
     assert contents.warnings == ("4 rows repeat the stamp of the one before: the first of each is used",)

@@ -4,6 +4,7 @@ import pytest
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.logs.formats import log_contents
+from tests.builders.studies import put_file
 from tests.builders.usd_logs import text, usd
 
 VARIABLES = {"gyro.x": "f", "motor.m1": "H", "acc.z": "e", "pm.state": "b"}
@@ -18,14 +19,7 @@ def log(version=2, whole=True):
     return usd({"fixedFrequency": VARIABLES, "tick": {}}, SAMPLES, version, whole)
 
 
-@pytest.fixture
-def read(tmp_path):
-    def call(content):
-        path = tmp_path / "log00"
-        path.write_bytes(content)
-        return log_contents(path)
-
-    return call
+NAME = "log00"
 
 
 @pytest.mark.parametrize(("version", "step"), [(1, 2.0), (2, 0.002)])
@@ -60,8 +54,7 @@ def test_a_check_sum_that_is_wrong_is_warned_of_and_what_is_whole_is_read(read, 
 
 def test_an_older_card_is_named_and_not_read(tmp_path):
     """A count of names, the names with their types, the samples."""
-    path = tmp_path / "cf50_04"
-    path.write_bytes(b"#tick(I),stateEstimateZ.x(h),stateEstimateZ.quat(I),*P\x0e")
+    path = put_file(tmp_path / "cf50_04", b"#tick(I),stateEstimateZ.x(h),stateEstimateZ.quat(I),*P\x0e")
     with pytest.raises(InputError, match="cf50_04: a log of a Crazyflie's uSD card in its older format, which is not"):
         log_contents(path)
 

@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-import scipy.io
 
 from cpfls_cli.errors import InputError
-from cpfls_cli.logs.formats import log_contents
 from tests.builders.dataflash_logs import HEAD, dataflash
 
 KINDS = {
@@ -32,14 +30,7 @@ def log(rows=ROWS, units=UNITS, said=("ArduCopter V4.5.7 (2a3dc4b7)",), *, text=
     return dataflash(KINDS, rows, PARAMETERS, said, units, text=text)
 
 
-@pytest.fixture
-def read(tmp_path):
-    def call(content):
-        path = tmp_path / "log.bin"
-        path.write_bytes(content)
-        return log_contents(path)
-
-    return call
+NAME = "log.bin"
 
 
 def test_messages_become_topics_and_instances_topics_of_their_own(read):
@@ -73,8 +64,7 @@ def test_what_the_log_says_of_units_parameters_and_program(read):
 
 
 def test_a_parameter_that_is_changed_in_flight_counts_as_it_was_at_the_beginning(read):
-    rows = [*ROWS, ("PARM", (9_000_000, b"FRAME_CLASS", 7.0))]
-    assert read(log(rows)).parameters == PARAMETERS
+    assert read(log([*ROWS, ("PARM", (9_000_000, b"FRAME_CLASS", 7.0))])).parameters == PARAMETERS
 
 
 def test_a_log_that_was_cut_off_is_read_up_to_there(read):
@@ -214,7 +204,7 @@ def messages_of(contents):
 
 
 @pytest.mark.parametrize("form", ["structures", "matrices"])
-def test_messages_that_a_ground_station_made_variables_of_matlab_are_those_of_the_log(read, tmp_path, form):
+def test_messages_that_a_ground_station_made_variables_of_matlab_are_those_of_the_log(read, form):
     kinds = {"IMU": ("QBff", "TimeUS,I,GyrX,AccX"), "ATT": ("Qcc", "TimeUS,Roll,Yaw"), "RCOU": ("QHH", "TimeUS,C1,C2")}
     own = {
         "IMU": [(5_000_000 + 1000 * row, row % 2, 0.5 * row, 9.5) for row in range(6)],
@@ -248,9 +238,7 @@ def test_messages_that_a_ground_station_made_variables_of_matlab_are_those_of_th
             "Value": np.array([1.0, 3.0]),
         }
         data["MSG"] = {"TimeUS": 1, "Message": "ArduCopter V4.5.7"}
-    path = tmp_path / "log.mat"
-    scipy.io.savemat(path, data)
-    exported = log_contents(path)
+    exported = read(data, "log.mat")
     held = {
         key: values
         for key, values in messages_of(log).items()
@@ -267,18 +255,16 @@ def test_messages_that_a_ground_station_made_variables_of_matlab_are_those_of_th
 
 
 @pytest.mark.parametrize("form", ["structures", "matrices"])
-def test_an_integral_is_no_number_of_an_instance(tmp_path, form):
+def test_an_integral_is_no_number_of_an_instance(read, form):
     own = {"TimeUS": 1e6 + 1e4 * np.arange(40.0), "I": 3 * np.sin(0.3 * np.arange(40.0))}
     named = {"ATT": own | {"Roll": np.arange(40.0)}, "PIDR": own}
     matrices = {name: np.column_stack([*fields.values()]) for name, fields in named.items()}
     labels = {f"{name}_label": np.array([*fields], dtype=object) for name, fields in named.items()}
-    scipy.io.savemat(tmp_path / "log.mat", named if form == "structures" else matrices | labels)
-    topics = log_contents(tmp_path / "log.mat").topics
+    topics = read(named if form == "structures" else matrices | labels, "log.mat").topics
     assert topics.keys() == named.keys()
     assert topics["PIDR"]["I"] == pytest.approx(own["I"])
 
 
 @pytest.mark.parametrize("stamps", ["abc", np.empty(0), np.array([1.0, np.nan, 3.0]), np.ones((3, 3))])
-def test_what_has_no_stamps_is_no_message(tmp_path, stamps):
-    scipy.io.savemat(tmp_path / "log.mat", {"ATT": {"TimeUS": stamps, "Roll": np.ones(3)}})
-    assert "ATT/Roll" in log_contents(tmp_path / "log.mat").topics[""]
+def test_what_has_no_stamps_is_no_message(read, stamps):
+    assert "ATT/Roll" in read({"ATT": {"TimeUS": stamps, "Roll": np.ones(3)}}, "log.mat").topics[""]

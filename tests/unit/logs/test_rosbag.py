@@ -15,8 +15,7 @@ KINDS = (".db3", ".mcap")
 
 
 def sent(count=20):
-    text = STORE.types["std_msgs/msg/String"]
-    messages = [("/note", BEGIN_NS, text("hello"))]
+    messages = [("/note", BEGIN_NS, STORE.types["std_msgs/msg/String"]("hello"))]
     for number in range(count):
         now = BEGIN_NS + 10 * number * MILLISECOND
         messages.append(("/imu/data", now, imu(now - LATE, (number, 1.0, 2.0), (0.0, 0.0, 9.81))))

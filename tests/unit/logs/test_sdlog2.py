@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP
-from cpfls_cli.logs.formats import log_contents
 from tests.builders.dataflash_logs import definition, message
 
+NAME = "log.px4log"
 KINDS = {
     "TIME": ("Q", "StartTime"),
     "ATT": ("fffffff", "qw,qx,qy,qz,Roll,Pitch,Yaw"),
@@ -45,14 +45,13 @@ ANGLES = np.random.default_rng(0).uniform(-1.2, 1.2, (20, 3))
 
 
 @pytest.mark.parametrize("name", ["log.px4log", "log001.bin", "log"])
-def test_messages_have_the_time_before_them_and_the_names_of_ulog(tmp_path, name):
-    (tmp_path / name).write_bytes(sdlog2(flight(ANGLES)))
-    contents = log_contents(tmp_path / name)
+def test_messages_have_the_time_before_them_and_the_names_of_ulog(read, name):
+    contents = read(sdlog2(flight(ANGLES)), name)
     topics = contents.topics
     attitude, clock = topics["vehicle_attitude"], 0.02 * np.arange(20)
     np.testing.assert_allclose(attitude[STAMP], clock, atol=1e-9)
-    read = Rotation.from_quat(np.column_stack([attitude[f"q[{each}]"] for each in (1, 2, 3, 0)]))
-    assert (read.inv() * Rotation.from_euler("ZYX", ANGLES[:, ::-1])).magnitude().max() < 1e-6
+    turned = Rotation.from_quat(np.column_stack([attitude[f"q[{each}]"] for each in (1, 2, 3, 0)]))
+    assert (turned.inv() * Rotation.from_euler("ZYX", ANGLES[:, ::-1])).magnitude().max() < 1e-6
     np.testing.assert_allclose(topics["sensor_combined"]["gyro_rad[2]"], 3.0)
     np.testing.assert_allclose(topics["sensor_combined"]["accelerometer_m_s2[1]"], ANGLES[:, 1], rtol=1e-6)
     np.testing.assert_allclose(topics["actuator_outputs"][STAMP], clock[::2], atol=1e-9)
@@ -66,27 +65,24 @@ def test_messages_have_the_time_before_them_and_the_names_of_ulog(tmp_path, name
     assert contents.begins == {"": 7.0}
 
 
-def test_a_kind_that_is_described_again_and_never_written_changes_nothing(tmp_path):
+def test_a_kind_that_is_described_again_and_never_written_changes_nothing(read):
     again = b"".join(definition(60 + place, name, *KINDS[name]) for place, name in enumerate(("ATT", "TIME")))
-    (tmp_path / "log.px4log").write_bytes(sdlog2(flight(ANGLES)) + again)
-    assert len(log_contents(tmp_path / "log.px4log").topics["vehicle_attitude"][STAMP]) == 20
+    assert len(read(sdlog2(flight(ANGLES)) + again).topics["vehicle_attitude"][STAMP]) == 20
 
 
-def test_without_an_attitude_it_is_said_what_the_file_is(tmp_path):
-    (tmp_path / "log.px4log").write_bytes(sdlog2([("TIME", (5,)), ("GPS", (5, 3))]))
+def test_without_an_attitude_it_is_said_what_the_file_is(read):
     with pytest.raises(InputError, match=r"before ULog \(sdlog2\), without the attitude"):
-        log_contents(tmp_path / "log.px4log")
+        read(sdlog2([("TIME", (5,)), ("GPS", (5, 3))]))
 
 
 @pytest.mark.parametrize(
     "kinds", [{"PARM": ("Nn", "Name,Value")}, {"IMU": ("nnnnnn", KINDS["IMU"][1])}, {"TIME": ("Q", "StartTime")}]
 )
-def test_what_a_damaged_log_describes_otherwise_is_left_out(tmp_path, kinds):
+def test_what_a_damaged_log_describes_otherwise_is_left_out(read, kinds):
     rows = [(name, own) for name, own in flight(ANGLES) if name not in kinds or name == "TIME"]
     texts = {"PARM": (b"PWM_MIN", b"1100"), "IMU": [b"1"] * 6, "TIME": (BEGIN - 5,)}
     rows += [(name, texts[name]) for name in kinds]
-    (tmp_path / "log.px4log").write_bytes(sdlog2(rows, KINDS | kinds) + b"\xa3\x95\x07")
-    contents = log_contents(tmp_path / "log.px4log")
+    contents = read(sdlog2(rows, KINDS | kinds) + b"\xa3\x95\x07")
     assert len(contents.topics["vehicle_attitude"][STAMP]) == 20
     assert ("sensor_combined" in contents.topics) == ("IMU" not in kinds)
     assert ("PWM_MIN" in contents.parameters) == ("PARM" not in kinds)

@@ -12,6 +12,7 @@ from cpfls_cli.logs.records import stamps_while
 from tests.builders import ulogs
 from tests.builders.dataflash_logs import dataflash
 
+NAME = "log.bin"
 TIME = np.arange(0.0, 60.0, 0.1)
 RESETS = np.array([[12.0, 23.0], [30.0, -8.0], [55.0, 120.0]])
 """When, s, and by how much, deg: two in flight, which is from 10 s to 50 s and longest after the second, one after."""
@@ -36,8 +37,7 @@ def apart(one, other):
 def of_px4(path, counts=(1, 1, 1), asked="float[4] q_d"):
     """Write what PX4 logs: the stated quaternion is that of the turn, or its negative, which is the same one."""
     true = Rotation.from_euler("ZYX", angles(TIME)[:, ::-1])
-    turned = Rotation.from_rotvec(off(TIME)[:, None] * [0, 0, 1])
-    logged = (turned * true).as_quat()[:, [3, 0, 1, 2]]
+    logged = (Rotation.from_rotvec(off(TIME)[:, None] * [0, 0, 1]) * true).as_quat()[:, [3, 0, 1, 2]]
     counted, stated = np.full(len(TIME), 250.0), np.zeros((len(TIME), 2))
     for (at, turn), count, sign in zip(RESETS, counts, (1, -1, 1), strict=True):
         half = np.radians(turn) / 2
@@ -87,8 +87,7 @@ def of_ardupilot(events, turns=RESETS, noise_rad_s=0.0):
     """Write what ArduCopter logs: an attitude in hundredths of a degree, a gyroscope faster, and events."""
     fast = np.arange(0.0, 60.0, 0.04)
     true = angles(fast)
-    slopes = np.gradient(true, fast, axis=0)
-    (roll, pitch, _), (d_roll, d_pitch, d_yaw) = true.T, slopes.T
+    (roll, pitch, _), (d_roll, d_pitch, d_yaw) = true.T, np.gradient(true, fast, axis=0).T
     rate = np.column_stack(
         [
             d_roll - np.sin(pitch) * d_yaw,
@@ -114,10 +113,9 @@ FLIES = [(9.9, 10), (10.0, 28), (50.0, 18), (50.5, 11)]
 
 
 @pytest.mark.parametrize("noise_rad_s", [0.0, 0.05])
-def test_ardupilot_s_resets_are_measured_and_undone(tmp_path, noise_rad_s):
+def test_ardupilot_s_resets_are_measured_and_undone(read, noise_rad_s):
     marked = [(at - 0.03, 62) for at, _ in RESETS]
-    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, *marked], noise_rad_s=noise_rad_s))
-    topics = log_contents(tmp_path / "log.bin").topics
+    topics = read(of_ardupilot([*FLIES, *marked], noise_rad_s=noise_rad_s)).topics
     for name in ("Yaw", "DesYaw"):
         beyond = np.radians(topics["ATT"][name]) - angles(TIME)[:, 2]
         # What it turns by between two rows is known to a degree or so, as their stamps and the gyroscope's are.
@@ -127,30 +125,26 @@ def test_ardupilot_s_resets_are_measured_and_undone(tmp_path, noise_rad_s):
 
 
 @pytest.mark.parametrize(("first", "second"), [(20.0, 12.0), (12.0, 20.0), (-20.0, 20.0)])
-def test_of_ardupilot_s_resets_near_each_other_each_is_undone(tmp_path, first, second):
+def test_of_ardupilot_s_resets_near_each_other_each_is_undone(read, first, second):
     resets = np.array([[20.0, first], [20.3, second]])
-    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, *((at, 62) for at, _ in resets)], resets))
-    topics = log_contents(tmp_path / "log.bin").topics
+    topics = read(of_ardupilot([*FLIES, *((at, 62) for at, _ in resets)], resets)).topics
     np.testing.assert_allclose(topics[YAW_RESETS][STAMP], resets[:, 0], atol=1e-9)
     np.testing.assert_allclose(np.degrees(topics[YAW_RESETS]["turn"]), resets[:, 1], atol=1.0)
 
 
-def test_an_event_of_ardupilot_is_of_one_turn(tmp_path):
-    resets = np.array([[20.0, 20.0], [20.3, 12.0]])
-    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, (20.1, 62)], resets))
-    assert log_contents(tmp_path / "log.bin").topics[YAW_RESETS][STAMP] == pytest.approx([20.0])
+def test_an_event_of_ardupilot_is_of_one_turn(read):
+    topics = read(of_ardupilot([*FLIES, (20.1, 62)], np.array([[20.0, 20.0], [20.3, 12.0]]))).topics
+    assert topics[YAW_RESETS][STAMP] == pytest.approx([20.0])
 
 
-def test_ardupilot_s_reset_that_is_as_small_as_what_vibration_makes_is_none(tmp_path):
+def test_ardupilot_s_reset_that_is_as_small_as_what_vibration_makes_is_none(read):
     marked = [(at, 62) for at in np.arange(12.0, 48.0, 3.0)]
-    (tmp_path / "log.bin").write_bytes(of_ardupilot([*FLIES, *marked], (), noise_rad_s=1.0))
-    assert YAW_RESETS not in log_contents(tmp_path / "log.bin").topics
+    assert YAW_RESETS not in read(of_ardupilot([*FLIES, *marked], (), noise_rad_s=1.0)).topics
 
 
-def test_what_ardupilot_does_not_call_a_reset_is_none(tmp_path):
+def test_what_ardupilot_does_not_call_a_reset_is_none(read):
     for events, turns in ((FLIES, RESETS), ([*FLIES, (20.0, 62)], ())):
-        (tmp_path / "log.bin").write_bytes(of_ardupilot(events, turns))
-        topics = log_contents(tmp_path / "log.bin").topics
+        topics = read(of_ardupilot(events, turns)).topics
         assert YAW_RESETS not in topics
         jumps = [abs((b - a + 180) % 360 - 180) for a, b in pairwise(topics["ATT"]["Yaw"])]
         assert (max(jumps) > 100.0) == bool(len(turns))

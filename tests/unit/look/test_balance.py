@@ -45,8 +45,7 @@ def test_a_single_rotor_is_one_cause_of_several():
     alone = {cause.kind: cause.alone for cause in balance.causes}
     assert alone == {"rotor": True, "centre of mass": False, "yaw torque": False, "wind": False}
     (rotor,) = (cause for cause in balance.causes if cause.kind == "rotor")
-    mean = (3 + 1 / 0.75) / 4
-    assert rotor.size.low < (1 / 0.75 - 1) / mean < rotor.size.high
+    assert rotor.size.low < (1 / 0.75 - 1) / ((3 + 1 / 0.75) / 4) < rotor.size.high
 
 
 def test_spins_of_which_one_is_not_known_are_not_known():
@@ -139,8 +138,7 @@ def test_a_weak_rotor_that_is_asked_for_less_is_not_sound_by_working_as_much_as_
 
 def test_unknown_thrust_curves_widen_the_centre_of_mass():
     """Between straight and square, a share of commands is one to two of thrust."""
-    ahead = 0.05 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0]
-    balance = balance_of(hovering(1 + ahead, gusts=0.001))
+    balance = balance_of(hovering(1 + 0.05 / np.mean(CROSS[:, 0] ** 2) * CROSS[:, 0], gusts=0.001))
     assert balance.measured_by == "command"
     (cause,) = (cause for cause in balance.causes if cause.kind == "centre of mass")
     assert cause.forward.low == pytest.approx(0.05, abs=0.003)

@@ -75,8 +75,7 @@ def test_proposed_gains_hold_the_asked_margin_with_nineteen_of_twenty_plants(aut
     # Plants with which the loop that flew would be unstable are not among them.
     assert low - 1 < after.phase_deg.low < low + 3
     assert high - 2 < after.phase_deg.high < high + 1
-    found_loop = loops(autopilot, new, own.parameters[None])[1][0]
-    exact = stability_margins(FRD(found_loop, 2 * np.pi * frequency))
+    exact = stability_margins(FRD(loops(autopilot, new, own.parameters[None])[1][0], 2 * np.pi * frequency))
     assert after.phase_deg.value == pytest.approx(exact[1], abs=0.5)
     assert after.holds > 0.94
 
@@ -101,8 +100,7 @@ def test_the_interval_is_that_of_the_plants():
 def test_gains_that_suit_are_kept():
     gains = found("px4")
     assert {row.direction for row in gains.rows} != {"keep"}
-    middle = {row.parameter: 0.5 * (row.low + row.high) for row in gains.rows}
-    again = found("px4", middle)
+    again = found("px4", {row.parameter: 0.5 * (row.low + row.high) for row in gains.rows})
     assert [row.direction for row in again.rows] == ["keep"] * 3
     assert again.axes[0].before.phase_deg.value == again.axes[0].after.phase_deg.value
     assert not again.axes[0].changed
@@ -178,8 +176,7 @@ def test_a_weak_axis_gets_sticks_to_move():
 
 def test_the_angle_is_tuned_where_one_is_flown():
     assert "P of the angle" not in by_term(found("px4"))
-    row = by_term(found("px4", attitude=True))["P of the angle"]
-    assert row.parameter == "MC_ROLL_P"
+    assert by_term(found("px4", attitude=True))["P of the angle"].parameter == "MC_ROLL_P"
 
 
 @pytest.mark.parametrize(
@@ -196,8 +193,7 @@ def test_versions_whose_gains_count(autopilot, system, reason):
 
 
 def test_names_are_those_of_the_version():
-    new = {row.parameter for row in found("betaflight").rows}
-    assert {"d_min_roll", "d_roll"} <= new
+    assert {"d_min_roll", "d_roll"} <= {row.parameter for row in found("betaflight").rows}
     assert {row.parameter for row in found("betaflight", system="Betaflight 3.5.0").rows} == {
         "p_roll",
         "i_roll",

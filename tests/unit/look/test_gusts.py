@@ -30,8 +30,7 @@ def gusty(seed, size=3.0, memory=0.4, seconds=60.0, noise=0.01):
 
 def in_band(size, memory):
     """Root mean square from 0.2 to 6 Hz of a process of first order."""
-    ends = np.arctan(2 * np.pi * memory * np.array([0.2, 6.0]))
-    return size * np.sqrt(np.diff(ends)[0] * 2 / np.pi)
+    return size * np.sqrt(np.diff(np.arctan(2 * np.pi * memory * np.array([0.2, 6.0])))[0] * 2 / np.pi)
 
 
 def test_size_and_memory_of_gusts_are_found_though_the_loop_answers():

@@ -21,8 +21,7 @@ def climbing(seed, exponent, by=0.3, gusts=0.02, seconds=60.0):
     generator = np.random.default_rng(seed)
     samples = round(seconds * RATE)
     collective = 0.4 * np.exp(by * correlated(generator, samples, RATE, 1.0)[:, 0])
-    blows = np.exp(gusts * correlated(generator, samples, RATE, 1.0)[:, 0])
-    up = GRAVITY * (collective / 0.4) ** exponent * blows
+    up = GRAVITY * (collective / 0.4) ** exponent * np.exp(gusts * correlated(generator, samples, RATE, 1.0)[:, 0])
     return still_flight(seconds, RATE, collective=collective, specific_force=forces(up))
 
 
@@ -60,8 +59,7 @@ def test_hover_without_an_accelerometer_is_level_flight_at_one_height():
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
 def test_the_exponent_of_thrust_lies_in_its_interval(exponent):
     shapes = [hover_of(climbing(seed, exponent)).shape for seed in range(40)]
-    inside = sum(shape.exponent.low <= exponent <= shape.exponent.high for shape in shapes)
-    assert inside >= 37
+    assert sum(shape.exponent.low <= exponent <= shape.exponent.high for shape in shapes) >= 37
     assert np.mean([shape.exponent.half for shape in shapes]) < 0.2
 
 
@@ -89,18 +87,16 @@ def test_a_loop_in_acro_is_no_hover_and_a_steady_collective_has_no_shape():
 
 def test_the_stated_curve_is_compared_by_its_exponent():
     flight = climbing(0, 1.5)
-    stated = {"MOT_THST_EXPO": 1.0, "MOT_SPIN_MIN": 0.0, "MOT_SPIN_MAX": 1.0, "MOT_THST_HOVER": 0.3}
-    hover = hover_of(
+    assert hover_of(
         still_flight(
             60.0,
             RATE,
             collective=flight.collective,
             specific_force=flight.specific_force,
             autopilot="ardupilot",
-            parameters=stated,
+            parameters={"MOT_THST_EXPO": 1.0, "MOT_SPIN_MIN": 0.0, "MOT_SPIN_MAX": 1.0, "MOT_THST_HOVER": 0.3},
         )
-    )
-    assert hover.shape.stated == pytest.approx(2.0, abs=1e-3)
+    ).shape.stated == pytest.approx(2.0, abs=1e-3)
 
 
 def test_stated_hover_is_compared_as_thrust():

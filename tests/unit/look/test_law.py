@@ -28,8 +28,7 @@ def flown(d=40.0, rounding=0.0, kicked=4.0):
     """A roll in gusts whose PID is that of Betaflight, in its own scales."""
     rng = np.random.default_rng(3)
     gusts, asked = kicked * rng.standard_normal(COUNT), low_pass(12 * rng.standard_normal(COUNT), 3.0)
-    turned = low_pass(gusts + asked, 20.0)
-    measured = np.degrees(low_pass(turned, 80.0))
+    measured = np.degrees(low_pass(low_pass(gusts + asked, 20.0), 80.0))
     error = np.degrees(asked) - measured
     slope = low_pass(np.diff(measured, prepend=0.0) * RATE, 100.0)
     command = (0.032029 * 50 * error + 0.244381 * 80 * np.cumsum(error) / RATE - 0.000529 * d * slope) / 1000
@@ -54,8 +53,7 @@ def test_the_stated_law_fits_what_it_flew(hz):
 
 def test_twice_the_derivative_is_another_law():
     log = flown(d=80.0)
-    law = flown_law(log)
-    feedback, hz = flown_feedback(log, 0, law), 30.0
+    feedback, hz = flown_feedback(log, 0, flown_law(log)), 30.0
     ratio, turned = feedback.near(hz)
     s, z = 2j * np.pi * hz, np.exp(2j * np.pi * hz / RATE)
     share = 1 / (1 + RATE / (2 * np.pi * 100.0))

@@ -20,8 +20,7 @@ def flight():
 
 @pytest.fixture(scope="module")
 def loop(flight):
-    plants = tuple(axis_effectiveness(flight, axis) for axis in range(3))
-    return loops_of(flight, plants)[0]
+    return loops_of(flight, tuple(axis_effectiveness(flight, axis) for axis in range(3)))[0]
 
 
 def stepped():

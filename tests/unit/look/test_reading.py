@@ -285,8 +285,7 @@ def test_thrust_that_stays_at_nothing_is_no_flight():
 def test_a_cut_of_a_log_without_a_word_on_its_writer():
     """Outputs of its rate loop are known by their names."""
     output = named(logs.command(OWN, "ardupilot"), "ROut", "POut", "YOut")
-    contents = logs.ardupilot(OWN, motors=10, more={"RATE": topic(OWN, 2, output)})
-    found = read(replace(contents, system=""))
+    found = read(replace(logs.ardupilot(OWN, motors=10, more={"RATE": topic(OWN, 2, output)}), system=""))
     assert found.command_source == "output of the rate loop, RATE.ROut, POut, YOut"
 
 

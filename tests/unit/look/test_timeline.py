@@ -15,6 +15,7 @@ from tests.builders import ended_flights as ended
 from tests.builders import looked_logs as logs
 from tests.builders.dataflash_logs import dataflash
 from tests.builders.look_flights import still_flight
+from tests.builders.studies import put_file
 from tests.builders.ulogs import message, ulog
 from tests.builders.unknown_logs import flight, named, with_ground
 
@@ -60,8 +61,7 @@ def test_what_px4_states():
         "vehicle_status": state([0, 8, 15], nav_state=[2, 3, 5], failsafe=[0, 0, 1]),
         "actuator_armed": state([0, 4.5, 27], armed=[0, 1, 0]),
     }
-    result = ((3.0, "INFO", "ready"), (9.0, "WARNING", "wind"))
-    found = events(logs.px4(HOP, more=more), result)
+    found = events(logs.px4(HOP, more=more), ((3.0, "INFO", "ready"), (9.0, "WARNING", "wind")))
     on = {"actuator_armed": state([0, 27], armed=[1, 0])}
     assert of(events(logs.px4(HOP, more=on)), "armed") == [(0.0, "armed when the log begins"), (27.0, "disarmed")]
     counted = {
@@ -106,8 +106,7 @@ def test_modes_that_change_often_are_one_line():
 
 
 def test_a_crash_shows_its_moments():
-    crashed = ended.hits(flight(seconds=40.0))
-    found = events(logs.px4(crashed))
+    found = events(logs.px4(ended.hits(flight(seconds=40.0))))
     assert [(kind, round(at)) for kind, at in ((e.kind, e.time_s) for e in found) if kind == "impact"] == [
         ("impact", 40)
     ]
@@ -119,8 +118,7 @@ def test_a_crash_shows_its_moments():
 
 
 def test_what_falls_against_the_air_hits_the_ground():
-    own = flight(seconds=40.0)
-    falls = ended.then(own, 1.5, felt=(0.0, 0.0, 4.5), falls=5.3)
+    falls = ended.then(flight(seconds=40.0), 1.5, felt=(0.0, 0.0, 4.5), falls=5.3)
     found = events(logs.px4(ended.then(ended.then(falls, 0.06, felt=(0.0, 40.0, 90.0)), 6.0)))
     assert [(event.kind, round(event.time_s)) for event in found if event.severity == "danger"] == [
         ("rotors stop in the air", 40),
@@ -238,8 +236,7 @@ def test_a_log_that_ends_in_the_air_is_said_and_who_disarms_with_the_rotors_on_m
     found = events(logs.px4(OWN))
     assert [text for _, text in of(found, "end")] == ["the log ends in the air"]
     assert not of(found, "landing")
-    armed = {"flightModeFlags": (OWN.time < OWN.time[-1] - 0.05).astype(float)}
-    found = events(logs.betaflight(OWN, more=armed))
+    found = events(logs.betaflight(OWN, more={"flightModeFlags": (OWN.time < OWN.time[-1] - 0.05).astype(float)}))
     assert [text for _, text in of(found, "end")] == ["disarmed as it flies or touches down"]
     assert "disarmed" not in [text for _, text in of(found, "armed")]
     assert [text for _, text in of(events(logs.betaflight(OWN)), "end")] == ["the log ends in the air"]
@@ -328,8 +325,7 @@ def test_a_loop_that_is_not_measured_says_why_about_its_axes():
 
 def test_readers_give_messages(tmp_path):
     rows = [("MSG", (2_000_000, b"Mode change")), ("X", (1_000_000, 1.0)), ("X", (3_000_000, 2.0))]
-    path = tmp_path / "log.bin"
-    path.write_bytes(dataflash({"X": ("Qf", "TimeUS,A")}, rows))
+    path = put_file(tmp_path / "log.bin", dataflash({"X": ("Qf", "TimeUS,A")}, rows))
     assert log_contents(path).messages == ((1.0, "", "Mode change"),)
     path = tmp_path / "log.ulg"
     said = b"\x34" + (3_600_000_000 + 1_500_000).to_bytes(8, "little") + b"\x1b[31mLow battery\x1b[0m\t"
@@ -342,8 +338,7 @@ def test_readers_give_messages(tmp_path):
 def test_a_hard_landing():
     own = with_ground(flight(seconds=20.0))
     own.specific_force[np.abs(own.time - 25.1) < 0.02] = [0.0, 0.0, 60.0]
-    found = events(logs.ardupilot(own))
-    assert [(event.text, event.severity) for event in found if event.kind == "landing"] == [
+    assert [(event.text, event.severity) for event in events(logs.ardupilot(own)) if event.kind == "landing"] == [
         ("lands hard, with 6.1 g", "warning")
     ]
     # The autopilot is sure of it later, and it is when it touches that counts.
@@ -405,8 +400,7 @@ def test_an_accelerometer_that_reads_wrong_in_a_log_that_never_stands(size, said
 
 def test_the_autopilots_word_for_take_off_may_come_long_before():
     """A flight is surely off the ground at a tenth of its height."""
-    contents = logs.ardupilot(HOP, more={"EV": state([1.0], Id=[28])})
-    assert of(events(contents), "take-off") == [(1.0, "takes off")]
+    assert of(events(logs.ardupilot(HOP, more={"EV": state([1.0], Id=[28])})), "take-off") == [(1.0, "takes off")]
 
 
 def test_errors_that_come_again_are_one_line_and_a_crash_is_no_note():

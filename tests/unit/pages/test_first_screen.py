@@ -33,11 +33,10 @@ def screen(found, **origin):
     below = next(each.blocks for each in rest if isinstance(each, Folded) and each.summary == BEFORE_AND_AFTER)
     table, caption, *more = below
     assert (type(box), type(facts), type(table)) == (Box, Facts, Table)
-    rows = {row[0].text: row[1:] for row in table.cells}
     return (
         box,
         dict(facts.rows),
-        rows,
+        {row[0].text: row[1:] for row in table.cells},
         caption.text,
         [row for each in more if isinstance(each, Facts) for row in each.rows],
     )
@@ -167,8 +166,7 @@ def test_what_speaks_against_the_model_stands_in_the_box():
 @pytest.mark.parametrize("verdict", ["NAMED", "PARTIAL", "AMBIGUOUS"])
 def test_a_model_that_plays_back_worse_is_not_to_be_taken(verdict):
     worse = made.played_pair(body_rate=(0.5, 0.3, 0.3, 0.4), attitude=(0.1, 0.3, 0.3, 0.2))
-    said = next_steps(diagnosis(verdict, playback=worse))
-    assert said.endswith(
+    assert next_steps(diagnosis(verdict, playback=worse)).endswith(
         "Do not take the model with it, extended.h5, yet: it plays held-out flights back worse in body rate."
     )
     alike = made.played_pair(body_rate=(0.4001, 0.5, 0.5, 0.4), attitude=(0.1, 0.3, 0.3, 0.2))
@@ -205,8 +203,7 @@ def test_a_model_whose_own_file_says_do_not_use_is_not_to_be_taken():
     """Better in attitude alone: its file goes by body rates, and so does what is said of it."""
     played = made.played_pair(body_rate=(0.35, 0.3, 0.3, 0.6), attitude=(0.05, 0.2, 0.1, 0.3))
     assert made.extended(playback=played).trust == Trust.DO_NOT_USE
-    said = next_steps(diagnosis("NAMED", playback=played))
-    assert said.startswith(
+    assert next_steps(diagnosis("NAMED", playback=played)).startswith(
         "Do not take the model with it, extended.h5, yet: it forecasts worse than no model in body rate"
     )
 
@@ -325,8 +322,7 @@ def test_what_cannot_be_played_back_is_said():
     _, _, rows, caption, _ = screen(diagnosis())
     assert "Playback: mean error after 0.5 s; velocity and position cannot be played back, " in caption
     assert not {"playback, velocity", "playback, position"} & set(rows)
-    still = made.played_pair(body_rate=(0.0,) * 4, attitude=(0.0,) * 4)
-    _, _, rows, caption, _ = screen(diagnosis(playback=still))
+    _, _, rows, caption, _ = screen(diagnosis(playback=made.played_pair(body_rate=(0.0,) * 4, attitude=(0.0,) * 4)))
     assert "The flights show no motion that could be played back." in caption
     _, _, rows, caption, _ = screen(replace(diagnosis(), playback=None))
     assert "layback" not in caption

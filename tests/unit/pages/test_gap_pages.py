@@ -101,25 +101,20 @@ def in_all_forms(source, blocks):
     """Tell a record on a page; give the text of each form, one line for each row of a table."""
     sources = Sources([source], source.vehicle, Study().report)
     html, markdown, data = (report_page(sources, "0", form).text for form in (Form.HTML, Form.MARKDOWN, Form.JSON))
+    plain = re.sub(r"^> ", "", markdown, flags=re.MULTILINE)
+    plain = plain.replace("**", "").replace(" | ", " ").replace("| ", "").replace(" |", "")
     texts = {
         "terminal": "\n".join(terminal_lines(blocks, whole=True)),
         "html": _of_html(html),
-        "markdown": _of_markdown(markdown),
+        "markdown": unescape(re.sub(r"\\(.)", r"\1", plain)),
         "json": "\n".join(_of_json(json.loads(data))),
     }
     return {form: "\n".join(" ".join(line.split()) for line in text.splitlines()) for form, text in texts.items()}
 
 
 def _of_html(page):
-    body = re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", page, flags=re.DOTALL)
-    rows = re.sub(r"\s*\n\s*", " ", body)
+    rows = re.sub(r"\s*\n\s*", " ", re.sub(r"<style>.*?</style>|<svg.*?</svg>", "", page, flags=re.DOTALL))
     return unescape(re.sub(r"<[^>]+>", " ", re.sub(r"</(tr|p|div|li|dd|h\d|caption|figcaption|thead)>", "\n", rows)))
-
-
-def _of_markdown(page):
-    plain = re.sub(r"^> ", "", page, flags=re.MULTILINE)
-    plain = plain.replace("**", "").replace(" | ", " ").replace("| ", "").replace(" |", "")
-    return unescape(re.sub(r"\\(.)", r"\1", plain))
 
 
 def _of_json(value):
@@ -255,8 +250,7 @@ def test_a_wrong_thrust_is_not_said_to_be_a_wrong_inertia_too():
 
 def test_errors_of_the_vehicles_numbers_are_per_cent_with_a_sign():
     def said(name, *number, effect="parameter_error"):
-        numbers = (Estimate(name, "1", *number, (-0.9, 3.0)),)
-        return effect_sentence(replace(OFFSET, name=effect, numbers=numbers))
+        return effect_sentence(replace(OFFSET, name=effect, numbers=(Estimate(name, "1", *number, (-0.9, 3.0)),)))
 
     assert "(parameter_error): Izz over yaw torque +24.0 % [+19.9, +28.1] (p" in said("inertia_z", 0.24, 0.199, 0.281)
     assert "Ixx −8 % [−20, +4] (p" in said("inertia_x", -0.08, -0.2, 0.04)

@@ -90,8 +90,7 @@ def test_the_curves_and_the_rotors_make_the_whole_wrench():
 
 @pytest.mark.parametrize(("rows", "panels"), [((0, 2), 3), ((5,), 3), ((1, 4), 6)])
 def test_torque_and_force_are_drawn_where_they_were_learned(rows, panels):
-    own = vehicle_of(replace(whole(), remainder=remainder(2, rows=rows)))
-    section = vehicle.section(source_of_vehicle(own), 1)
+    section = vehicle.section(source_of_vehicle(vehicle_of(replace(whole(), remainder=remainder(2, rows=rows)))), 1)
     (drawn,) = [
         block for block in unfolded(section.blocks) if isinstance(block, Plot) and block.name.endswith("remainder")
     ]
@@ -451,8 +450,7 @@ def test_a_table_has_a_column_of_what_is_stated_where_it_has_any():
     numbers = [number_of(name) for name in names] + [
         number_of(f"products.{name}", stated=0.0) for name in ("Ixy", "Ixz")
     ]
-    own = vehicle_of(whole(), numbers=tuple(numbers))
-    tables = [block for block in blocks_of(own) if isinstance(block, Table)]
+    tables = [block for block in blocks_of(vehicle_of(whole(), numbers=tuple(numbers))) if isinstance(block, Table)]
     stated = {each.header[0]: "In the config" in each.header for each in tables}
     assert (stated["Constant"], stated["Another constant"]) == (False, True)
 
@@ -479,8 +477,7 @@ def test_the_size_of_a_thrust_factor_goes_with_the_full_speed_that_is_assumed():
     thrust, drag, *_ = [row[-1] for row in rows_of(shares, "Constant")]
     assert thrust.endswith(", at an assumed 1000 rad/s")
     assert "assumed" not in drag
-    known = rows_of(replace(shares, full_speed_rad_s=None), "Constant")
-    assert "assumed" not in known[0][-1]
+    assert "assumed" not in rows_of(replace(shares, full_speed_rad_s=None), "Constant")[0][-1]
 
 
 @pytest.mark.parametrize("lacks", [True, False])
@@ -495,6 +492,5 @@ def test_velocity_is_asked_for_only_where_flights_lack_it(lacks):
 def test_constants_without_a_number_are_one_row():
     names = ("Ixx", "Iyy", "Izz")
     numbers = tuple(number_of(f"inertia.{name}", determined=False, possible=name == "Izz") for name in names)
-    own = vehicle_of(whole(), numbers=numbers)
-    rows = [row for row in rows_of(own, "Constant") if "I" in row[0]]
+    rows = [row for row in rows_of(vehicle_of(whole(), numbers=numbers), "Constant") if "I" in row[0]]
     assert [row[0] for row in rows] == ["Ixx, Iyy, kg m^2", "Izz, kg m^2"]

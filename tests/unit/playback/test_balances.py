@@ -56,8 +56,7 @@ def test_slopes_are_difference_quotients_for_every_number(flights):
         own = np.stack([each[..., 1 + place, 1 + place] for each in here[:3]])
         # Some averages over a band are rounding: that of what stays the same.
         size = np.sqrt(np.abs(squares(here) * own)).max(axis=(1, 3), keepdims=True) + 1e-9 * np.abs(squares(here)).max()
-        off = np.abs((ahead - behind) / (2 * step) - slopes)
-        assert (off <= 1e-5 * size).all(), number.name
+        assert (np.abs((ahead - behind) / (2 * step) - slopes) <= 1e-5 * size).all(), number.name
 
 
 @pytest.mark.parametrize("kind", [Balances, PastBalances])
@@ -103,8 +102,7 @@ def test_the_residual_is_what_the_model_leaves_of_the_motion(flights):
     terms = np.concatenate(
         [model.response.terms_at_samples(flight.speed[part], motion.period, flight.hold) for part in stretches]
     )
-    air = np.einsum("tji,tj->ti", motion.rotation, motion.velocity)
-    wrench = model.wrench(air, motion.rate, terms)
+    wrench = model.wrench(np.einsum("tji,tj->ti", motion.rotation, motion.velocity), motion.rate, terms)
     momentum = motion.rate @ at.inertia
     torque = np.cross(motion.rate, momentum) - wrench[:, :3]
     force = np.array([0.0, 0.0, STATED.gravity_m_s2 * STATED.mass_kg]) - np.einsum(
@@ -197,8 +195,7 @@ def _in_turn(heading):
 @pytest.mark.parametrize("begin", [0.0, 3.1])
 def test_a_path_flown_again_with_another_heading_is_no_run_of_it(begin):
     """About its own axes a body moves otherwise then, and what its model lacks in yaw is not repeatable there."""
-    flight = _in_turn(begin + np.linspace(0.0, 8.0 * np.pi / 3.0, 6000))
-    assert len(instruments([flight]).runs) == 1
+    assert len(instruments([_in_turn(begin + np.linspace(0.0, 8.0 * np.pi / 3.0, 6000))]).runs) == 1
 
 
 @pytest.mark.parametrize("heading", [0.0, 3.1])

@@ -40,8 +40,7 @@ def test_a_constant_push_is_observed_and_acts_on():
     flight, patient = flight_of(), replace(OBSERVER, rate=np.full(6, 1e4), memory_s=np.full(6, 1e4))
     push = np.array([0.02, -0.03, 0.01, 0.4, 0.3, -0.5])
     player = player_of(MODEL, flight)
-    pushed = replace(player, along=np.tile(push, (len(flight), 1)))
-    errors = free_runs(pushed, flight, np.array([0]), 79).errors[0]
+    errors = free_runs(replace(player, along=np.tile(push, (len(flight), 1))), flight, np.array([0]), 79).errors[0]
     motion = flight.motion
     flown = flight_of(
         motion=motion._replace(

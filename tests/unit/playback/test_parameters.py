@@ -129,8 +129,7 @@ def test_a_number_that_the_flight_does_not_show_is_not_determined(flight):
     # Without any yaw effort the rotors' spins cancel, and nothing gyroscopic is left.
     still = flight.speed.mean(axis=1, keepdims=True) * np.ones(4)
     quiet = windows_of([replace(flight, speed=still)], 0.2, 0.2)
-    spread = uncertainty(fit(free, quiet, {}, 20, 1e-4), quiet)
-    assert spread.determined.tolist() == [False, True, True, True]
+    assert uncertainty(fit(free, quiet, {}, 20, 1e-4), quiet).determined.tolist() == [False, True, True, True]
 
 
 @pytest.mark.parametrize(("of_arm", "determined"), [(0.15, True), (0.3, False)])
@@ -215,8 +214,7 @@ def test_model_of_each_configuration_has_its_mass(found):
 def test_effects_stay_what_they_are_where_the_inertia_differs():
     """Damping and flapping are torques of the air: a body that gains 2 % does not gain 2 % of them."""
     others = [replace(flight, group="payload") for flight in flown(loaded(), KINDS, seed=51, hold="linear")]
-    windows = windows_of([*flown(truth(), KINDS, seed=1, hold="linear"), *others], 0.5, 0.6)
-    found = fit(JOINT, windows, {}, 60, 3e-5)
+    found = fit(JOINT, windows_of([*flown(truth(), KINDS, seed=1, hold="linear"), *others], 0.5, 0.6), {}, 60, 3e-5)
     for group, flew in (("", truth()), ("payload", loaded())):
         model = JOINT.at(found.values, group).model
         assert model.vehicle.inertia_kg_m2[:3] == pytest.approx(flew.vehicle.inertia_kg_m2, rel=0.001)

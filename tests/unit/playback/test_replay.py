@@ -39,8 +39,7 @@ def integrated(flight, start, horizon, acceleration):
 
     first = [motion.position[start], motion.velocity[start], motion.rotation[start].ravel(), motion.rate[start]]
     ends = time[start], time[start + horizon]
-    done = solve_ivp(slope, ends, np.concatenate(first), rtol=1e-10, atol=1e-12, max_step=period)
-    end = done.y[:, -1]
+    end = solve_ivp(slope, ends, np.concatenate(first), rtol=1e-10, atol=1e-12, max_step=period).y[:, -1]
     return end[:3], end[3:6], end[6:15].reshape(3, 3), end[15:]
 
 
@@ -54,8 +53,7 @@ def wrench_with_effects(air, rate, speed):
 
 def of_rigid_body(rotation, air, rate, speed):
     torque, force = wrench_with_effects(air, rate, speed)
-    angular = np.linalg.solve(INERTIA, torque - cross(rate, INERTIA @ rate))
-    return rotation @ force / 6.0 - [0, 0, 9.81], angular
+    return rotation @ force / 6.0 - [0, 0, 9.81], np.linalg.solve(INERTIA, torque - cross(rate, INERTIA @ rate))
 
 
 def off(flight, start, horizon, model, acceleration):
@@ -154,11 +152,10 @@ def test_baselines_are_their_formulas(prediction):
             # The integral of the rate until then.
             as_long = fades_s * (1 - left) if prediction == RATE_FADES else gone
             turned = motion.rotation[start] @ Rotation.from_rotvec(as_long * motion.rate[start]).as_matrix()
-            away = Rotation.from_matrix(motion.rotation[at].T @ turned).as_rotvec()
             wanted = [
                 motion.position[start] + gone * motion.velocity[start] - motion.position[at],
                 motion.velocity[start] - motion.velocity[at],
-                away,
+                Rotation.from_matrix(motion.rotation[at].T @ turned).as_rotvec(),
                 left * motion.rate[start] - motion.rate[at],
             ]
             np.testing.assert_allclose(runs.errors[run, step - 1], wanted, atol=1e-12)
@@ -176,8 +173,7 @@ def test_rates_fade_as_fast_as_those_of_the_flights_that_train():
     stays = replace(flight, motion=flight.motion._replace(rate=np.ones((200, 3))))
     assert fading([stays], 20) == pytest.approx(100 * 20 * 0.01)
     # A stretch that is shorter than the horizon shows what it can.
-    short = replace(fades, stretches=(slice(0, 5), slice(100, 104)))
-    assert fading([short], 20) == pytest.approx(0.13, rel=0.01)
+    assert fading([replace(fades, stretches=(slice(0, 5), slice(100, 104)))], 20) == pytest.approx(0.13, rel=0.01)
 
 
 def test_chance_is_what_blocks_of_windows_tell_of_the_difference_from_the_model():
@@ -190,12 +186,10 @@ def test_chance_is_what_blocks_of_windows_tell_of_the_difference_from_the_model(
     own = played(flight, VehicleModel(vehicle=VEHICLE, effects=EFFECTS)).runs(MODEL, np.arange(120), 10).errors
     apart = stated - np.linalg.norm(own[:, :, 3], axis=2)
     # Six blocks of two horizons; leaving out one of six is to leave the mean of five.
-    means = apart.reshape(6, 20, 10).mean(axis=1)
-    error = means.std(axis=0, ddof=1) / np.sqrt(6)
+    error = apart.reshape(6, 20, 10).mean(axis=1).std(axis=0, ddof=1) / np.sqrt(6)
     np.testing.assert_allclose(found.models[STATED].body_rate.chance, 2.5706 * error, rtol=1e-4)
     np.testing.assert_allclose(sizes[0], sizes[1])
-    few = replay([played(flight_of(samples=80))], 10, 1)
-    assert few.models[MODEL].body_rate.chance is None
+    assert replay([played(flight_of(samples=80))], 10, 1).models[MODEL].body_rate.chance is None
 
 
 def test_errors_by_horizon_are_means_over_all_windows_of_all_flights():
@@ -257,8 +251,7 @@ def test_a_signal_is_averaged_over_the_flights_that_know_it():
 def test_a_run_that_diverges_is_counted_and_bounded(fuzzy):
     driven = (ModelEffect("linear_damping", {}, np.full(3, -90.0)),)
     found = replay([played(flight_of(), VehicleModel(vehicle=VEHICLE, effects=driven, fuzzy=fuzzy))], 60, 5)
-    lost = (found.diverged >= 0).sum(axis=1)
-    assert lost.tolist() == [4, 0, 0, 0]
+    assert (found.diverged >= 0).sum(axis=1).tolist() == [4, 0, 0, 0]
     assert all(np.isfinite(mean_errors(found, signal)).all() for signal in found.models[MODEL].signals)
     assert mean_errors(found, "body_rate").max() < 600
 
@@ -287,8 +280,7 @@ def test_no_window_crosses_a_pause():
 def test_the_worst_windows_do_not_overlap():
     found = replay([played(flight_of(samples=200))], 20, 1)
     worst = found.worst(4)
-    starts = np.sort(found.start[worst])
-    assert np.diff(starts).min() > 20
+    assert np.diff(np.sort(found.start[worst])).min() > 20
     assert worst[0] == found.size[0].argmax()
     assert np.all(np.diff(found.size[0, worst]) <= 0)
 

@@ -36,8 +36,7 @@ def test_numbers_lie_in_their_intervals_as_often_as_they_should_and_go_together(
     values = dict(zip(spread.names, spread.values.T, strict=True))
     known = {number.name: number for number in found_record(flat(truth())).numbers}
     for name, own in values.items():
-        inside = np.mean((known[name].low <= own) & (own <= known[name].high))
-        assert 0.93 < inside < 0.97
+        assert 0.93 < np.mean((known[name].low <= own) & (own <= known[name].high)) < 0.97
     assert np.corrcoef(np.log(values["inertia.Izz"]), np.log(values["drag_factor"]))[0, 1] == pytest.approx(
         0.9, abs=0.03
     )

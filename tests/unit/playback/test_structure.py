@@ -74,12 +74,11 @@ def test_a_search_shows_how_far_it_is(searched):
 @pytest.mark.parametrize("quick", [False, True])
 def test_a_first_answer_grows_from_one_start(flights, quick):
     """It adds a response of the rotors as it adds other blocks; a whole search begins with each of them alone."""
-    left_out = tuple(set(QUICK.leave_out) - {"lag", "slow_actuation"})
     result = []
     choice = chosen(
         flights,
         lambda judged, _: result.append(judged[-1].structure.blocks),
-        settings=replace(QUICK, leave_out=left_out, quick=quick),
+        settings=replace(QUICK, leave_out=tuple(set(QUICK.leave_out) - {"lag", "slow_actuation"}), quick=quick),
     )
     starts = {("lag",), ("slow_actuation",)}
     assert starts.isdisjoint(result) if quick else starts <= {*result}
@@ -135,8 +134,7 @@ def test_errors_are_predicted_near_a_fit(flights):
     """A block less, and one more: fitted, both come to what was predicted from the fit between them."""
     bench = structure._Bench(STATED, parts_of(flights, QUICK), lambda *_: None, 1, {}, structure._ACTUATION)
     base = ("inertia", "thrust_factor", "lag", "linear_damping", "rotor_drag", "flapping_moment")
-    judged = bench.judge(Structure(base))
-    outlook = bench.outlook(judged, ("drag_factor",))
+    outlook = bench.outlook(bench.judge(Structure(base)), ("drag_factor",))
     for blocks in (base[:4] + base[5:], (*base, "drag_factor")):
         fitted = bench.judge(Structure(blocks))
         assert outlook.errors(blocks) == pytest.approx(fitted.by_block, rel=0.2)
@@ -215,10 +213,8 @@ def test_no_block_can_be_left_out_of_the_choice():
 
 
 def test_blocks_that_gain_only_together_are_found_from_all():
-    errors = {"": 1.0, "a": 0.5, "b": 1.0, "c": 0.98, "ab": 0.51, "ac": 0.52, "bc": 0.97, "abc": 0.1}
-    bench = Bench(errors)
-    added = structure._grow(bench, ("a", "b", "c"))
-    assert added.structure.blocks == ("a",)
+    bench = Bench({"": 1.0, "a": 0.5, "b": 1.0, "c": 0.98, "ab": 0.51, "ac": 0.52, "bc": 0.97, "abc": 0.1})
+    assert structure._grow(bench, ("a", "b", "c")).structure.blocks == ("a",)
     structure._explore(bench, bench.judge(Structure(("a", "b", "c"))), ("a", "b", "c"))
     structure._settle(bench, ("a", "b", "c"))
     assert structure._preferred(bench)[2].structure.blocks == ("a", "b", "c")
@@ -279,8 +275,7 @@ def test_flights_that_are_logged_fast_are_flown_in_steps_of_several_samples():
     fast = flown(truth(), ("figure", "steps"), duration_s=5.0, rate_hz=500.0, noise=MIDDLING, seed=2)
     windows = [each for part in parts_of(fast, QUICK) for each in part]
     assert [each.every for each in windows] == [5, 5]
-    free = Structure(TRUE_BLOCKS).free(STATED)
-    found = fit(free, windows, {}, 12, 1e-3)
+    found = fit(Structure(TRUE_BLOCKS).free(STATED), windows, {}, 12, 1e-3)
 
     def of_all_samples(each):
         # Errors count at the ends of the longer steps alone.

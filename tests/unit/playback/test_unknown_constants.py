@@ -66,8 +66,7 @@ def without_velocity(flights, accelerometer):
     for flight in flights:
         motion = flight.motion
         acceleration = np.gradient(motion.velocity, motion.period, axis=0)
-        sensed = np.einsum("tji,tj->ti", motion.rotation, acceleration + gravity)
-        force = sensed if accelerometer else None
+        force = np.einsum("tji,tj->ti", motion.rotation, acceleration + gravity) if accelerometer else None
         changed.append(replace(flight, has_velocity=False, has_position=False, specific_force=force))
     return changed
 
@@ -210,8 +209,7 @@ def test_rotors_that_stand_or_turn_for_a_moment_tell_no_thrust():
 @pytest.mark.parametrize(("heavier", "known"), [(1.0, True), (8.0, False)])
 def test_with_a_moment_of_inertia_that_no_body_has_nothing_that_turns_it_is_determined(heavier, known):
     names = ("thrust_factor", "drag_factor", "inertia.Ixx", "products.Ixy", "rotor_drag.k_d")
-    moment = heavier * TRUE.vehicle.inertia_kg_m2[0]
-    values = (1e-6, 1e-8, moment, 1e-5, 1e-4)
+    values = (1e-6, 1e-8, heavier * TRUE.vehicle.inertia_kg_m2[0], 1e-5, 1e-4)
     numbers = [
         FoundNumber(name, "", value, 0.0, 1.0, np.nan, True, False) for name, value in zip(names, values, strict=True)
     ]
@@ -249,8 +247,7 @@ def test_where_nothing_turns_no_factor_of_the_loop_overflows():
 def test_intervals_hold_what_the_loop_leaves_open():
     names = ("thrust_factor", "drag_factor", "inertia.Ixx", "inertia.Iyy", "inertia.Izz", "rotor_drag.k_d")
     numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in names]
-    still = replace_explained(LOOP, 0.95)
-    wide = {number.name: number for number in widened_by_loop(numbers, still)}
+    wide = {number.name: number for number in widened_by_loop(numbers, replace_explained(LOOP, 0.95))}
     assert (wide["inertia.Ixx"].low, wide["inertia.Ixx"].high) == pytest.approx((0.72, 1.21))
     assert (wide["inertia.Iyy"].low, wide["inertia.Iyy"].high) == pytest.approx((0.45, 1.76))
     # Of yaw the flights say nothing by which a fit could have been misled.

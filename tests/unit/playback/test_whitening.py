@@ -141,8 +141,7 @@ def test_a_gust_does_not_grow_with_what_was_before_and_an_effect_does():
 
 
 def test_what_stands_still_grows_with_nothing():
-    found = innovations_of(np.zeros((len(BLOCK), 6)), moved=np.ones((len(BLOCK), 2)))
-    assert not found.grows(0.05).any()
+    assert not innovations_of(np.zeros((len(BLOCK), 6)), moved=np.ones((len(BLOCK), 2))).grows(0.05).any()
 
 
 def test_a_gust_has_its_size_and_falls_to_37_percent_within_its_memory():
@@ -181,8 +180,7 @@ def pieces(rest):
     """Power that is left where parts are of very different sizes on each piece, and the last of them nothing."""
     rng = np.random.default_rng(5)
     squares = rng.uniform(0.05, 8.0, (PIECES, 3)) ** 2 * [1.0, 9.0, 0.0]
-    size = REST**2 + squares @ SHARE**2
-    expected = KNOWN + size[:, None] * rest.power(MEMORY_S)[0]
+    expected = KNOWN + (REST**2 + squares @ SHARE**2)[:, None] * rest.power(MEMORY_S)[0]
     return expected * rng.standard_exponential((PIECES, FREQUENCIES)), squares
 
 
@@ -233,8 +231,7 @@ def test_it_is_played_as_large_as_the_parts_are_where_the_vehicle_flies():
     # No part turns, and all rotors turn alike.
     alike = np.full(4, np.sqrt((speed**2).mean()))
     terms = np.concatenate([[1.0], alike, alike**2, np.zeros(8)])
-    still = np.zeros((1, 3))
-    by_part = model.wrench_by_part(velocity[None], still, terms[None])
+    by_part = model.wrench_by_part(velocity[None], np.zeros((1, 3)), terms[None])
     parts = [by_part[name][0] for name in lack.part]
     size = np.sqrt(
         lack.rest[:3] ** 2 + sum((own * part[:3]) ** 2 for own, part in zip(share[:3].T, parts, strict=True))

@@ -75,8 +75,7 @@ def test_printed_rule_chooses_what_brute_force_chooses(seed):
 
 
 def test_every_nth_sample():
-    Q = problem(1, samples=40, columns=5)
-    selection = reduce(Q, ReductionSettings(criterion="even", size=16))
+    selection = reduce(problem(1, samples=40, columns=5), ReductionSettings(criterion="even", size=16))
     assert selection.indices.tolist() == [0, 2, 5, 7, 10, 12, 15, 17, 20, 22, 25, 27, 30, 32, 35, 37]
     with pytest.raises(SettingError, match="even needs a size and no condition_number"):
         ReductionSettings(criterion="even", size=16, condition_number=5.0)
@@ -84,12 +83,10 @@ def test_every_nth_sample():
 
 def test_long_selection_stays_exact_across_refreshes():
     Q = problem(5, samples=260, columns=6)
-    selection = reduce(Q, ReductionSettings(criterion="A", size=230))
-    chosen = selection.indices.tolist()
+    chosen = reduce(Q, ReductionSettings(criterion="A", size=230)).indices.tolist()
     for step in (99, 100, 101, 150, 229):
         left = [i for i in range(len(Q)) if i not in chosen[:step]]
-        best = left[int(np.argmax([score("A", Q, chosen[:step], i) for i in left]))]
-        assert chosen[step] == best
+        assert chosen[step] == left[int(np.argmax([score("A", Q, chosen[:step], i) for i in left]))]
 
 
 @pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "sigma_min", "A", "D", "even", "paper-literal"])
@@ -127,8 +124,7 @@ def test_condition_number_stops_as_soon_as_it_is_reached():
 
 @pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "sigma_min", "A", "D"])
 def test_unreachable_condition_number_takes_all_samples(criterion):
-    Q = problem(2)
-    selection = reduce(Q, ReductionSettings(criterion=criterion, size=None, condition_number=1.01))
+    selection = reduce(problem(2), ReductionSettings(criterion=criterion, size=None, condition_number=1.01))
     assert (selection.stop_reason, sorted(selection.indices)) == ("all-samples", list(range(40)))
 
 
@@ -236,8 +232,7 @@ def test_badly_scaled_samples_are_exchanged_without_squaring_the_condition_numbe
 
 
 def test_one_parameter_has_nothing_to_exchange():
-    Q = np.random.default_rng(0).standard_normal((20, 3, 1))
-    assert exchanged(Q, 5).condition_number == pytest.approx(1.0)
+    assert exchanged(np.random.default_rng(0).standard_normal((20, 3, 1)), 5).condition_number == pytest.approx(1.0)
 
 
 def deficient(rank=7, columns=16, samples=60, seed=0):
@@ -272,8 +267,7 @@ def test_same_choice_as_in_coordinates_of_full_rank():
 
 def test_samples_of_dependent_rows_reach_the_rank_one_by_one():
     Q = np.random.default_rng(4).standard_normal((30, 1, 6)) * np.array([1.0, 0.5, -2.0])[:, None]
-    selection = reduce(Q, ReductionSettings(size=12))
-    assert selection.rank_trace[:6].tolist() == [1, 2, 3, 4, 5, 6]
+    assert reduce(Q, ReductionSettings(size=12)).rank_trace[:6].tolist() == [1, 2, 3, 4, 5, 6]
     with pytest.raises(SettingError, match="has rank 6, which takes 6 samples"):
         reduce(Q, ReductionSettings(size=4))
 
@@ -281,8 +275,7 @@ def test_samples_of_dependent_rows_reach_the_rank_one_by_one():
 def test_mixed_blocks_prefer_the_sample_that_adds_most_rank():
     strong_line = np.zeros((3, 6))
     strong_line[0, 5] = 100.0
-    blocks = np.stack([strong_line, np.eye(6)[:3] * 0.1, np.eye(6)[3:] * 0.1])
-    selection = reduce(blocks, ReductionSettings(size=3))
+    selection = reduce(np.stack([strong_line, np.eye(6)[:3] * 0.1, np.eye(6)[3:] * 0.1]), ReductionSettings(size=3))
     assert selection.indices.tolist() == [1, 2, 0]
 
 

@@ -63,8 +63,7 @@ def test_a_smaller_size_is_the_beginning_of_a_larger_one(criterion, pool):
 @pytest.mark.parametrize("criterion", ["KD-exchange", "K-exchange", "even"])
 def test_what_knows_its_size_from_the_start_has_no_beginning(criterion):
     settings = ReductionSettings(criterion=criterion, size=30)
-    selection = reduce_streamed(survey(chunked(regressor(), 700), 1e-10), settings, generator())
-    assert beginning(selection, 12) is None
+    assert beginning(reduce_streamed(survey(chunked(regressor(), 700), 1e-10), settings, generator()), 12) is None
 
 
 @pytest.mark.parametrize("size", [100, 999, 3000])

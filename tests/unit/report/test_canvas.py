@@ -39,8 +39,7 @@ def test_ids_of_two_figures_do_not_meet_and_all_references_resolve():
 
 
 def test_a_figure_is_well_formed_named_and_carries_no_style_sheet():
-    svg = plot("one", "", 'says "what" & <more>', 2.0, draw).picture.svg
-    root = ElementTree.fromstring(svg)
+    root = ElementTree.fromstring(plot("one", "", 'says "what" & <more>', 2.0, draw).picture.svg)
     assert (root.get("aria-label"), root.get("role")) == ('says "what" & <more>', "img")
     tags = {element.tag.rsplit("}", 1)[-1] for element in root.iter()}
     assert not tags & {"style", "metadata", "script", "image"}

@@ -187,8 +187,7 @@ def answer(name, **more):
     ],
 )
 def test_a_change_in_words(cause, sizes, words, shows):
-    given = found(cause, *sizes, cable_m=0.7)
-    assert change_words(given, 6.0, ["drift x", "drift y", "drift z"]).startswith(words)
+    assert change_words(found(cause, *sizes, cable_m=0.7), 6.0, ["drift x", "drift y", "drift z"]).startswith(words)
     if shows:
         assert smallest_words(cause, abs(sizes[0]), 6.0) == shows
 

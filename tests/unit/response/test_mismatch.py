@@ -11,14 +11,13 @@ FREQUENCY = 10.0 ** (np.arange(-24, 25) / 24)
 def response(ratio, coherence=1.0, error=0.01, model=True, instrumented=False):
     """A measured gain of 5 with some phase, and a model that is off by a ratio."""
     gain = np.full(len(FREQUENCY), 5.0 * np.exp(-0.3j))
-    whole = np.broadcast_to(np.asarray(coherence, dtype=float), FREQUENCY.shape)
     return FrequencyResponse(
         frequency=FREQUENCY,
         gain=gain,
         model=gain * ratio if model else None,
         direct=gain,
         coherence_input=np.ones_like(FREQUENCY),
-        coherence_output=whole,
+        coherence_output=np.broadcast_to(np.asarray(coherence, dtype=float), FREQUENCY.shape),
         random_error=np.full(len(FREQUENCY), error),
         averages=np.full(len(FREQUENCY), 50.0),
         instrumented=instrumented,

@@ -70,16 +70,14 @@ def plain():
 
 def test_without_effects_the_balance_closes_to_the_accuracy_of_the_integration(plain):
     weak, left = balance(signals_of(plain))
-    size = rms(weak.averaged(weak.inertial))
-    assert size[:3].min() > 0.3
+    assert rms(weak.averaged(weak.inertial))[:3].min() > 0.3
     assert rms(left)[:3].max() < 2e-5
     assert rms(left)[3:].max() < 2e-4
 
 
 def test_accuracy_is_of_second_order_in_the_step():
     fine, coarse, reference = (flown(1.0, integration_rate_hz=rate).signals["position"] for rate in (400, 200, 1600))
-    ratio = rms(coarse - reference) / rms(fine - reference)
-    assert (ratio > 3.0).all()
+    assert (rms(coarse - reference) / rms(fine - reference) > 3.0).all()
 
 
 def test_path_is_followed_and_no_rotor_is_clipped(plain):
@@ -95,8 +93,7 @@ def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
     signals, (shape, linear) = signals_of(flight), by_columns(one)
     weak, left = balance(signals)
     if one.effect.kind == "actuator":
-        corrected = one.effect.apply(signals, shape)
-        expected = left - weak.averaged(weak.residual(corrected))
+        expected = left - weak.averaged(weak.residual(one.effect.apply(signals, shape)))
     else:
         expected = weak.averaged(one.effect.columns(signals, shape)) @ linear
     assert rms(expected).max() > 2e-3
@@ -192,8 +189,7 @@ def test_torque_is_that_of_the_logged_rotor_speeds(plain):
 
 def test_rotors_lag_behind_the_command(plain):
     command, speed = plain.signals["rotor_command"], plain.signals["rotor_speed"]
-    slope = np.gradient(speed, PERIOD, axis=0)[20:-5]
-    lag = 0.05 * slope
+    lag = 0.05 * np.gradient(speed, PERIOD, axis=0)[20:-5]
     np.testing.assert_allclose((command - speed)[20:-5], lag, atol=0.02 * np.abs(lag).max())
 
 
@@ -230,8 +226,7 @@ def test_noise_lies_on_the_log_and_not_in_the_loop(plain):
 
 
 def test_more_than_four_rotors_fly_too():
-    angles = np.pi / 3 * np.arange(6)
-    hubs = [(0.4 * np.cos(angle), 0.4 * np.sin(angle), 0.0) for angle in angles]
+    hubs = [(0.4 * np.cos(angle), 0.4 * np.sin(angle), 0.0) for angle in np.pi / 3 * np.arange(6)]
     spun = tuple(RotorSettings(position_m=hub, spin=1 if n % 2 else -1) for n, hub in enumerate(hubs))
     flight = flown(1.0, vehicle=replace(VEHICLE, rotors=spun))
     assert flight.signals["rotor_speed"].shape == (101, 6)
@@ -309,12 +304,10 @@ def test_limits_of_tilt_and_velocity_are_kept_and_reached():
     assert room.limits == ("", "")
     path, _, _, room = of(size_rad=0.4, tilt_max=0.1, band_hz=(0.5, 1.0))
     assert room.limits == ("tilt (trajectory.tilt_max_rad = 0.1)",) * 2
-    tilt = tilt_of(flown_along(path, room.added).attitude).max()
-    assert 0.0995 < tilt <= 0.1
+    assert 0.0995 < tilt_of(flown_along(path, room.added).attitude).max() <= 0.1
     _, _, _, room = of(size_rad=0.4, velocity_max_m_s=0.2, band_hz=(0.5, 1.0))
     assert all("trajectory.excite.velocity_max_m_s = 0.2" in limit for limit in room.limits)
-    velocity = np.linalg.norm(room.added.motion[1], axis=1).max()
-    assert 0.199 < velocity <= 0.2
+    assert 0.199 < np.linalg.norm(room.added.motion[1], axis=1).max() <= 0.2
 
 
 def test_rotors_keep_what_control_takes():
@@ -329,8 +322,7 @@ def test_rotors_keep_what_control_takes():
 
 def test_the_largest_speed_is_named():
     hover = float(np.sqrt(hover_squared(USUAL).max()))
-    weak = replace(USUAL, rotor_speed_max_rad_s=1.15 * hover)
-    _, _, _, room = of(weak, size_rad=0.1)
+    _, _, _, room = of(replace(USUAL, rotor_speed_max_rad_s=1.15 * hover), size_rad=0.1)
     largest = f"rotor speed (85 % of the square of vehicle.rotor_speed_max_rad_s = {1.15 * hover:g})"
     assert room.limits == (largest, largest)
 
@@ -438,8 +430,7 @@ def test_a_new_actuator_effect_is_a_link_of_the_chain(monkeypatch):
     assert free.signals["rotor_speed"].min() < 345 < free.signals["rotor_speed"].max() < 500
     assert flight.rotor_speed is None
     np.testing.assert_array_equal(flight.signals["position"], free.signals["position"])
-    slow = flown_with(monkeypatch, limited_rotors=(345.0,))
-    assert slow.position[-1, 2] < free.position[-1, 2] - 0.01
+    assert flown_with(monkeypatch, limited_rotors=(345.0,)).position[-1, 2] < free.position[-1, 2] - 0.01
 
 
 def test_a_new_effect_on_the_vehicle_is_one_function(monkeypatch):

@@ -67,16 +67,14 @@ def test_body_torque_is_the_change_of_angular_momentum():
     time = 0.02 * np.arange(300)
     change = (angular_momentum(time + STEP) - angular_momentum(time - STEP)) / (2 * STEP)
     expected = orientation(time).inv().apply(change)
-    torque = flown().signals["body_torque"]
-    np.testing.assert_allclose(torque, expected, atol=1e-5 * np.abs(expected).max())
+    np.testing.assert_allclose(flown().signals["body_torque"], expected, atol=1e-5 * np.abs(expected).max())
 
 
 def test_work_of_the_torque_is_the_change_of_rotational_energy():
     signals, time = flown().signals, 0.02 * np.arange(300)
     power = np.sum(signals["torque"] * signals["attitude_rate"], axis=1)
     energy = 0.5 * np.einsum("ni,ij,nj->n", signals["body_rate"], TENSOR, signals["body_rate"])
-    work = trapezoid(power, time)
-    assert work == pytest.approx(energy[-1] - energy[0], abs=1e-4 * np.ptp(energy))
+    assert trapezoid(power, time) == pytest.approx(energy[-1] - energy[0], abs=1e-4 * np.ptp(energy))
 
 
 def test_rotors_give_back_the_torque_and_the_weight():
@@ -139,8 +137,7 @@ def test_noise_comes_from_the_given_generator():
 
 
 def test_what_no_rotor_can_do_is_reported_and_left_out():
-    weak = VehicleSettings(rotor_speed_max_rad_s=348.5)
-    flight = flown(vehicle=weak)
+    flight = flown(vehicle=VehicleSettings(rotor_speed_max_rad_s=348.5))
     speed = flight.signals["rotor_speed"]
     assert {one.kind for one in flight.infeasible} == {"above the limit"}
     for one in flight.infeasible:
@@ -158,8 +155,7 @@ def test_relative_noise_on_a_rotor_that_can_never_turn_so_fast():
 
 def turning(samples=500):
     """Three constant Euler rates; the second sample has a pitch of exactly 90 degrees."""
-    time = 0.02 * np.arange(samples)
-    attitude = np.outer(time, RATE)
+    attitude = np.outer(0.02 * np.arange(samples), RATE)
     attitude[1, 1] = 0.5 * np.pi
     zero = np.zeros((samples, 3))
     return {"attitude": attitude, "attitude_rate": zero + RATE, "attitude_acceleration": zero}
@@ -186,8 +182,7 @@ def test_torques_are_finite_and_agree_through_a_vertical_pitch():
 
 def test_noise_of_the_body_torque_goes_into_the_generalised_one():
     signals = held(noise={"body_torque": 0.2}).signals
-    clean = held().signals
-    assert (signals["body_torque"] - clean["body_torque"]).std() == pytest.approx(0.2, rel=0.1)
+    assert (signals["body_torque"] - held().signals["body_torque"]).std() == pytest.approx(0.2, rel=0.1)
     generalised = rotations.generalised_torque(signals["attitude"], signals["body_torque"])
     np.testing.assert_allclose(signals["torque"], generalised, atol=1e-12)
 
@@ -244,8 +239,7 @@ def test_thrust_carries_and_accelerates_the_mass():
 
 def test_too_much_thrust_is_said_with_its_time():
     # Climbs with 2 m/s^2 at 4 s; four rotors of 121.5e-6 N s^2 give 6 kg * (9.81 + 1) m/s^2 at 365.2 rad/s.
-    vehicle = VehicleSettings(rotor_speed_max_rad_s=np.sqrt(6 * 10.81 / (4 * 121.5e-6)))
-    found, trajectory = asked(vehicle)
+    found, trajectory = asked(VehicleSettings(rotor_speed_max_rad_s=np.sqrt(6 * 10.81 / (4 * 121.5e-6))))
     (thrust,) = found.too_much
     assert (thrust.limit, thrust.worst) == (pytest.approx(6 * 10.81), pytest.approx(6 * 11.81, rel=1e-9))
     assert trajectory.time[thrust.at] == pytest.approx(4.0)

@@ -122,8 +122,7 @@ def test_a_flight_is_that_of_an_adaptive_integrator(load):
     off = np.abs(fine - exact).max(axis=0)
     assert off.max() < 3e-5
     # Of second order: what is left falls to a quarter, and without it next to nothing is left.
-    left = np.abs((4 * fine - coarse) / 3 - exact).max(axis=0)
-    assert (left < 0.02 * off + 1e-9).all()
+    assert (np.abs((4 * fine - coarse) / 3 - exact).max(axis=0) < 0.02 * off + 1e-9).all()
 
 
 def test_values_are_taken_in_the_order_of_the_catalogue_or_by_name():

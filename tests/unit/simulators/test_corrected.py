@@ -50,7 +50,13 @@ def effect(name, **values):
     return named_effect(name, numbers=[number(key, *np.atleast_1d(value)) for key, value in values.items()])
 
 
-def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(), hidden=(), vehicle=None):
+def files_of(of, *effects, vehicle=SMALL.vehicle, flights=(ONE,), **found):
+    """What is said of a file and the corrected ones, where flights were compared with a vehicle."""
+    usual = {"verdict": "NAMED", "contradictions": (), "rivals": {}, "not_excited": ()}
+    return corrected(of, vehicle, SimpleNamespace(effects=effects, **(usual | found)), list(flights))
+
+
+def correct(path, *effects, alternatives=(), hidden=(), vehicle=None, **found):
     of = of_log(read_model(path), None, None)
     vehicle = vehicle or VehicleSettings(
         mass_kg=of.mass_kg,
@@ -68,10 +74,8 @@ def correct(path, *effects, alternatives=(), verdict="NAMED", contradictions=(),
     rivals = {}
     for each in alternatives:
         rivals.setdefault(each.instead_of, []).append(each)
-    found = SimpleNamespace(
-        verdict=verdict, contradictions=contradictions, rivals=rivals, effects=effects, not_excited=hidden
-    )
-    said, files = corrected(of, vehicle, found, [ONE, TWO])
+    found |= {"rivals": rivals, "not_excited": hidden}
+    said, files = files_of(of, *effects, vehicle=vehicle, flights=(ONE, TWO), **found)
     (path.parent / "new").mkdir(exist_ok=True)
     for name, content in files.items():
         (path.parent / "new" / name).write_bytes(content)
@@ -164,8 +168,7 @@ def test_numbers_that_instruments_do_not_identify_stay(mine):
 
 
 def test_a_yaw_torque_is_corrected_once(mine):
-    wrong = effect("drag_factor_error", error=0.2), effect("parameter_error", inertia_z=0.8)
-    said, new = correct(mine, *wrong)
+    said, new = correct(mine, *(effect("drag_factor_error", error=0.2), effect("parameter_error", inertia_z=0.8)))
     assert [each.element for each in said.changes] == ["momentConstant"]
     assert new.rotors[0].drag_factor == pytest.approx(1.2 / 1.8 * SMALL.drag_factor, rel=1e-3)
 
@@ -360,15 +363,12 @@ MJCF = """<mujoco model="cf2">
 
 def test_inertia_and_centre_of_mjcf(tmp_path):
     """Its controls are thrusts: what the flights say of them has no place in the file, and is listed."""
-    path = put_file(tmp_path / "cf2.xml", MJCF)
-    of, vehicle = of_log(read_model(path), None, None), SMALL.vehicle
-    effects = (
+    said, files = files_of(
+        of_log(read_model(put_file(tmp_path / "cf2.xml", MJCF)), None, None),
         effect("parameter_error", inertia_x=0.445, thrust_scale=-0.17),
         effect("com_offset", c_x=(0.002, 1e-4), c_y=(0.0, 1e-4)),
         effect("rotor_drag", k_d=(1e-5, 1e-6)),
     )
-    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, effects=effects, not_excited=())
-    said, files = corrected(of, vehicle, found, [ONE])
     (new,) = files.values()
     assert b'pos="0.002 0 0" mass="0.045" diaginertia="4.438e-05 4.2e-5 6.6e-5"/> <!-- by CAD -->' in new
     assert [each.element for each in said.changes] == ["ixx", "pose x"]
@@ -436,8 +436,7 @@ def test_thrusts_as_controls_are_not_what_flights_were_compared_with(tmp_path):
     path.write_text(text.replace(".006", ".0045"))
     of = of_log(read_model(path), None, None)
     effects = (effect("drag_factor_error", error=0.25), effect("rotor_mismatch", difference_1=(0.1, 0.001)))
-    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, effects=effects, not_excited=())
-    said, files = corrected(of, SMALL.vehicle, found, [ONE])
+    said, files = files_of(of, *effects)
     assert files["cf2.xml"] == path.read_bytes()
     assert said.elsewhere[0].startswith(
         "thrust, as a factor on that which flights were compared with: M1 1.05 [1.05, 1.05], M3 0.95 [0.9495, 0.9505]; "
@@ -473,9 +472,7 @@ def test_a_first_link_without_mass_leaves_the_heaviest(tmp_path):
 @pytest.mark.parametrize("name", ["a--b---.csv", "\u00fc--.csv", "-->.csv", "line\nbreak.csv"])
 def test_no_name_of_a_log_ends_the_comment(mine, name):
     of = of_log(read_model(mine), None, None)
-    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
-                            effects=(effect("drag_factor_error", error=0.25),))  # fmt: skip
-    _, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name=name)])
+    _, files = files_of(of, effect("drag_factor_error", error=0.25), flights=[SimpleNamespace(name=name)])
     comment = files["mine.sdf"].decode("ascii").partition("<!-- Corrected")[2].partition("-->")[0]
     assert "--" not in comment
     assert comment.endswith(" ")
@@ -495,11 +492,8 @@ def test_each_file_says_its_own_changes(tmp_path):
     whole = (
         "<sdf version='1.9'><model name='w'><include merge='true'><uri>model://base</uri></include>\n{}</model></sdf>"
     )
-    path = put_file(tmp_path / "whole" / "model.sdf", whole.format("".join(plugins)))
-    of = of_log(read_model(path), None, None)
-    found = SimpleNamespace(verdict="NAMED", contradictions=(), rivals={}, not_excited=(),
-                            effects=(effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17),))  # fmt: skip
-    _, files = corrected(of, SMALL.vehicle, found, [ONE])
+    of = of_log(read_model(put_file(tmp_path / "whole" / "model.sdf", whole.format("".join(plugins)))), None, None)
+    _, files = files_of(of, effect("parameter_error", inertia_x=0.5, thrust_scale=-0.17))
     assert list(files) == ["model.sdf", "base-model.sdf"]
     own, base = (text.decode().partition("<!-- Corrected")[2].partition("-->")[0] for text in files.values())
     assert "motorConstant" in own
@@ -510,8 +504,7 @@ def test_each_file_says_its_own_changes(tmp_path):
 
 def test_files_of_one_name_are_numbered():
     files = [Path("w/model.sdf"), Path("a/base/model.sdf"), Path("b/base/model.sdf"), Path("c/base2-model.sdf")]
-    model = SimulatorModel("m", "sdf", (), (), (), (), tuple(files))
-    assert list(model.output_names.values()) == [
+    assert list(SimulatorModel("m", "sdf", (), (), (), (), tuple(files)).output_names.values()) == [
         "model.sdf", "base-model.sdf", "base2-model.sdf", "c-base2-model.sdf"
     ]  # fmt: skip
 
@@ -534,8 +527,7 @@ def test_python_is_corrected_in_place(tmp_path):
         effect("rotor_drag", k_d=(2e-7, 1e-8)),
         effect("motor_lag", time_constant_s=(0.05, 0.002)),
     )
-    changes = {change.element: change.after for change in said.changes}
-    assert changes == {
+    assert {change.element: change.after for change in said.changes} == {
         "quad_params.k_eta": 1.66e-8,
         "quad_params.Ixx": float(f"{1.5 * 0.83 * 3.7e-5:.4g}"),
         "quad_params.k_d": 2e-7,
@@ -597,8 +589,7 @@ def test_thrust_of_ardupilot_is_the_reciprocal_of_its_hover_throttle(tmp_path, c
 def test_a_direction_that_no_flight_shows_stays(mine):
     """The log states another one, and its flight has no speeds of rotors."""
     of = replace(of_log(read_model(mine), None, None), spins=(-1, 1, -1, -1))
-    found = SimpleNamespace(verdict="NO_GAP", contradictions=(), rivals={}, effects=(), not_excited=())
-    said, files = corrected(of, SMALL.vehicle, found, [SimpleNamespace(name="one.csv", rotor_speed=None)])
+    said, files = files_of(of, verdict="NO_GAP", flights=[SimpleNamespace(name="one.csv", rotor_speed=None)])
     assert files["mine.sdf"] == mine.read_bytes()
     assert said.unchanged[0].startswith("directions of rotors: no flight of more than 5 s")
 
@@ -629,8 +620,7 @@ def test_rotors_of_rotorpy_move_around_its_centre(tmp_path):
     for own in (path, path.parent / "new" / path.name):
         names: dict = {}
         exec(own.read_text(), names)
-        vehicle = multirotor(names["quad_params"])
-        wrenches.append(vehicle.compute_body_wrench(rate, speeds, air))
+        wrenches.append(multirotor(names["quad_params"]).compute_body_wrench(rate, speeds, air))
     (force, torque), (after, moved) = wrenches
     np.testing.assert_allclose(after, force, rtol=1e-12)
     thrusts = before.rotors[0].thrust.value * (speeds**2).sum()
@@ -640,8 +630,7 @@ def test_rotors_of_rotorpy_move_around_its_centre(tmp_path):
 
 def test_rotors_of_crazyflow_move_in_its_plane(tmp_path):
     """Its mixing matrix times L has the levers of thrust, and none of heights."""
-    path = put_file(tmp_path / "params.toml", SECTION.format(name="a"))
-    said, new, before = shifted(path)
+    said, new, before = shifted(put_file(tmp_path / "params.toml", SECTION.format(name="a")))
     np.testing.assert_allclose(new.hubs[:, :2], before.hubs[:, :2] - SHIFT[:2], rtol=0, atol=3e-5)
     entries = {f"a.mixing_matrix[{row}][{rotor}]" for row in (0, 1) for rotor in range(4)}
     assert {change.element for change in said.changes} == entries

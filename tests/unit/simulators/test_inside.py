@@ -214,8 +214,7 @@ def test_limits_of_speeds_hold(tmp_path, commanded, lags):
     text = re.sub(r"('rotor_speed_min': *)[^,]*", rf"\g<1>{lowest}", rotorpy_of(TRUE))
     limited = flown(given(tmp_path, "py", text), commanded, lags=lags)[1]
     held = replace(commanded, speed=np.full_like(commanded.speed, lowest))
-    free = flown(given(tmp_path, "py"), held, lags=lags)[1]
-    np.testing.assert_allclose(limited, free, atol=1e-9)
+    np.testing.assert_allclose(limited, flown(given(tmp_path, "py"), held, lags=lags)[1], atol=1e-9)
 
 
 def test_a_second_flight_has_the_steps_of_the_file(tmp_path, flight):
@@ -249,8 +248,7 @@ def test_what_an_export_says_of_controls_holds(tmp_path, flight):
     order = (2, 0, 3, 1)
     of = replace(of_log(read_model(tmp_path / "v.xml"), None, None), order=order)
     own = free_runs(player_of(model, flight), flight, starts(flight), HORIZON).errors
-    mixed = replace(flight, speed=flight.speed[:, order])
-    _, theirs = flown(of, mixed)
+    _, theirs = flown(of, replace(flight, speed=flight.speed[:, order]))
     assert (apart(own, theirs) < AGREE).all()
 
 
@@ -284,8 +282,7 @@ def test_a_file_is_flown_as_given_and_as_corrected(tmp_path, held, ending, monke
             text.replace("<option", '<compiler meshdir="parts"/><option').replace(*seen) for text in (wrong, right)
         )
     monkeypatch.chdir(tmp_path)
-    of = given(Path(), ending, wrong)
-    played_back, found = both(of, held, {f"v.{ending}": right.encode()})
+    played_back, found = both(given(Path(), ending, wrong), held, {f"v.{ending}": right.encode()})
     assert found.program.startswith({"xml": "MuJoCo ", "py": "RotorPy "}[ending])
     assert found.why_not == ""
     for name in ("before", "after"):
@@ -310,8 +307,7 @@ def test_a_run_that_ran_away_stays_as_it_was(flight):
 def test_what_runs_away_in_mujoco_writes_nothing(tmp_path, flight, monkeypatch, capfd):
     require("xml")
     monkeypatch.chdir(tmp_path)
-    of = given(tmp_path, "xml", mjcf_of(TRUE, SPINS, thrust=1e12))
-    flies = flies_of(of, np.ones(4))
+    flies = flies_of(given(tmp_path, "xml", mjcf_of(TRUE, SPINS, thrust=1e12)), np.ones(4))
     course = Course(flight, np.array([3, 40]), 4)
     assert (inside.runs_of(course, flies(course, False)).diverged >= 0).all()
     assert [path.name for path in tmp_path.iterdir()] == ["v.xml"]

@@ -30,8 +30,7 @@ def exported(folder, form, vehicle):
 
 @pytest.mark.parametrize("form", ["sdf", "px4", "urdf", "mjcf"])
 def test_an_exported_vehicle_is_read_again(tmp_path, form):
-    vehicle = vehicle_of(truth()).model
-    held, read = exported(tmp_path, form, vehicle)
+    held, read = exported(tmp_path, form, vehicle_of(truth()).model)
     np.testing.assert_allclose(read.mass_kg, held.body.mass, **CLOSE)
     np.testing.assert_allclose(
         [read.inertia[at] for at in INERTIA_ENTRIES], [held.body.inertia[at] for at in INERTIA_ENTRIES], rtol=1e-9,
@@ -202,8 +201,7 @@ def test_rotors_of_urdf_on_arms_of_their_own_are_in_the_axes_of_what_these_hang_
     text = urdf_of(SMALL)
     path.write_text(text)
     for index in range(4):
-        joint = f'<joint name="rotor_{index}_joint"'
-        begin = text.index(joint)
+        begin = text.index(f'<joint name="rotor_{index}_joint"')
         place = re.search(r'<origin xyz="([^"]+)"/>', text[begin:])[1]
         arm = f"""<link name="arm_{index}"/><joint name="fixed_{index}" type="fixed"><parent link="base_link"/>
         <child link="arm_{index}"/><origin xyz="{place}" rpy="0 0 {0.7 * index + 0.7}"/></joint>"""

@@ -57,8 +57,7 @@ def test_rotors_that_nothing_separates_are_said(tmp_path):
 
 
 def test_places_that_do_not_fit_leave_the_order_of_the_file(tmp_path):
-    crowded = [(1.0, -1.0, -1), (1.0, -1.1, 1), (1.0, -0.9, -1), (-1.0, 1.0, 1)]
-    vehicle = of(tmp_path, (-1, 1, -1, 1), crowded)
+    vehicle = of(tmp_path, (-1, 1, -1, 1), [(1.0, -1.0, -1), (1.0, -1.1, 1), (1.0, -0.9, -1), (-1.0, 1.0, 1)])
     assert vehicle.order == (0, 1, 2, 3)
     assert "no order of its rotors fits that of the log" in vehicle.warnings[0]
 
@@ -78,8 +77,7 @@ def test_single_rotors_turn_as_the_log_has_them(tmp_path, turned, sure, has_log)
 
 def test_a_largest_speed_that_a_log_let_one_guess_is_that_of_the_model(tmp_path):
     """Whose config was made with another log: what is guessed makes no other vehicle."""
-    path = put_file(tmp_path / "mine.sdf", sdf_of(LARGE, spins=(-1, 1, -1, 1)))
-    model = read_model(path)
+    model = read_model(put_file(tmp_path / "mine.sdf", sdf_of(LARGE, spins=(-1, 1, -1, 1))))
     fast = 1.3 * model.speed_max.value
     proposal = SimpleNamespace(airframe=None, rotors=4, speed_max=fast, share_of_speed=False)
     like = replace(LARGE.vehicle, rotor_speed_max_rad_s=1.5 * model.speed_max.value)
@@ -117,8 +115,7 @@ def test_a_file_of_gazebo_is_flown_by_the_equations_of_its_plugin(tmp_path, has)
 
 
 def test_what_a_file_of_rotorpy_states_besides_flies_too(tmp_path):
-    whole = replace(model(), effects=truth().effects)
-    made = exported(sheet_of_vehicle(whole), "rotorpy", "v.py")
+    made = exported(sheet_of_vehicle(replace(model(), effects=truth().effects)), "rotorpy", "v.py")
     (tmp_path / "v.py").write_text(made.text)
     of = of_log(read_model(tmp_path / "v.py"), None, None)
     flies = {each.name: each.coefficients for each in vehicle_of(of, of, STATED).effects}

@@ -16,6 +16,7 @@ from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.gusty_flights import SMALL
 from tests.builders.playback_flights import truth
 from tests.builders.simulator_files import FRAME, HEADER, SECTION, rotorpy_of
+from tests.builders.studies import put_file
 from tests.builders.vehicle_models import vehicle_of
 
 CLOSE = {"rtol": 1e-9, "atol": 1e-15}
@@ -27,9 +28,7 @@ def mine(tmp_path):
     """Write a text as a file of a name."""
 
     def write(name, text):
-        path = tmp_path / name
-        path.write_text(text)
-        return path
+        return put_file(tmp_path / name, text)
 
     return write
 

@@ -165,8 +165,7 @@ def test_logs_whose_autopilot_flies_no_mission_are_followed_by_sticks(tmp_path):
     assert command_line(to_fly(replace(job, inputs=[]))).startswith("cpfls trajectory ")
     # Of flights that were imported, and of a vehicle that was found, the file says what wrote the log.
     for systems, by_hand in ((("Betaflight 4.3.0",), True), (("Betaflight 4.3.0", "PX4 1.13.3"), False), ((), False)):
-        planned = command_line(to_fly(replace(job, inputs=[]), systems=systems))
-        assert planned.startswith("fly by hand") is by_hand
+        assert command_line(to_fly(replace(job, inputs=[]), systems=systems)).startswith("fly by hand") is by_hand
 
 
 @pytest.mark.parametrize(
@@ -178,8 +177,7 @@ def test_a_model_that_is_not_to_be_taken_is_not_gone_on_with(rates, goes_on):
     """Leave the model as it is, was said above a command that plays the other one back."""
     study = validate(parse_config(CONFIG, "config"), "config")
     job = Job(study, Path("own/gap"), False, False, lambda *_: None, lambda _: None, config=Path("c.yaml"))
-    pair = made.played_pair(body_rate=rates, attitude=rates)
-    found = made.diagnosis("PARTIAL", playback=pair)
+    found = made.diagnosis("PARTIAL", playback=made.played_pair(body_rate=rates, attitude=rates))
     assert next_command(job, found, ("cpfls", "replay"), ("cpfls", "response"), Path("d.h5"))[1] == goes_on
 
 

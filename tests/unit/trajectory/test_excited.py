@@ -116,9 +116,7 @@ def test_it_begins_and_ends_at_rest_and_is_as_large_as_asked_for(signal, axis, c
 
 def test_axes_of_a_multisine_are_hardly_correlated_and_sweeps_take_turns():
     """Without the fades they are not at all."""
-    along = curves(excited(hovering()))
-    values = np.array(list(along.values()))
-    assert np.abs(np.corrcoef(values) - np.eye(4)).max() < 0.2
+    assert np.abs(np.corrcoef(np.array(list(curves(excited(hovering())).values()))) - np.eye(4)).max() < 0.2
     swept = np.array(list(curves(excited(hovering(signal="sweep-linear"))).values()))
     moving = np.abs(swept) > 1e-3 * np.abs(swept).max(axis=1, keepdims=True)
     for number in range(4):
@@ -245,8 +243,7 @@ def test_each_run_begins_and_ends_at_rest_after_a_pause(pair):
 
 def test_the_whole_mission_is_one_smooth_motion(pair):
     _, mission = pair
-    step = mission.time[1]
-    np.testing.assert_allclose(np.diff(mission.time), step)
+    np.testing.assert_allclose(np.diff(mission.time), mission.time[1])
     names = ("position", "velocity", "acceleration", "jerk")
     pairs = [(getattr(mission, low), getattr(mission, high)) for low, high in pairwise(names)]
     pairs += [(mission.attitude, mission.attitude_rate), (mission.yaw, mission.yaw_rate)]

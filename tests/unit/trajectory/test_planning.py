@@ -60,8 +60,7 @@ def test_yaw_makes_one_turn_from_rest_to_rest(diagonal):
 
 
 def test_yaw_keeps_the_proportions_of_the_holds():
-    settings = TrajectorySettings(legs=1, duration_s=40.0, hold_velocity_s=4.0, sample_time_s=0.5)
-    trajectory = plan(settings, GRAVITY)
+    trajectory = plan(TrajectorySettings(legs=1, duration_s=40.0, hold_velocity_s=4.0, sample_time_s=0.5), GRAVITY)
     # The velocity hold is a fifth of the move, so a fifth of the turn's time has constant yaw rate.
     turning = trajectory.yaw_rate[(trajectory.time >= 16) & (trajectory.time <= 24)]
     np.testing.assert_allclose(turning, turning[0], rtol=1e-12)
@@ -191,8 +190,7 @@ def test_each_axis_takes_as_long_as_the_slowest_alone():
 
 
 def test_what_nothing_limits_has_no_solution_and_nothing_moves_where_nothing_is_asked():
-    limits = Limits(velocity=np.array([1.0, np.inf]))
-    each = synchronised(np.array([1.0, 1.0]), limits)
+    each = synchronised(np.array([1.0, 1.0]), Limits(velocity=np.array([1.0, np.inf])))
     assert [move.outcome for move in each] == [MoveOutcome.SOLVED, MoveOutcome.NO_LIMIT]
     moves = synchronised(np.zeros(3), Limits(velocity=1.0))
     assert [(move.outcome, move.duration) for move in moves] == [(MoveOutcome.ZERO_DISPLACEMENT, 0.0)] * 3
@@ -255,9 +253,8 @@ def oscillation(time):
     """Acceleration, jerk and snap of a sinusoidal motion, and a yaw that oscillates on top of a turn."""
     angle = np.outer(time, FREQUENCIES) + PHASES
     sine, cosine = AMPLITUDES * np.sin(angle), AMPLITUDES * np.cos(angle)
-    translation = np.stack([sine, FREQUENCIES * cosine, -(FREQUENCIES**2) * sine])
     heading = [0.8 * time + 0.5 * np.sin(2 * time), 0.8 + np.cos(2 * time), -2 * np.sin(2 * time)]
-    return translation, np.stack(heading)
+    return np.stack([sine, FREQUENCIES * cosine, -(FREQUENCIES**2) * sine]), np.stack(heading)
 
 
 def flown(time):
@@ -323,8 +320,7 @@ def spectral_derivative(values, duration):
 def test_derivatives_are_those_of_the_spectrum():
     path = drawn()
     motion, turning = path.sample(path.times(64)), 2 * np.pi / DURATION * path.turns
-    swing = motion.attitude - path.times(64)[:, None] * turning
-    rate = spectral_derivative(swing, DURATION)
+    rate = spectral_derivative(motion.attitude - path.times(64)[:, None] * turning, DURATION)
     np.testing.assert_allclose(motion.attitude_rate, rate + turning, atol=1e-11)
     np.testing.assert_allclose(motion.attitude_acceleration, spectral_derivative(rate, DURATION), atol=1e-10)
 
@@ -351,8 +347,7 @@ def test_every_angle_turns_through_complete_circles():
 
 @pytest.mark.parametrize("settings", [{}, {"rate_max_rad_s": 2.0}, {"acceleration_max_rad_s2": 1e6}])
 def test_one_limit_is_used_up(settings):
-    limits = RotationLimits(RotationSettings(**settings))
-    assert 0.999 < limits.peaks(drawn(**settings)).max() <= 1
+    assert 0.999 < RotationLimits(RotationSettings(**settings)).peaks(drawn(**settings)).max() <= 1
 
 
 def test_torque_limit_binds_where_it_is_the_stricter():

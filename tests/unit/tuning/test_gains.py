@@ -73,8 +73,7 @@ def test_what_flights_leave_open_costs_gain():
 
 
 def test_one_disk_holds_all_margins_and_no_proposal_leaves_the_documented_range():
-    asked = AskedMargins(6.0, 45.0, 35.0)
-    assert np.degrees(2 * np.arctan(asked.disk / 2)) == pytest.approx(45.0)
+    assert np.degrees(2 * np.arctan(AskedMargins(6.0, 45.0, 35.0).disk / 2)) == pytest.approx(45.0)
     assert AskedMargins(12.0, 30.0, 20.0).disk == pytest.approx(2 * (10**0.6 - 1) / (10**0.6 + 1))
     parameter = AUTOPILOTS["ardupilot"].named("ATC_ANG_YAW_P")
     low, inside = proposal_of(parameter, 1.3), proposal_of(parameter, 4.567)
@@ -185,9 +184,7 @@ def test_a_vehicle_that_hovers_nowhere_between_idle_and_full_thrust_is_refused(m
 
 def test_intervals_become_the_corners_of_the_plant():
     plant = AxisPlant(100.0, 0.0, 0.0, 1.0, 0.0, 0.04, 0.0)
-    intervals = {"I": (0.9, 1.2), "k": (0.95, 1.05), "lag": (0.5, 1.5)}
-    spread = spread_of(intervals, "I", "k")
-    corners = list(spread.corners(plant))
+    corners = list(spread_of({"I": (0.9, 1.2), "k": (0.95, 1.05), "lag": (0.5, 1.5)}, "I", "k").corners(plant))
     assert (corners[0], len(corners)) == (plant, 5)
     assert sorted({each.gain for each in corners}) == pytest.approx([95 / 1.2, 100.0, 105 / 0.9])
     assert list(Spread().corners(plant)) == [plant]

@@ -119,8 +119,12 @@ def blank_flight(samples):
     return still_flight(np.zeros((samples, 3)))
 
 
-def test_a_fortieth_of_the_flight_unless_asked_otherwise():
-    data = blank_flight(4000)
+@pytest.mark.parametrize(
+    "data",
+    [blank_flight(4000), Flights((blank_flight(2000), blank_flight(2000)))],
+    ids=["one", "two, without their pause"],
+)
+def test_a_fortieth_of_the_flights_unless_asked_otherwise(data):
     blocks = time_blocks(data, None)
     assert blocks.duration == pytest.approx(1.0)
     np.testing.assert_array_equal(blocks.labels(data), np.arange(4000) // 100)
@@ -150,13 +154,6 @@ def test_a_selection_counts_the_blocks_that_it_is_in():
     learned = data[np.array([5, 7, 150, 151, 3999])]
     assert blocks.number(learned.time).tolist() == [0, 0, 1, 1, 39]
     assert blocks.labels(learned).tolist() == [0, 0, 1, 1, 2]
-
-
-def test_the_pause_between_flights_counts_for_nothing():
-    both = Flights((blank_flight(2000), blank_flight(2000)))
-    blocks = time_blocks(both, None)
-    assert blocks.duration == pytest.approx(1.0)
-    np.testing.assert_array_equal(blocks.labels(both), np.arange(4000) // 100)
 
 
 def test_a_pause_starts_a_stretch_and_jitter_does_not():

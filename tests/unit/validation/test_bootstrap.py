@@ -86,8 +86,7 @@ def test_draws_are_those_of_all_rows_solved_again(base, every):
     np.testing.assert_allclose(model.coefficients, x[first:] / fit.column_size, atol=1e-8)
     np.testing.assert_allclose(draws.coefficients, expected[:, first:] / fit.column_size, atol=1e-8)
     np.testing.assert_allclose(draws.rigid_body, expected[:, :first] if first else np.zeros((DRAWS, 6)), atol=1e-8)
-    alone = (rigid * scale[:, None]).reshape(-1, RIGID)
-    best, expected = brute_force(alone, np.zeros(RIGID), y, label)
+    best, expected = brute_force((rigid * scale[:, None]).reshape(-1, RIGID), np.zeros(RIGID), y, label)
     np.testing.assert_allclose(fit_baselines(learned, fit.row_scale, 1e-10)[0].parameters, best, atol=1e-10)
     np.testing.assert_allclose(draws.best_rigid_body, expected, atol=1e-9)
     assert (draws.blocks, draws.block_duration) == (BLOCKS, pytest.approx(0.2))
@@ -117,8 +116,7 @@ def test_a_seed_gives_the_same_draws_and_chunks_change_nothing(base, monkeypatch
 @pytest.mark.parametrize("base", ["none", "rigid-body"])
 @pytest.mark.parametrize("samples", [12, 45, 200])
 def test_noise_free_data_and_short_flights_give_finite_draws(base, samples):
-    whole = bending_flight(bent=0.0, noise=0.0)
-    training = whole[:samples]
+    training = bending_flight(bent=0.0, noise=0.0)[:samples]
     settings = IdentificationSettings(**STRUCTURE, base=base)
     settings = replace(settings, ridge=replace(settings.ridge, embargo_s=0.0))
     evaluator = model_evaluator(training, training, settings)

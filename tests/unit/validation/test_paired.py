@@ -89,8 +89,7 @@ def test_left_is_what_samples_do_not_tell_of_values_that_are_true(case):
 
 @pytest.mark.parametrize("penalty", [0.0, 1e-30, 1e-3], ids=["none", "rounding", "some"])
 def test_all_is_left_of_a_direction_that_no_sample_sees(penalty):
-    gram = np.diag([4.0, 1.0, 0.0])[None]
-    scores = BlockScores(gram, np.zeros((1, 3)), np.full(3, penalty), np.ones(3))
+    scores = BlockScores(np.diag([4.0, 1.0, 0.0])[None], np.zeros((1, 3)), np.full(3, penalty), np.ones(3))
     left = scores.undetermined(np.array([[3.0, -2.0, 5.0]]), TOLERANCE)
     np.testing.assert_allclose(left, [[3.0 * penalty / (4 + penalty), -2.0 * penalty / (1 + penalty), 5.0]], atol=1e-15)
 
@@ -103,13 +102,12 @@ def test_solution_is_that_of_least_squares(case):
 def test_directions_that_nothing_determines_stay_where_they_are():
     rng = np.random.default_rng(2)
     A = rng.standard_normal((BLOCKS, ROWS, 4)) @ rng.standard_normal((4, PARAMETERS))
-    scores = BlockScores(
+    moved = BlockScores(
         A.swapaxes(1, 2) @ A,
         np.einsum("bnp,bn->bp", A, rng.standard_normal((BLOCKS, ROWS))),
         np.zeros(PARAMETERS),
         np.zeros(PARAMETERS),
-    )
-    moved = scores.draws(rng.standard_normal((50, BLOCKS)), 1e-6)
+    ).draws(rng.standard_normal((50, BLOCKS)), 1e-6)
     null = linalg.null_space(A.reshape(-1, PARAMETERS))
     assert null.shape[1] == 1
     assert np.abs(moved).max() > 0.01
@@ -138,8 +136,7 @@ def test_a_better_model_is_found_and_one_bad_block_of_twenty_is_not_better():
     assert (found.lower, found.higher) == (True, False)
     assert found.ratio == pytest.approx(0.8, abs=0.08)
     theirs = np.ones(MOST_COMPARED)
-    ours = np.where(np.arange(MOST_COMPARED) == 3, 100.0, 0.9)
-    found = compare_errors(ours, theirs, 1.0)
+    found = compare_errors(np.where(np.arange(MOST_COMPARED) == 3, 100.0, 0.9), theirs, 1.0)
     assert (found.lower, found.higher) == (False, False)
 
 
@@ -212,8 +209,7 @@ def test_a_vertical_pitch_throughout_is_nothing_to_compare():
 
 def coloured(rng, samples, memory):
     share = np.exp(-1 / memory)
-    white = rng.standard_normal((300 + samples, 3))
-    return lfilter([np.sqrt(1 - share**2)], [1, -share], white, axis=0)[300:]
+    return lfilter([np.sqrt(1 - share**2)], [1, -share], rng.standard_normal((300 + samples, 3)), axis=0)[300:]
 
 
 @pytest.mark.parametrize("samples", [40, 100, 200, 1000])
@@ -333,8 +329,7 @@ def test_without_a_rigid_body_errors_are_those_of_refits(every):
         found = []
         for judged, left_out in zip(blocks.validation, blocks.left_out, strict=True):
             part, rest = learned[np.flatnonzero(~left_out)], training[np.flatnonzero(judged)]
-            A = columns(part.motion)
-            x = linalg.lstsq(A.reshape(part.torque.size, -1), part.torque.ravel())[0]
+            x = linalg.lstsq(columns(part.motion).reshape(part.torque.size, -1), part.torque.ravel())[0]
             found.append(np.mean(((rest.torque - columns(rest.motion) @ x) * scale) ** 2))
         return np.mean(found), np.std(found, ddof=1) / 2
 
@@ -355,8 +350,7 @@ def test_without_a_rigid_body_errors_are_those_of_refits(every):
 def test_over_a_rigid_body_it_is_the_ridge_curve_of_the_structure():
     training, chosen = bending_flight(bent=1.0), settings("rigid-body", harmonic_order=1)
     compared = compare_structures(training, training, chosen)
-    with_folds = replace(chosen, ridge=replace(chosen.ridge, folds=4))
-    evaluator = model_evaluator(training, training, with_folds)
+    evaluator = model_evaluator(training, training, replace(chosen, ridge=replace(chosen.ridge, folds=4)))
     curve = evaluator.solver.curve(uniform_breakpoints(evaluator.structure))
     own = int(np.flatnonzero(compared.own)[0])
     assert compared.error[own] == pytest.approx(curve.error[curve.chosen])
@@ -385,8 +379,7 @@ def test_structures_that_the_samples_cannot_tell_are_left_out():
     assert np.max(compared.parameters) <= 3 * 45
     assert np.isfinite(compared.error).all()
     data = bending_flight()
-    shipped = compare_structures(data, data, settings("none", harmonic_order=8, membership_functions=9))
-    assert not shipped.own.any()
+    assert not compare_structures(data, data, settings("none", harmonic_order=8, membership_functions=9)).own.any()
 
 
 @pytest.mark.parametrize("base", ["none", "rigid-body"])

@@ -81,7 +81,9 @@ def test_a_polynomial_has_a_value_for_each_product_of_its_numbers():
     assert branch.terms["b",].tolist() == [[1.0, 1.0], [0.0, 0.0]]
 
 
-@pytest.mark.parametrize("case", [lambda a: 1.0 / a, lambda a: a**0.5, lambda a: F.largest(a, 1.0)])
+@pytest.mark.parametrize(
+    "case", [lambda a: 1 / a, lambda a: a > 0, lambda a: a**0.5, lambda a: a / a, lambda a: F.largest(a, 1.0)]
+)
 def test_what_is_no_polynomial_is_refused(case):
     with pytest.raises(NoPolynomialError):
         case(Polynomial.number("a"))
@@ -91,10 +93,8 @@ def formulas(functions, a, b):
     """Some of all that symbols can do; of scalars, vectors, and one value a rotor."""
     each = functions.rotors([0.3, -0.4, 2.0]) + a[0]
     limited = functions.smallest(functions.largest(each * b[2], -0.5), 0.5)
-    rows = (a, b, cross(a, b))
-    turned = apply(transposed(rows), subtract(a, scaled(0.5, b)))
     return (
-        *add(turned, (0, 0, -9.81)),
+        *add(apply(transposed((a, b, cross(a, b))), subtract(a, scaled(0.5, b))), (0, 0, -9.81)),
         functions.total(limited / (1 + each**2)),
         functions.sqrt(dot(a, a)) ** -0.5 - functions.exp(-functions.absolute(a[1])),
         functions.where(a[0] > b[0], a[0], functions.where(a[1] < 0.0, b[1], b[2])),
@@ -126,8 +126,7 @@ def test_what_is_computed_twice_is_written_once_and_what_no_result_needs_not_at_
 
 
 def test_what_is_known_is_folded_in_and_what_is_nothing_costs_nothing():
-    graph = Graph()
-    (x,) = graph.inputs("x", 1)
+    (x,) = Graph().inputs("x", 1)
     assert [x * 0, 0.0 * x, 0 / x] == [0, 0, 0]
     assert [one is x for one in (x + 0, 0.0 + x, x * 1.0, x / 1, x - 0)] == [True] * 5
     assert SYMBOLS.sin(0.5) == math.sin(0.5)
@@ -182,8 +181,7 @@ def test_derivatives_are_written_as_numbers_with_derivatives_have_them(short):
     # What was given is not written into by what is computed later, also of other sizes.
     function((x + 1.0,), (w - 1.0,))
     function((x[:3],), (w[:, :3],))
-    expected = of_rotors(ARRAYS, *differentiated(0.4, x), w)
-    for own, value, each in zip(by, values, expected, strict=True):
+    for own, value, each in zip(by, values, of_rotors(ARRAYS, *differentiated(0.4, x), w), strict=True):
         np.testing.assert_allclose(value, each.value, rtol=1e-13)
         np.testing.assert_allclose(own, [each.by[place] for place in sorted(each.by)], rtol=1e-13)
     ahead, behind = (of_rotors(ARRAYS, 0.4, x + step, w) for step in (1e-6, -1e-6))
@@ -236,11 +234,10 @@ def test_demand_of_six_rotors_gives_the_wrench_with_the_smallest_norm():
 
 def test_what_rotors_cannot_do_is_reported_and_not_clipped():
     hover = 6 * 9.81
-    thrust = np.full(5, hover)
     torque = np.zeros((5, 3))
     torque[1, 0] = 2 * hover * ARM
     torque[3, 0] = 3 * hover * ARM
-    demand = rotor_demand(VehicleSettings(rotor_speed_max_rad_s=500.0), thrust, torque)
+    demand = rotor_demand(VehicleSettings(rotor_speed_max_rad_s=500.0), np.full(5, hover), torque)
     squared_2, squared_4 = demand.squared_speed[3, [1, 3]]
     assert squared_2 == pytest.approx(hover / THRUST * (1 / 4 - 3 / 2))
     assert squared_4 == pytest.approx(hover / THRUST * (1 / 4 + 3 / 2))
@@ -312,7 +309,6 @@ def test_inertia_that_no_body_has_is_refused(inertia, message):
 
 def test_the_radius_of_a_propeller_is_positive_or_not_known():
     read = TypeAdapter(RotorSettings).validate_json
-    texts = ("{}", '{"radius_m": null}', '{"radius_m": 0.2}')
-    assert [read(text).radius_m for text in texts] == [None, None, 0.2]
+    assert [read(text).radius_m for text in ("{}", '{"radius_m": null}', '{"radius_m": 0.2}')] == [None, None, 0.2]
     with pytest.raises(ValidationError):
         read('{"radius_m": 0.0}')

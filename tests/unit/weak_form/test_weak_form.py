@@ -34,8 +34,7 @@ def test_slope_is_the_derivative_of_the_window():
 
 @pytest.mark.parametrize("samples", [8, 9, 40])
 def test_the_derivative_of_time_is_1_however_few_samples_a_window_has(samples):
-    window = windows(0.01, 0.01 * samples, 0.5)
-    np.testing.assert_allclose(window.derivative(TIME), 1.0, rtol=1e-9)
+    np.testing.assert_allclose(windows(0.01, 0.01 * samples, 0.5).derivative(TIME), 1.0, rtol=1e-9)
 
 
 def test_a_line_is_seen_at_the_centre_of_each_window():
@@ -110,9 +109,8 @@ def test_fit_uses_all_blocks_and_its_errors_are_those_of_textbooks():
 def test_errors_never_fall_below_those_of_unit_noise():
     columns, right, block = problem(2)
     flat = columns.reshape(-1, COLUMNS)
-    expected = np.sqrt(np.diag(np.linalg.inv(flat.T @ flat)))
     _, unsure = folds(columns, 0.1 * right, block).conditional_on(np.array([0])).fit(np.arange(1, 5))
-    np.testing.assert_allclose(unsure, expected[1:], rtol=1e-6)
+    np.testing.assert_allclose(unsure, np.sqrt(np.diag(np.linalg.inv(flat.T @ flat)))[1:], rtol=1e-6)
 
 
 @pytest.mark.parametrize("known", [0.0, 0.3])
@@ -154,8 +152,7 @@ def test_a_subtracted_column_is_gone_from_the_right_side_and_channels_weigh_what
     for b in range(BLOCKS):
         seen, unseen = (tuple(each[rows] for each in by_hand) for rows in (block != b, block == b))
         for draw in range(3):
-            expected = least_squares(seen[0], seen[1][..., draw])
-            left = unseen[1][..., draw] - unseen[0] @ expected
+            left = unseen[1][..., draw] - unseen[0] @ least_squares(seen[0], seen[1][..., draw])
             assert found[b, draw] == pytest.approx((left**2).sum())
 
 

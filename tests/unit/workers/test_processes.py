@@ -18,6 +18,7 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.evolution.archive import Evaluation
 from cpfls_cli.workers.workforce import WorkerError, Workforce, attempt, chunks, employ, result_of
 from tests.builders.evaluators import DEADLY_POISON, POISON, Failing, Loading, Logging, Reporting, Uneven, Unloadable
+from tests.builders.studies import put_file
 
 ROOT = Path(__file__).parents[3]
 GENES = np.random.default_rng(5).integers(0, 32768, (40, 6))
@@ -129,8 +130,7 @@ if __name__ == "__main__":
 
 @pytest.fixture
 def parent(tmp_path):
-    script = tmp_path / "parent.py"
-    script.write_text(PARENT)
+    script = put_file(tmp_path / "parent.py", PARENT)
     free = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     with subprocess.Popen(
         [sys.executable, script],
