@@ -166,6 +166,12 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         if len(names) in (1, len(first)):
             break
     rows = _rows(chain(begun, lines), delimiter, line)
+    # A loop that writes a separator behind each field leaves an empty one, in either of both.
+    while len(names) > len(first) > 0 and not names[-1]:
+        names.pop()
+    if len(first) > len(names) > 1 and not any(first[len(names) :]):
+        rows = ((at, own[: len(names)] if not any(own[len(names) :]) else own) for at, own in rows)
+        first = first[: len(names)]
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
         rows = ((at, list(map(_with_points, fields))) for at, fields in rows)
         first = list(map(_with_points, first))
