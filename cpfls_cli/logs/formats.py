@@ -189,7 +189,7 @@ def _reader(path: Path) -> ModuleType:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
         free = ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS if form.by_content))
         must = f"its name must end in one of {named}, or it must hold one of {free}"
-        raise InputError(f"{path}: not a log: {must}; {TABLE_ENDS}")
+        raise InputError(f"{path}: not a log: {must}, or a line of column names above numbers")
     alike = [other for other in LOG_FORMATS if other.begins(first)]
     if alike and form not in alike:
         remedy = f"rename it to end in {alike[0].suffix}" if alike[0].suffix else "rename it without an ending"
