@@ -21,6 +21,7 @@ from cpfls_cli.logs.records import date, seconds
 _NANOSECOND = 10**9
 _MICROSECONDS = 1000
 _SAME_CLOCK_S = 1.0
+_SLOWEST = 20.0  # Times that a simulation may take as long, or as short, as real time; a stamp that stays is no clock.
 _MOST_NUMBERS = 64
 _WITHOUT_NUMBERS = re.compile(r"sensor_msgs/msg/(Image|CompressedImage|PointCloud2?)")
 _STANDARD = re.compile(r"(sensor|geometry|nav)_msgs/msg/")
@@ -164,10 +165,12 @@ def _sent(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _drifts(received: np.ndarray, sent: dict[str, np.ndarray]) -> bool:
-    """Tell whether a sender's clock runs steadily away from the recorder's."""
-    late = received - sent.get(STAMP, received)
+    """Tell whether a sender's clock runs steadily away from the recorder's, at a pace that a simulation may have."""
+    own = sent.get(STAMP, received)
+    late, spans = received - own, (own[-1] - own[0], received[-1] - received[0])
     same = _SAME_CLOCK_S * _NANOSECOND
-    return bool(abs(late[-1] - late[0]) > same and (np.abs(np.diff(late)) < same).all())
+    runs = spans[1] < _SLOWEST * spans[0] < _SLOWEST**2 * spans[1]
+    return bool(runs and abs(late[-1] - late[0]) > same and (np.abs(np.diff(late)) < same).all())
 
 
 _Pace = tuple[np.ndarray, np.ndarray]  # Stamps of the recorder and of another clock, ns.
