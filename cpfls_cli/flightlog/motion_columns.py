@@ -109,8 +109,12 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
                 f"{named.group.pattern} is {fit.gain:.3g} times as large as the attitude's derivative, which no unit"
                 " explains: is the unit of the stamps right?"
             )
-        sure: Sure = "data" if agrees else "guess"
-        seen.take(named, unit, _rates_in_words(named, fit, unit, scale), sure, scale, fit.order, fit.sign)
+        # Attitudes are filtered by more than what these two are apart.
+        counts = Rival(f"unit: deg/s, scale: {1 / _COUNTS:.4g}", "if it is counts of 16 bits, which are 6 % more")
+        rivals = (counts,) if agrees and scale < 1.0 and stated is None else ()
+        sure: Sure = "data" if agrees and not rivals else "guess"
+        words = _rates_in_words(named, fit, unit, scale)
+        seen.take(named, unit, words, sure, scale, fit.order, fit.sign, rivals)
         _doubt_rates(seen, named, fit)
         return
     values = seen.grid(named)

@@ -687,6 +687,14 @@ def test_a_jolt_at_touchdown_in_counts_of_a_gyroscope_is_no_loss_of_control():
     assert recognise(log.topics, log.units, {}, "").flown.ended == ""
 
 
+def test_counts_of_a_gyroscope_and_thousandths_of_its_rates_are_too_alike_to_choose(own):
+    for scale in (16.4 * 180 / np.pi, 1000.0):
+        guess = seen(flat_log(own, rate=named(np.round(scale * own.rate), *GYRO))).signal("body_rate")
+        assert (guess.columns.unit, guess.columns.scale, guess.sure) == ("rad/s", 0.001, "guess")
+        assert "scale: 0.06098" in guess.rivals[0].text
+    assert seen(flat_log(own, rate=named(np.degrees(own.rate), *GYRO))).signal("body_rate").sure == "data"
+
+
 def test_a_track_of_positions_is_no_log_of_a_flight():
     log = {"": {name: np.arange(100.0) ** 2 for name in ("millis", "latitude", "Longitude", "altitude", "speed")}}
     log[""]["millis"] = np.arange(100.0)
