@@ -85,6 +85,15 @@ def test_a_separator_at_the_end_of_lines_parts_nothing(tmp_path, text):
         log_contents(tmp_path / "log.csv")
 
 
+def test_zeros_that_a_card_holds_where_nothing_was_written_are_no_values(tmp_path):
+    zeros = "\0" * 512
+    (tmp_path / "log.csv").write_text(f"t,roll\n0,1\n{zeros}1,2\n2,3\n{zeros}")
+    assert listed(log_contents(tmp_path / "log.csv"))[""] == {"t": [0, 1, 2], "roll": [1, 2, 3]}
+    (tmp_path / "log.csv").write_text(f"t,roll\n0,1\n{zeros}t, roll \n0,3\n")
+    with pytest.raises(InputError, match=r"log.csv:3: the column names again, of another log: keep one of them"):
+        log_contents(tmp_path / "log.csv")
+
+
 @pytest.mark.parametrize("name", ["log.txt", "log.dat", "log", "log.data"])
 def test_a_table_with_a_line_of_names_may_end_otherwise(tmp_path, name):
     (tmp_path / name).write_text("time, theta, m1, f\n0.25, -1.5, 1000, inf\n0.5, 2e-3, 1000, 3\n")
