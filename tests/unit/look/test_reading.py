@@ -240,7 +240,7 @@ def test_of_derivatives_without_angles_it_is_said_what_a_gyroscope_is_best_calle
     for name in [name for name in fields if name.startswith(("gyro", "q", "roll", "pitch", "yaw"))]:
         del fields[name]
     fields |= named(OWN.rate, "phi_dot_cal", "theta_dot_cal", "psi_dot_cal")
-    with pytest.raises(InputError, match="psi_dot_cal may be derivatives of angles; .* best called gyro_x"):
+    with pytest.raises(InputError, match=r"psi_dot_cal may be derivatives of angles; .* best called gyro_x"):
         read(contents)
 
 
