@@ -74,6 +74,11 @@ _STEADY: Final = 0.15
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
 _BATTERY_V = (2.5, 80.0)  # From one cell that is empty to more than a large vehicle has.
 _ON_EARTH: Final = (("lat", "latitude"), ("lon", "lng", "long", "longitude"))
+_OF_TRACKS: Final = {
+    *(word for axis in _ON_EARTH for word in axis),
+    *"t time timestamp date utc millis ms us s sec seconds alt altitude height elevation m deg degrees kmh".split(),
+    *"speed ground velocity vel heading course track sog cog gps fix hdop vdop pdop sats satellites num".split(),
+}
 _SHOWN = 4  # Groups of columns that are named where others are taken for the same.
 _UP: Final = {"FLU": "up", "FRD": "down"}
 
@@ -167,7 +172,7 @@ def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
     if system and not log.flat:
         return f"holds only {some([*log.topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight"
     words = {word for name in log.names for word in words_of(name)}
-    if all(words & {*axis} for axis in _ON_EARTH):
+    if words <= _OF_TRACKS and all(words & {*axis} for axis in _ON_EARTH):
         return (
             f"a track of positions ({some([*log.names], _SHOWN)}) holds no motion of the body: give the autopilot's log"
         )

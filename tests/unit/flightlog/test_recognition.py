@@ -700,6 +700,10 @@ def test_a_track_of_positions_is_no_log_of_a_flight():
     log[""]["millis"] = np.arange(100.0)
     with pytest.raises(InputError, match=r"a track of positions \(millis, latitude.* give the autopilot's log"):
         recognise(log, {}, {}, "")
+    # What else is in it may be motion of the body.
+    log[""]["kippwinkel"] = np.arange(100.0) ** 2
+    with pytest.raises(InputError, match="no column is recognised as a signal of a flight"):
+        recognise(log, {}, {}, "")
 
 
 def test_columns_of_something_else_are_refused_by_name():
