@@ -44,7 +44,7 @@ from cpfls_cli.flightlog.stated_vehicle import (
 )
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
-from cpfls_cli.flightlog.vocabulary import KNOWN
+from cpfls_cli.flightlog.vocabulary import KNOWN, OF_TRACKS
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, known_unit
 from cpfls_cli.words import joined, some
@@ -74,11 +74,6 @@ _STEADY: Final = 0.15
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
 _BATTERY_V = (2.5, 80.0)  # From one cell that is empty to more than a large vehicle has.
 _ON_EARTH: Final = (("lat", "latitude"), ("lon", "lng", "long", "longitude"))
-_OF_TRACKS: Final = {
-    *(word for axis in _ON_EARTH for word in axis),
-    *"t time timestamp date utc millis ms us s sec seconds alt altitude height elevation m deg degrees kmh".split(),
-    *"speed ground velocity vel heading course track sog cog gps fix hdop vdop pdop sats satellites num".split(),
-}
 _SHOWN = 4  # Groups of columns that are named where others are taken for the same.
 _UP: Final = {"FLU": "up", "FRD": "down"}
 
@@ -172,7 +167,7 @@ def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
     if system and not log.flat:
         return f"holds only {some([*log.topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight"
     words = {word for name in log.names for word in words_of(name)}
-    if words <= _OF_TRACKS and all(words & {*axis} for axis in _ON_EARTH):
+    if words <= OF_TRACKS and all(words & {*axis} for axis in _ON_EARTH):
         return (
             f"a track of positions ({some([*log.names], _SHOWN)}) holds no motion of the body: give the autopilot's log"
         )
