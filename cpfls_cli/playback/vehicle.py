@@ -269,7 +269,7 @@ def _identified(
     if constants is None or not constants.identified:
         return None
     # Where instruments find the same body the fit is the vehicle's, and takes more from the flights.
-    return constants if loop.unexplained or constants.contradict(fitted.body.inertia) else None
+    return constants if loop.unexplained or constants.contradict(fitted.body.inertia, loop.low, loop.high) else None
 
 
 class Held(NamedTuple):
