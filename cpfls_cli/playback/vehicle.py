@@ -556,11 +556,12 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
 def widened_by_law(numbers: Sequence[FoundNumber], rises: tuple[float, float]) -> Iterator[FoundNumber]:
     """Widen the intervals of the inertia by what is not known of the thrust of commands where no law was found.
 
-    Weight shows the thrust that carries it, and rotation how it changes over the moments of inertia.
+    Weight shows the thrust that carries it, and rotation how it changes over the moments of inertia, and how their drag
+    does.
     """
     lawless = LAW not in {number.name for number in numbers}
     for number in numbers:
-        widened = lawless and number.name.startswith("inertia.")
+        widened = lawless and number.name.startswith(("inertia.", "drag_factor"))
         low, high = (number.low * rises[0], number.high * rises[1]) if widened else number[3:5]
         known = not widened or high <= KNOWN * low
         yield number._replace(low=low, high=high, determined=number.determined and known)

@@ -195,6 +195,8 @@ def test_an_inertia_of_commands_is_as_open_as_their_law():
     assert (inertia.low, inertia.high, inertia.determined) == (pytest.approx(0.72), 1.1, True)
     assert thrust == numbers[1]
     assert not next(widened_by_law(numbers, (0.5, 1.0))).determined
+    drag = FoundNumber("drag_factor", "", 1.0, 0.9, 1.1, np.nan, True, False)
+    assert next(widened_by_law([drag], (0.5, 1.0))) == drag._replace(low=0.45, determined=False)
     law = FoundNumber("thrust_law.linear", "", 0.3, 0.2, 0.4, np.nan, True, False)
     assert next(widened_by_law([*numbers, law], (0.5, 1.0))) == numbers[0]
 
