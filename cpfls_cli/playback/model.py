@@ -9,6 +9,7 @@ from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
@@ -31,6 +32,9 @@ from cpfls_cli.vehicle.values import Functions, Tangent, Value, Vector, dot, min
 
 if TYPE_CHECKING:
     from cpfls_cli.regressor.regressor import InertiaValues
+
+_DISCHARGE_S = 10.0
+"""Over which a voltage is averaged: dips are shorter, which answer commands or are noise, a discharge is longer."""
 
 
 @result
@@ -311,6 +315,9 @@ class VehicleModel:
             # The fullest battery of other flights is another one.
             share = signals.voltage * (signals.full_voltage / self.full_voltage)
             signals = replace(signals, voltage=share, full_voltage=self.full_voltage)
+        if signals.voltage is not None:
+            samples = max(1, round(_DISCHARGE_S / signals.period))
+            signals = replace(signals, voltage=uniform_filter1d(signals.voltage, samples, mode="nearest"))
         for one in self.filters:
             apply = one.effect.apply
             if apply is not None and not one.effect.missing(signals):
