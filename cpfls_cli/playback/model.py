@@ -37,6 +37,19 @@ _DISCHARGE_S = 10.0
 """Over which a voltage is averaged: dips are shorter, which answer commands or are noise, a discharge is longer."""
 
 
+def _discharging(signals: Signals, full: float) -> Signals:
+    """Take the voltage of a flight as a share of a full one, in V, without its dips and noise about the discharge."""
+    if signals.voltage is None:
+        return signals
+    # The fullest battery of other flights is another one; 1 is that of shares.
+    ratio = 1.0 if 1.0 in {signals.full_voltage, full} else signals.full_voltage / full
+    time = np.linspace(-1.0, 1.0, len(signals))
+    line = np.polynomial.Polynomial.fit(time, signals.voltage, min(1, len(signals) - 1))(time)
+    samples = max(1, round(_DISCHARGE_S / signals.period))
+    slow = line + uniform_filter1d(signals.voltage - line, samples, mode="nearest")
+    return replace(signals, voltage=ratio * slow, full_voltage=signals.full_voltage / ratio)
+
+
 @result
 class Remainder:
     """What has no name: torque and force over the direction of the airflow, by a periodic fuzzy system.
@@ -311,13 +324,7 @@ class VehicleModel:
             signals = replace(signals, vehicle=self.vehicle)
         if any(self.wind):
             signals = replace(signals, wind=np.array(self.wind))
-        if signals.voltage is not None and {signals.full_voltage, self.full_voltage}.isdisjoint({1.0}):
-            # The fullest battery of other flights is another one.
-            share = signals.voltage * (signals.full_voltage / self.full_voltage)
-            signals = replace(signals, voltage=share, full_voltage=self.full_voltage)
-        if signals.voltage is not None:
-            samples = max(1, round(_DISCHARGE_S / signals.period))
-            signals = replace(signals, voltage=uniform_filter1d(signals.voltage, samples, mode="nearest"))
+        signals = _discharging(signals, self.full_voltage)
         for one in self.filters:
             apply = one.effect.apply
             if apply is not None and not one.effect.missing(signals):

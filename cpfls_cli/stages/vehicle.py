@@ -394,9 +394,8 @@ def _supplied_alike(flights: Sequence[LoggedFlight]) -> tuple[Sequence[LoggedFli
     if not without or len(without) == len(flights) or not flights[0].parts[0].commanded:
         return flights, ()
     said = f"the voltage of the battery is not used, because not all flights have it: {joined(without)} without"
-    return [replace(flight, parts=tuple(replace(part, voltage=None) for part in flight.parts)) for flight in flights], (
-        said,
-    )
+    alike = [replace(flight, parts=tuple(replace(part, voltage=None) for part in flight.parts)) for flight in flights]
+    return alike, (said,)
 
 
 def _require_rotors(flight: LoggedFlight) -> None:
