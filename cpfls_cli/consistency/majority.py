@@ -287,7 +287,8 @@ def _read_rightly(now: _Compared, channel: str) -> _Read | None:
     known = all(signals.attitude is not None for signals in now.flights)
     best, least, mistakes = None, np.empty(0), 0
     for repair, what in _readings(channel):
-        read = _tuned(now, repair, what) if known or not repair.needs_attitude else None
+        possible = (known or not repair.needs_attitude) and not _outweighs(now, repair)
+        read = _tuned(now, repair, what) if possible else None
         if read is None:
             continue
         nearest = _clearest(now.checked(read[0]))
@@ -297,6 +298,15 @@ def _read_rightly(now: _Compared, channel: str) -> _Read | None:
         if better:
             best, least, mistakes = read, rest, number
     return best
+
+
+def _outweighs(now: _Compared, repair: ChannelRepair) -> bool:
+    """Check whether an accelerometer that is said to lack gravity feels it: on average it carries the weight."""
+    felt = [signals.specific_force for signals in now.flights if signals.specific_force is not None]
+    if repair.channel != "specific_force" or not repair.gravity_m_s2 or not felt:
+        return False
+    along_z = float(np.concatenate(felt)[:, 2].mean() * repair.matrix[2, 2])
+    return abs(along_z - repair.gravity_m_s2) < abs(along_z)
 
 
 def _surely_less(after: Array, before: Array) -> bool:

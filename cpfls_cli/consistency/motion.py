@@ -422,8 +422,10 @@ def _problems(check: PairCheck) -> Iterator[Finding]:
         return
     yield from _scales_off(check)
     offset = check.second.mean(axis=0) - check.first.mean(axis=0)
+    # A thrust may be off by as much as a wrong factor makes it.
+    most = _GRAVITY_OFF_M_S2 if pair.exact else STANDARD_GRAVITY / 2
     for axis, own in zip(AXES, offset.tolist(), strict=True):
-        if pair.first != "position" and abs(own) > _GRAVITY_OFF_M_S2:
+        if pair.first != "position" and abs(own) > most:
             what = f"{pair.words} differ by {own:.1f} m/s^2 along {axis}, as if one included gravity"
             yield pair.finding(what, own, "m/s^2")
     if pair.exact and check.visible.any() and check.delay.beyond(_DELAY_OFF_S):

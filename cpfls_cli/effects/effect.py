@@ -33,7 +33,7 @@ class Coefficient:
     meaning: str
     scale: Callable[[VehicleSettings], float] | None = None  # Natural size on a vehicle, in `unit`; None for 1.
     of_log: bool = False  # Whether it is of the log, and not of the motion.
-    by_force: bool = False  # Whether flights without force do not identify it, so that it is 0 in them.
+    by_force: bool = False  # Whether its force identifies it: without an accelerometer its torque is left out.
 
     def bounds(self, vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the coefficient on a vehicle, in `unit`."""

@@ -38,9 +38,9 @@ _BY_NAME, _WEIGHT = 2.0, 1.15
 _FAST_HZ, _DERIVED = 10.0, 0.8
 # Residual of a velocity in body axes, as a share of that in those of the world, that shows the former.
 _CLOSER = 0.4
-# What names a derivative; difference of Euler and body rates, as a share of them, that matters to nothing; and what is
+# Difference of Euler and body rates, as a share of them, that matters to nothing; and what is
 # left of rates by the ones, as a share of what is left by the others, that shows the former.
-_DERIVATIVE, _ALIKE, _CLEARLY = ("dot",), 0.02, 0.8
+_ALIKE, _CLEARLY = 0.02, 0.8
 _TUMBLES = 3.0  # Times the rate that 95 % of a log stay below.
 # Correlations of one axis: below the first a column follows nothing, below the second it runs the other way.
 _ALONG, _AGAINST = 0.3, -0.6
@@ -109,8 +109,12 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
                 f"{named.group.pattern} is {fit.gain:.3g} times as large as the attitude's derivative, which no unit"
                 " explains: is the unit of the stamps right?"
             )
-        sure: Sure = "data" if agrees else "guess"
-        seen.take(named, unit, _rates_in_words(named, fit, unit, scale), sure, scale, fit.order, fit.sign)
+        # Attitudes are filtered by more than what these two are apart.
+        counts = Rival(f"unit: deg/s, scale: {1 / _COUNTS:.4g}", "if it is counts of 16 bits, which are 6 % more")
+        rivals = (counts,) if agrees and scale < 1.0 and stated is None else ()
+        sure: Sure = "data" if agrees and not rivals else "guess"
+        words = _rates_in_words(named, fit, unit, scale)
+        seen.take(named, unit, words, sure, scale, fit.order, fit.sign, rivals)
         _doubt_rates(seen, named, fit)
         return
     values = seen.grid(named)
@@ -137,6 +141,12 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
     sure = "guess" if rivals or fit is not None else "named"
     reason = f"{called(named)}, {size_in_words}{turned}; {against}"
     seen.take(named, unit, reason, sure, scale, sign=named.sign, rivals=rivals)
+
+
+def size_by_angles(rates: Array, angles: Array, rate_hz: float) -> float | None:
+    """Give what rates are over those in rad/s, by derivatives of angles in rad; None where these do not say it."""
+    fit = fit_axes(slow(first_derivative(np.unwrap(angles, axis=0), rate_hz), rate_hz), slow(rates, rate_hz))
+    return nearest(fit.gain, sizes("body_rate")).size if fit.explained > GOOD else None
 
 
 def _rates_in_words(named: Named, fit: AxisFit, unit: str, scale: float) -> str:
@@ -181,8 +191,7 @@ def without_euler_rates(log: LogTable, candidates: Mapping[SignalName, list[Name
     """
     angles = next(iter(candidates.get("attitude", ())), None)
     others, derivatives = (
-        [own for own in candidates.get("body_rate", ()) if (own.group.words[-1:] == _DERIVATIVE) is derived]
-        for derived in (False, True)
+        [own for own in candidates.get("body_rate", ()) if own.group.derivative is derived] for derived in (False, True)
     )
     rates = others + [own for own in derivatives if angles is not None and _turns_as_body(log, angles, own)]
     kept = {name: own for name, own in candidates.items() if name != "body_rate"}

@@ -83,6 +83,11 @@ class ColumnGroup:
         before, _, after = self.pattern.rpartition(self.ending) if self.ending else (self.pattern, "", "")
         return words_of(f"{before} {after}")
 
+    @property
+    def derivative(self) -> bool:
+        """Whether the name is that of a derivative."""
+        return _first_hand(self.words)[-1:] == ("dot",)
+
     @cached_property
     def last_words(self) -> tuple[str, ...]:
         """Words of the last part of a path that has any: a structure ``output`` may hold whatever was measured."""
@@ -97,6 +102,13 @@ def words_of(text: str) -> tuple[str, ...]:
     for pattern, one in vocabulary.ONE_WORD.items():
         words = re.sub(pattern, one, words)
     return tuple(words.split())
+
+
+def _first_hand(words: tuple[str, ...]) -> tuple[str, ...]:
+    """Leave out what was done to a signal where it ends a name, which does not say what the signal is."""
+    while len(words) > 1 and words[-1] in vocabulary.SECOND_HAND:
+        words = words[:-1]
+    return words
 
 
 @cache
@@ -351,6 +363,8 @@ def _stated_unit(group: ColumnGroup, signal: SignalName) -> tuple[UnitName, floa
 def _means(meaning: Meaning, group: ColumnGroup, words: tuple[str, ...]) -> bool:
     """Tell whether words mean a signal; positions, rotors and angles have ways of their own."""
     own, signal = {*words}, meaning.signal
+    if meaning.last:
+        words = _first_hand(words)
     # A name that ends in the unit of a rate or of a speed is one.
     ending = WRITTEN.get(_symbols(group.ending))
     ends_in_speed = ending is not None and KNOWN_UNITS[ending[0]].si == "rad/s"

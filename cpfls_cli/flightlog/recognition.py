@@ -25,6 +25,7 @@ from cpfls_cli.flightlog.names import (
     named_signals,
     nameless_signals,
     only_of_airplanes,
+    words_of,
 )
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
 from cpfls_cli.flightlog.recognised import Load, LogTable, Recognition, Rival, Seen, called
@@ -43,7 +44,7 @@ from cpfls_cli.flightlog.stated_vehicle import (
 )
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
-from cpfls_cli.flightlog.vocabulary import KNOWN
+from cpfls_cli.flightlog.vocabulary import KNOWN, OF_TRACKS
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, known_unit
 from cpfls_cli.words import joined, some
@@ -72,6 +73,7 @@ _SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}  # 
 _STEADY: Final = 0.15
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
 _BATTERY_V = (2.5, 80.0)  # From one cell that is empty to more than a large vehicle has.
+_ON_EARTH: Final = (("lat", "latitude"), ("lon", "lng", "long", "longitude"))
 _SHOWN = 4  # Groups of columns that are named where others are taken for the same.
 _UP: Final = {"FLU": "up", "FRD": "down"}
 
@@ -164,6 +166,11 @@ def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
         return f"no flight in it: {names} never change, or hold too few samples for a flight"
     if system and not log.flat:
         return f"holds only {some([*log.topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight"
+    words = {word for name in log.names for word in words_of(name)}
+    if words <= OF_TRACKS and all(words & {*axis} for axis in _ON_EARTH):
+        return (
+            f"a track of positions ({some([*log.names], _SHOWN)}) holds no motion of the body: give the autopilot's log"
+        )
     shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
     return f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}"
 
@@ -201,11 +208,15 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
         known = [(row.columns, row.scale) for row in KNOWN if row.signal == "height" and is_of(system, row.system)]
         found = next((own for own in (*known, *height_columns(log.names)) if {*own[0]} <= {*log.names}), None)
         height = None if found is None else found[1] * log.on_grid(found[0])[:, 0]
-    if rate is not None:
-        unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(rate), 0.99)) > _FASTEST_RAD_S
-        rate = rate / (_DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0)
     if angles is not None and (first["attitude"].unit == "deg" or float(np.abs(angles).max()) > 2 * np.pi):
         angles = angles / _DEGREES
+    if rate is not None:
+        unit, fast = first["body_rate"].unit, float(np.quantile(np.abs(rate), 0.99)) > _FASTEST_RAD_S
+        size = _DEGREES if unit == "deg/s" or (unit is None and fast) else 1.0
+        if unit is None and fast and angles is not None:
+            # Counts of a sensor, too, are neither.
+            size = motion_columns.size_by_angles(rate, angles, 1 / float(log.grid[1] - log.grid[0])) or size
+        rate = rate / size
     ordered = "quaternion" in first and (first["quaternion"].group.kind == "wxyz" or first["quaternion"].known)
     return Signs(
         time=log.grid - log.grid[0],

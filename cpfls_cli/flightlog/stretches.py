@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import ceil, floor, pi
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -30,6 +30,7 @@ _MEASURED = frozenset(
 )
 _SHORTEST_PAUSE_S = 0.5  # Shorter ones are bridged like gaps.
 _FEWEST_IN_PAUSE = 20
+SILENT: Final = "its source was silent there"
 _USUAL_STEPS = 10  # Times the usual step between updates, and so many rows, from which on a source was silent.
 # Signals that are never straight lines while they are measured.
 _WITNESSES = {"body_rate", "acceleration", "rotor_speed", "rotor_command"}
@@ -150,8 +151,8 @@ def _warn_of_pause(name: str, time: Array, values: Array) -> Iterator[str]:
     if marked.any():
         each = "rotor" if name in ROTORS else "axis"
         yield (
-            f"{name} does not change on any {each} {_when(time, marked)}: its source was silent there, and the last"
-            " value was repeated; cut it off with import.crop_s"
+            f"{name} does not change on any {each} {_when(time, marked)}: {SILENT}, and the last value was repeated;"
+            " cut it off with import.crop_s"
         )
 
 

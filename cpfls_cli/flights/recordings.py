@@ -27,6 +27,7 @@ from cpfls_cli.flightlog.results import Imported
 from cpfls_cli.flightlog.settings import SETPOINTS
 from cpfls_cli.flightlog.smoothing import body_rate_of
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, SLOW_HZ, log_faster, shown_slowly, stated_vehicle
+from cpfls_cli.flightlog.stretches import SILENT
 from cpfls_cli.flights.same_vehicle import require_same_vehicle
 from cpfls_cli.gap.settings import GapSettings
 from cpfls_cli.logs.formats import LogColumns, is_log, read_log
@@ -203,9 +204,10 @@ def read_flight(path: Path, study: Study) -> ReadFlight:
     flight, origin = read_whole(path)
     own = ReadFlight(path.name, flight.signals, units_of(path, origin, study), (), begins=flight.begins)
     if isinstance(flight, Imported):
-        return replace(
-            own, updated_hz=flight.updated_hz, repeated=flight.repeated, stated=flight.stated, system=flight.system
-        )
+        # What the import said of the log is said once; what was not measured is none of it.
+        silent = tuple(words for words in flight.warnings if SILENT in words)
+        own = replace(own, warnings=silent, stated=flight.stated, system=flight.system)
+        return replace(own, updated_hz=flight.updated_hz, repeated=flight.repeated)
     return own
 
 

@@ -155,7 +155,10 @@ def diagnose(
     judged = [replace(each, effect=effect) for each, effect in zip(judged, known, strict=True)]
     progress(0.9, "sensor faults")
     faults = [sensor_fault(finding, prepared.logged(training), weak) for finding in audited.named]
-    doubts = [*_doubts(unnamed, bends, judged, settings), *(refused.sentence for refused in named.refusals)]
+    doubts = [
+        *_doubts(unnamed, bends, judged, named.unsure, settings),
+        *(refused.sentence for refused in named.refusals),
+    ]
     notes = [*not_judged(held_out), *([] if named.differ else doubts)]
     inertial = hypothesis.by_flight(lambda flight, _: flight.motion)
     # Above the floor of the sensors alone.
@@ -222,6 +225,8 @@ class _Named(NamedTuple):
     alike: tuple[Alternative, ...] = ()
     losses: tuple[RotorLoss, ...] = ()
     sure: Mapping[str, float] = MappingProxyType({})
+    unsure: Mapping[str, float] = MappingProxyType({})
+    """Effects that instruments do not show, each with its p-value, and without which a gap above the gusts is left."""
     unidentified: tuple[str, ...] = ()
     small: frozenset[str] = frozenset()
     """Effects whose numbers are by samples."""
@@ -276,6 +281,7 @@ def _gusts(found: NamedFit, given: Instruments, settings: GapSettings) -> Air | 
 def _significant(named: _Named, given: Instruments) -> _Named:
     """Give what was named the numbers that instruments identify, without what is 0 by them."""
     judge, refusals, fit = named.judge, list(named.refusals), named.judgement.found
+    unsure = dict[str, float]()
     while True:
         found = by_instruments(fit, given)
         refusal = ends_on_bound(found)
@@ -289,9 +295,9 @@ def _significant(named: _Named, given: Instruments) -> _Named:
         if not out:
             break
         fewer = fitted(judge.training, [each for each, _ in kept], found.floor, found.settings)
-        # A gap above the gusts is none of them: what it takes to explain it stays, with the p-value that it has.
+        # A gap above the gusts is none of them: what it takes to explain it stays.
         if (fewer.rms_floors > np.maximum(found.rms_floors, CLEAR)).any():
-            kept = significant_effects(found, given, 1.0)
+            unsure = {each.effect.name: chance for each, chance in significant_effects(found, given, 1.0)}
             break
         for effect in out:
             what = "".join(f"all that it adds to {name}" for name in effect.holds & names) or "it"
@@ -300,7 +306,8 @@ def _significant(named: _Named, given: Instruments) -> _Named:
     loose = tuple(effect.name for effect in unidentified(fit, found))
     sure = {each.effect.name: chance for each, chance in kept if np.isfinite(chance)}
     judgement = named.judgement._replace(found=found)
-    return named._replace(judgement=judgement, refusals=refusals, sure=sure, unidentified=loose)
+    unsure = {name: chance for name, chance in unsure.items() if np.isfinite(chance) and name not in sure}
+    return named._replace(judgement=judgement, refusals=refusals, sure=sure, unsure=unsure, unidentified=loose)
 
 
 def _within_bounds(found: NamedFit, given: Instruments) -> tuple[NamedFit, list[Refusal]]:
@@ -444,9 +451,13 @@ def _weightless(named: _Named, effects: Mapping[str, Sequence[Estimate]], least:
 
 
 def _doubts(
-    unnamed: Sequence[str], bends: Sequence[str], judged: Sequence[JudgedEffect], settings: GapSettings
+    unnamed: Sequence[str],
+    bends: Sequence[str],
+    judged: Sequence[JudgedEffect],
+    unsure: Mapping[str, float],
+    settings: GapSettings,
 ) -> Iterator[str]:
-    """Say what intervals cover, whose formula is another one, and which effects are not significant with the others."""
+    """Say what intervals cover, whose formula is another one, and which effects are not significant."""
     if bends:
         yield f"a part of the gap that counts is {' and '.join(bends)}: the formula is another one"
     if unnamed:
@@ -458,6 +469,11 @@ def _doubts(
         title = CATALOGUE[effect.name].title
         if effect.p_value > settings.significance:
             yield f"{title} is not significant jointly with the others, p = {effect.p_value:.2g}"
+        if effect.name in unsure:
+            yield (
+                f"by instruments {title} may be 0 (p = {unsure[effect.name]:.2g}); it is named because without it a gap"
+                " above the gusts is left"
+            )
         if not effect.identified:
             yield (
                 f"instruments do not identify the numbers of {title}: they come from a fit to all motion, in"

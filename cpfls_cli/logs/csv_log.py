@@ -88,6 +88,10 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
             try:
                 numbers.extend(_plain_numbers([row[index] for index in kept]))
             except ValueError:
+                if [own.strip() for own in row] == names:
+                    raise InputError(
+                        f"{path}:{number}: the column names again, of another log: keep one of them"
+                    ) from None
                 numbers.extend([_number(row[index], path, number, names[index]) for index in kept])
             count += 1
     if not count:
@@ -119,7 +123,8 @@ def _opened(path: Path) -> Iterator[_Table]:
             _refuse_inflated(path)
         with opener(path, "rb") as raw, io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as stream:
             # Of a line without an end a part is a row, of another length than all others.
-            yield _table(path, iter(partial(stream.readline, _LONGEST_LINE), ""))
+            # Zeros are what a card holds where nothing was written.
+            yield _table(path, (text.strip("\0") for text in iter(partial(stream.readline, _LONGEST_LINE), "")))
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
@@ -166,6 +171,12 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         if len(names) in (1, len(first)):
             break
     rows = _rows(chain(begun, lines), delimiter, line)
+    # A loop that writes a separator behind each field leaves an empty one, in either of both.
+    while len(names) > len(first) > 0 and not names[-1]:
+        names.pop()
+    if len(first) > len(names) > 1 and not any(first[len(names) :]):
+        rows = ((at, own[: len(names)] if not any(own[len(names) :]) else own) for at, own in rows)
+        first = first[: len(names)]
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
         rows = ((at, list(map(_with_points, fields))) for at, fields in rows)
         first = list(map(_with_points, first))

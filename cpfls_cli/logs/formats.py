@@ -189,7 +189,7 @@ def _reader(path: Path) -> ModuleType:
         named = ", ".join(form.suffix for form in LOG_FORMATS if form.suffix)
         free = ", ".join(dict.fromkeys(form.name for form in LOG_FORMATS if form.by_content))
         must = f"its name must end in one of {named}, or it must hold one of {free}"
-        raise InputError(f"{path}: not a log: {must}; {TABLE_ENDS}")
+        raise InputError(f"{path}: not a log: {must}, or a line of column names above numbers")
     alike = [other for other in LOG_FORMATS if other.begins(first)]
     if alike and form not in alike:
         remedy = f"rename it to end in {alike[0].suffix}" if alike[0].suffix else "rename it without an ending"
@@ -261,7 +261,18 @@ def _format_of(path: Path) -> LogFormat | None:
     named = next((form for form in LOG_FORMATS if form.suffix and name.endswith(form.suffix)), None)
     if named is not None and named.begins(first):
         return named
-    return next((form for form in LOG_FORMATS if form.by_content and form.begins(first)), named)
+    table = LOG_FORMATS[0] if named is None and _is_table(path) else named
+    return next((form for form in LOG_FORMATS if form.by_content and form.begins(first)), table)
+
+
+def _is_table(path: Path) -> bool:
+    """Tell whether a line of column names comes first, and numbers in the next."""
+    try:
+        with path.open("rb") as stream:
+            names, numbers = stream.readline(_LONGEST_LINE), stream.readline(_LONGEST_LINE)
+    except OSError:
+        return False
+    return _is_header(names) and not _NUMBERS_FIRST.match(names) and bool(_NUMBERS_FIRST.match(numbers))
 
 
 def _first_line(path: Path) -> bytes:
@@ -307,6 +318,12 @@ _FOREIGN: Final = (
     (b"\x28\xb5\x2f\xfd", 0, "data compressed by zstd", _UNPACK),
     (b"ustar", 257, "a tar archive", _UNPACK),
     (b"\x93NUMPY", 0, "an array of NumPy", "write it as .npz or CSV, with a name for each column"),
+    (
+        (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"),
+        0,
+        "a pickle of Python",
+        "reading it could run any code; save its numbers as .npz or CSV, with a name for each column",
+    ),
     (b"version https://git-lfs", 0, "a pointer of Git LFS", "fetch it with `git lfs pull`"),
     (b"BUILD", 16, "a .DAT of DJI", "convert it to CSV with DatCon or its like"),
     (b"%PDF", 0, "a PDF", "give the log that it shows"),
@@ -342,8 +359,9 @@ _NUMBER: Final = rb"[-+]?\d[\d.]*+(e[-+]?\d+)?+([-+]\d[\d.]*+(e[-+]?\d+)?+[ij])?
 _NUMBERS: Final = re.compile(
     rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.eij \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n){2}" % ((_NUMBER,) * 3)
 )
-# A line that says before each of its numbers what it is: `Power= 31 FLYMODE Yaw= 261.9 Roll= 2.2`.
-_NAMED_NUMBERS: Final = re.compile(rb"([a-z_][\w. \t]*[=:][ \t]*%b[ \t,;]*){3}" % _NUMBER)
+_NUMBERS_FIRST: Final = re.compile(rb"[ \t]*(%b[ \t]*[,;\t][ \t]*){2}[-+]?\d" % _NUMBER)
+# A line that says before each of its numbers, or of some in brackets, what it is: `Yaw= 261.9 Roll= 2.2 Place: (1, 2)`.
+_NAMED_NUMBERS: Final = re.compile(rb"([a-z_][\w. \t]*[=:][ \t]*+[(\[]?(%b[ \t,;]*+)++[)\]]?[ \t,;]*+){3}" % _NUMBER)
 _SPREADSHEET, _NPY = (b"xl/", b"[Content_Types].xml"), b".npy"
 # A MAVLink frame begins with one of these; before it a telemetry log has its stamp in eight bytes, of 2001 to 2100.
 _TELEMETRY: Final = (".tlog", ".rlog", ".raw", ".mavlink")

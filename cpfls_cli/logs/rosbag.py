@@ -21,6 +21,7 @@ from cpfls_cli.logs.records import date, seconds
 _NANOSECOND = 10**9
 _MICROSECONDS = 1000
 _SAME_CLOCK_S = 1.0
+_SLOWEST = 20.0  # Times that a simulation may take as long, or as short, as real time; a stamp that stays is no clock.
 _MOST_NUMBERS = 64
 _WITHOUT_NUMBERS = re.compile(r"sensor_msgs/msg/(Image|CompressedImage|PointCloud2?)")
 _STANDARD = re.compile(r"(sensor|geometry|nav)_msgs/msg/")
@@ -40,7 +41,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read topics, ``/topic.field.of.message`` with the numbers of arrays one by one.
 
     Stamps are those of the sender, from the header or the field ``timestamp`` (microseconds, as PX4 sends it), and
-    those of the recorder where there are none; ``timestamp_received`` is always the recorder's.
+    those of the recorder where there are none; ``timestamp_received`` is always the recorder's. Where a sender's clock
+    runs at another pace, as a simulation's does, all stamps are put on it.
     """
     try:
         with Reader(path) as reader:
@@ -56,29 +58,36 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
 def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
     topics: dict[str, dict[str, Array]] = {}
     units: dict[str, str] = {}
-    unknown, shifted = [], []
+    read: dict[str, tuple[np.ndarray, dict[str, np.ndarray]]] = {}
+    unknown, shifted, paced = [], [], []
     for topic, about in reader.topics.items():
         kind = about.msgtype or "of several types"
         if wanted is not None and topic not in wanted:
             topics[topic] = {STAMP: np.empty(0)}
         elif about.msgcount and not _WITHOUT_NUMBERS.match(kind):
             try:
-                received, columns = _columns_of_topic(reader, about.connections)
+                read[topic] = _columns_of_topic(reader, about.connections)
             except Exception:
                 # A definition that is missing, of another version or cannot be parsed costs its topic, not the bag.
                 unknown.append(f"{topic} ({kind})")
                 continue
-            topics[topic], offset = _on_clock(received, columns, reader.start_time)
-            shifted += [f"{topic} ({offset:+.3g} s)"] if offset else []
+            topics[topic] = {}
             if _STANDARD.match(kind):
-                known = ((name, unit) for name in columns for pattern, unit in _UNITS if pattern.search(name))
+                known = ((name, unit) for name in read[topic][1] for pattern, unit in _UNITS if pattern.search(name))
                 units |= {f"{topic}.{name}": unit for name, unit in known}
+    pace = _simulated(read)
+    for topic, (received, columns) in read.items():
+        topics[topic], offset = _on_clock(received, columns, reader.start_time, pace)
+        drifts = pace is not None and _drifts(received, _sent(columns))
+        paced += [topic] * drifts
+        shifted += [f"{topic} ({offset:+.3g} s)"] if offset and not drifts else []
     if not topics:
         listed = f": no definition fits {', '.join(unknown)}" if unknown else ""
         raise InputError(f"{path}: a ROS 2 bag without readable messages{listed}")
     causes = (
         ("topics left out because the file has no matching definition of their messages", unknown),
         ("these topics do not use the recorder's clock and are shifted by the median offset", shifted),
+        ("all stamps are put on a clock at another pace than the recorder's, as a simulation's is, that of", paced),
     )
     warnings = tuple(f"{words}: {', '.join(own)}" for words, own in causes if own)
     begins = reader.start_time / _NANOSECOND
@@ -144,16 +153,58 @@ def _at(value: Any, path: _Path) -> Any:
     return value
 
 
-def _on_clock(received: np.ndarray, columns: dict[str, np.ndarray], origin: int) -> tuple[dict[str, Array], float]:
-    """Convert stamps to s from an origin; also how far the sender's clock was shifted, s."""
+def _sent(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Give the stamps of who sent messages, ns, which a header that was left at 0 does not hold."""
     sent = {name: _MICROSECONDS * values.astype(np.int64) for name, values in columns.items() if name.startswith(STAMP)}
     second, part = (columns.get(f"header.stamp.{name}") for name in ("sec", "nanosec"))
-    if second is not None and part is not None and second.all():
-        sent[STAMP] = _NANOSECOND * second.astype(np.int64) + part.astype(np.int64)
-    offset = 0
+    if second is not None and part is not None:
+        stamp = _NANOSECOND * second.astype(np.int64) + part.astype(np.int64)
+        # A simulation begins at 0.
+        sent |= {STAMP: stamp} if second.all() or (stamp.any() and (np.diff(stamp) > 0).all()) else {}
+    return sent
+
+
+def _drifts(received: np.ndarray, sent: dict[str, np.ndarray]) -> bool:
+    """Tell whether a sender's clock runs steadily away from the recorder's, at a pace that a simulation may have."""
+    own = sent.get(STAMP, received)
+    late, spans = received - own, (own[-1] - own[0], received[-1] - received[0])
+    same = _SAME_CLOCK_S * _NANOSECOND
+    runs = spans[1] < _SLOWEST * spans[0] < _SLOWEST**2 * spans[1]
+    return bool(runs and abs(late[-1] - late[0]) > same and (np.abs(np.diff(late)) < same).all())
+
+
+_Pace = tuple[np.ndarray, np.ndarray]  # Stamps of the recorder and of another clock, ns.
+
+
+def _simulated(read: dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]) -> _Pace | None:
+    """Find a clock at another pace than the recorder's, with a step as long as the log before and after it."""
+    clocks = [(received, _sent(columns)) for received, columns in read.values()]
+    found = [(received, sent[STAMP]) for received, sent in clocks if _drifts(received, sent)]
+    if not found:
+        return None
+    received, sent = (
+        np.r_[2 * own[0] - own[-1], own, 2 * own[-1] - own[0]] for own in max(found, key=lambda clock: len(clock[0]))
+    )
+    return received, sent
+
+
+def _paced(stamps: np.ndarray, pace: _Pace, origin: int) -> np.ndarray:
+    since = np.interp(np.r_[origin, stamps] - origin, pace[0] - origin, pace[1] - pace[1][0])
+    paced: np.ndarray = origin + (since[1:] - since[0]).astype(np.int64)
+    return paced
+
+
+def _on_clock(
+    received: np.ndarray, columns: dict[str, np.ndarray], origin: int, pace: _Pace | None
+) -> tuple[dict[str, Array], float]:
+    """Convert stamps to s from an origin; also how far the sender's clock was shifted, s."""
+    sent, offset = _sent(columns), 0
+    drifts = pace is not None and _drifts(received, sent)
     if STAMP in sent:
-        apart = int(np.median(received - sent[STAMP]))
+        apart = int(np.median((_paced(received, pace, origin) if pace and drifts else received) - sent[STAMP]))
         offset = apart if abs(apart) > _SAME_CLOCK_S * _NANOSECOND else 0
     stamps = {STAMP: received} | {name: own + offset for name, own in sent.items()} | {f"{STAMP}_received": received}
+    if pace is not None:
+        stamps |= {name: _paced(own, pace, origin) for name, own in stamps.items() if not (drifts and name in sent)}
     numbers = {name: own.astype(float) for name, own in columns.items()}
     return numbers | {name: seconds(own, origin, _NANOSECOND) for name, own in stamps.items()}, offset / _NANOSECOND

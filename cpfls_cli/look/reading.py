@@ -258,7 +258,7 @@ class _Reader:
         thrust = rotors.samples or next(self.log.found("collective"), None) or rotors.thrusts(ThrustCurve())
         if driving.command is None and not any((rotors.samples, speeds, setpoint, asked, sticks)):
             faster = log_faster("rotors or setpoints", FAST_HZ, self.system, parameters=self.parameters)
-            raise InputError(f"holds motion, but neither rotors nor anything that was asked of them: {faster}")
+            raise InputError(f"holds motion, but neither rotors nor anything that was asked of them is known: {faster}")
         if thrust is not None and float(thrust.values.max()) < ALIVE:
             raise InputError(f"no flight in it: the thrust that is asked for ({thrust.source}) stays at 0")
         clock = _clock(rate, driving.command)
@@ -338,7 +338,9 @@ class _Reader:
             for group in [own.group for own in known if own.signal == "body_rate"][:1]:
                 still = np.ptp(self.log.table.values(group.columns)[1], axis=0).max(initial=0.0) == 0
                 derived = "are derivatives of angles, or wrong: as rates of the body they do not fit the attitude"
-                other = derived if group.words[-1:] == ("dot",) else "are no rates of the body"
+                if self.signal("attitude") is None:
+                    derived = "may be derivatives of angles; what a gyroscope reads is best called gyro_x and so on"
+                other = derived if group.derivative else "are no rates of the body"
                 held += f"; {joined(group.columns)} {'never change' if still else other}"
             raise InputError(f"a log without a gyroscope (it holds {held}): {faster}")
         return found

@@ -75,8 +75,8 @@ def test_messages_name_a_new_format(refuse, log_study, tmp_path):
     assert refuse("import", log_study, other, *words) == [
         f"{other}: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl,"
         " .bfl, .db3, .mcap, .h5, .hdf5, .mat, .npz, .fake, or it must hold one of Parquet, ULog,"
-        " ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag, HDF5, MATLAB, Fake;"
-        " a table with a line of column names has to end in .csv"
+        " ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag, HDF5, MATLAB, Fake,"
+        " or a line of column names above numbers"
     ]
     assert formats.suffixes_in_words().endswith(", .mat, .npz or .fake")
     assert formats.formats_in_words().endswith(", MATLAB, NumPy, Fake")

@@ -234,9 +234,9 @@ def columns_of(candidate: Candidate, signals: Signals) -> Columns:
     """
     assert candidate.effect.columns is not None, "only effects with columns are candidates"
     columns = candidate.effect.columns(signals, candidate.shape)
-    hidden = [place for place, each in enumerate(candidate.effect.coefficients) if each.by_force]
-    if hidden and not signals.has_force:
-        columns.direct[..., hidden] = 0.0
+    by_force = [place for place, each in enumerate(candidate.effect.coefficients) if each.by_force]
+    if by_force and signals.specific_force is None:
+        columns.direct[:, :3, by_force] = 0.0
     return columns
 
 

@@ -265,6 +265,30 @@ def test_a_velocity_that_comes_after_its_position_is_late_without_a_third(flight
     assert any("position and velocity" in warning and "early" in warning for warning in early.warnings)
 
 
+def stated(signals, factor):
+    """State a thrust factor that is wrong by a factor."""
+    rotors = tuple(replace(each, thrust_factor_n_s2=factor * each.thrust_factor_n_s2) for each in VEHICLE.rotors)
+    return replace(signals, vehicle=replace(VEHICLE, rotors=rotors))
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.8])
+def test_an_accelerometer_that_feels_the_weight_lacks_no_gravity_where_the_stated_thrust_is_wrong(flights, factor):
+    """It was said to lack gravity, by the thrust that then contradicted it."""
+    alone = [replace(stated(sensing(each), factor), velocity=None, position=None) for each in flights]
+    found = audit(alone, WINDOWS)
+    assert not found.contradictions
+    assert not any("gravity" in each for each in found.notes)
+
+
+def test_a_velocity_that_is_late_is_set_right_under_a_wrong_thrust(flights):
+    """The thrust contradicted it whatever was done, by 3.9 m/s^2 along z, so that nothing was."""
+    wrong = [replace(stated(each, 1.4), velocity=late(each.velocity, 0.02), acceleration=None) for each in flights]
+    found = audit(wrong, WINDOWS)
+    assert not found.contradictions
+    (repair,) = (each for each in found.repairs if each.channel == "velocity")
+    assert repair.delay_s == pytest.approx(0.02, abs=0.003)
+
+
 def test_a_late_gyroscope_is_not_taken_for_an_early_attitude(flights):
     found = audit([replace(signals, body_rate=late(signals.body_rate, 0.03)) for signals in flights], WINDOWS)
     assert [fault.name for fault in found.named] == ["channel_delay"]

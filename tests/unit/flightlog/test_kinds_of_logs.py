@@ -91,6 +91,27 @@ def test_a_fork_of_betaflight_may_have_its_attitude_in_other_axes_and_columns_of
     assert next(rotor.name for rotor in proposal.airframe.rotors) == "rear right"
 
 
+def test_the_visual_odometry_of_px4_is_in_its_axes_and_turns_what_another_topic_reads(own):
+    """A controller of a laboratory logs rates in the axes of its own world, forward and left exchanged."""
+    turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
+    seen = named(quaternion(turned), *(f"q[{axis}]" for axis in range(4))) | named(own.position @ NED.T, *"xyz")
+    rates = named((own.rate @ FLIP)[:, [1, 0, 2]] * [1, 1, -1], *(f"omega[{axis}]" for axis in range(3)))
+    motors = named(own.speed / 1000, *(f"control[{rotor}]" for rotor in range(4)))
+    proposal = proposed(
+        {
+            "vehicle_visual_odometry": topic(own, 2, seen),
+            "lab_debug": topic(own, 1, rates),
+            "actuator_motors": topic(own, 1, motors),
+        },
+        "PX4 1.13.0",
+    )
+    choices = {choice.key: choice.value for choice in proposal.choices}
+    assert (choices["body_frame"], choices["world_frame"]) == ("FRD", "NED")
+    columns = maps(proposal)["body_rate"]
+    assert columns.columns == ("lab_debug.omega[1]", "lab_debug.omega[0]", "lab_debug.omega[2]")
+    assert columns.sign == (1.0, 1.0, -1.0)
+
+
 def test_what_no_gyroscope_reads_in_degrees_is_in_its_counts(own):
     # Cleanflight wrote what the sensor gives, 16.4 for each deg/s.
     rate = 16.4 * np.degrees(own.rate) * 600 / np.degrees(np.abs(own.rate)).max()

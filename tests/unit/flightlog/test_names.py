@@ -110,6 +110,7 @@ def first(names, signal, system=""):
         ("x_dot y_dot z_dot", "velocity", "x_dot y_dot z_dot"),
         ("roll_dot pitch_dot yaw_dot", "body_rate", "roll_dot pitch_dot yaw_dot"),
         ("phi_dot theta_dot psi_dot", "body_rate", "phi_dot theta_dot psi_dot"),
+        ("phi_dot_cal theta_dot_cal psi_dot_cal", "body_rate", "phi_dot_cal theta_dot_cal psi_dot_cal"),
         ("xdot ydot zdot", "velocity", "xdot ydot zdot"),
         ("bat_volt", "voltage", "bat_volt"),
         # A structure of outputs holds what was measured; what is asked for is a command in volts too.

@@ -639,6 +639,35 @@ def test_a_matrix_that_is_written_at_one_instant_has_no_signals():
     assert nameless_signals({f"data[{column}]": np.arange(100.0) for column in range(12)}, np.zeros(100)) == ()
 
 
+def test_a_jolt_at_touchdown_in_counts_of_a_gyroscope_is_no_loss_of_control():
+    """Counts of 16 bits, 16.4 for a deg/s, would be flips in deg/s; the angles show that they are none."""
+    own = with_ground(flight(angle=0.08, climb=0.3))
+    counts = 16.4 * np.degrees(own.rate)
+    touches = np.searchsorted(own.time, 34.7) + np.arange(20)
+    counts[touches, 0] += 2 * np.linalg.norm(counts, axis=1).max() * np.sin(2 * np.pi * np.arange(20) / 20)
+    log = flat_log(own, rate=named(np.round(counts), *GYRO), force=None, position=None, velocity=None)
+    assert recognise(log.topics, log.units, {}, "").flown.ended == ""
+
+
+def test_counts_of_a_gyroscope_and_thousandths_of_its_rates_are_too_alike_to_choose(own):
+    for scale in (16.4 * 180 / np.pi, 1000.0):
+        guess = seen(flat_log(own, rate=named(np.round(scale * own.rate), *GYRO))).signal("body_rate")
+        assert (guess.columns.unit, guess.columns.scale, guess.sure) == ("rad/s", 0.001, "guess")
+        assert "scale: 0.06098" in guess.rivals[0].text
+    assert seen(flat_log(own, rate=named(np.degrees(own.rate), *GYRO))).signal("body_rate").sure == "data"
+
+
+def test_a_track_of_positions_is_no_log_of_a_flight():
+    log = {"": {name: np.arange(100.0) ** 2 for name in ("millis", "latitude", "Longitude", "altitude", "speed")}}
+    log[""]["millis"] = np.arange(100.0)
+    with pytest.raises(InputError, match=r"a track of positions \(millis, latitude.* give the autopilot's log"):
+        recognise(log, {}, {}, "")
+    # What else is in it may be motion of the body.
+    log[""]["kippwinkel"] = np.arange(100.0) ** 2
+    with pytest.raises(InputError, match="no column is recognised as a signal of a flight"):
+        recognise(log, {}, {}, "")
+
+
 def test_columns_of_something_else_are_refused_by_name():
     log = {"": {"t": np.arange(100.0), "price": np.arange(100.0) ** 2}}
     with pytest.raises(InputError, match=r"no column is recognised as a signal of a flight \(columns: t, price\)"):

@@ -16,6 +16,7 @@ from cpfls_cli.effects.signals import RecordedFlight, Signals, as_slow_as_rotors
 from cpfls_cli.errors import InputError
 from cpfls_cli.files import seal_of
 from cpfls_cli.flightlog.results import MOTION, Flight, Imported
+from cpfls_cli.flightlog.stretches import SILENT
 from cpfls_cli.flights import playback, recordings
 from cpfls_cli.flights import training as sources
 from cpfls_cli.flights.path import PlannedPath
@@ -276,7 +277,7 @@ def test_another_file_is_refused_with_path_and_remedy(source, change, said):
         next(source.chunks())
 
 
-def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):
+def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None, warnings=()):
     """A flight with a battery that sags, of a log with body torque, or with commands in a unit in its place."""
     rng = np.random.default_rng(4)
     mapped = {"voltage": {"columns": ["u"], "unit": unit}, "body_torque": {"columns": ["a", "b", "c"], "unit": "N m"}}
@@ -291,7 +292,7 @@ def driven(path, *, unit="V", voltage=(12.5, 10.0), commands=None):
     name, columns = ("body_torque", 3) if commands is None else ("rotor_command", 4)
     signals[name] = rng.uniform(0.2, 0.8, size=(90, columns))
     signals["voltage"] = np.linspace(*voltage, 90)
-    flight = imported(time=PERIOD_S * np.arange(90), **signals)
+    flight = replace(imported(time=PERIOD_S * np.arange(90), **signals), warnings=warnings)
     write(path, flight, Origin(stage="import", seed=1, config=resolved_yaml(study), inputs=inputs))
     return path
 
@@ -327,3 +328,9 @@ def test_a_flight_to_play_says_whether_its_commands_are_shares_of_a_full_speed(t
 def test_an_import_says_what_is_wrong_with_a_voltage(tmp_path):
     flight = recordings.read_flight(driven(tmp_path / "flight.h5", voltage=(12.5, 0.0)), Study())
     assert "voltage is 0 or less at 1 of 90" in " ".join(recordings.doubts_on_voltage(flight.signals, flight.units))
+
+
+def test_a_flight_says_again_where_its_log_was_silent_and_nothing_else_of_it(tmp_path):
+    own = ("rotor 1 is below zero", f"body_rate does not change on any axis from 1.0 s to 2.0 s: {SILENT}")
+    path = driven(tmp_path / "flight.h5", commands="1", warnings=own)
+    assert recordings.read_flight(path, Study()).warnings == own[1:]

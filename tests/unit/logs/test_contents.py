@@ -73,6 +73,41 @@ def test_columns_without_names_that_a_spreadsheet_adds_are_none(tmp_path):
         assert contents.warnings == warnings
 
 
+@pytest.mark.parametrize(
+    "text", ["t, roll, m1, \n0, 1, 2\n1, 2, 3\n", "t,roll,m1\n0,1,2,\n1,2,3,\n", "t,roll,m1,\n0,1,2,\n1,2,3,\n"]
+)
+def test_a_separator_at_the_end_of_lines_parts_nothing(tmp_path, text):
+    (tmp_path / "log.csv").write_text(text)
+    contents = log_contents(tmp_path / "log.csv")
+    assert {name: own for name, own in listed(contents)[""].items() if name} == {
+        "t": [0, 1],
+        "roll": [1, 2],
+        "m1": [2, 3],
+    }
+    (tmp_path / "log.csv").write_text("t,roll\n0,1,2\n")
+    with pytest.raises(InputError, match="3 fields, but 2 column names"):
+        log_contents(tmp_path / "log.csv")
+
+
+def test_zeros_that_a_card_holds_where_nothing_was_written_are_no_values(tmp_path):
+    zeros = "\0" * 512
+    (tmp_path / "log.csv").write_text(f"t,roll\n0,1\n{zeros}1,2\n2,3\n{zeros}")
+    assert listed(log_contents(tmp_path / "log.csv"))[""] == {"t": [0, 1, 2], "roll": [1, 2, 3]}
+    (tmp_path / "log.csv").write_text(f"t,roll\n0,1\n{zeros}t, roll \n0,3\n")
+    with pytest.raises(InputError, match=r"log.csv:3: the column names again, of another log: keep one of them"):
+        log_contents(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("name", ["log.txt", "log.dat", "log", "log.data"])
+def test_a_table_with_a_line_of_names_may_end_otherwise(tmp_path, name):
+    (tmp_path / name).write_text("time, theta, m1, f\n0.25, -1.5, 1000, inf\n0.5, 2e-3, 1000, 3\n")
+    assert is_log(tmp_path / name)
+    assert listed(log_contents(tmp_path / name))[""]["theta"] == [-1.5, 2e-3]
+    # A text with commas is none.
+    (tmp_path / name).write_text("time, place, and speed\nwere not written, 1, 2, 3\n")
+    assert not is_log(tmp_path / name)
+
+
 def test_of_columns_with_one_name_each_has_a_number(tmp_path):
     path = put_file(tmp_path / "log.csv", "T,roll,T,motor,motor\n0,1,20,5,6\n1,2,30,7,8\n")
     held = {"T[0]": [0, 1], "roll": [1, 2], "T[1]": [20, 30], "motor[0]": [5, 7], "motor[1]": [6, 8]}
@@ -889,6 +924,8 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
             "write its numbers as CSV",
         ),
         ("a.log", b"t:0.1, x:2e-3, y: 3\n", "text that names each number in each line", "write its numbers as CSV"),
+        ("a.txt", b"Stamp: 9.5, Place: (9.5, -8, 1e3), Angles: (1, -2, 3)\n", "text that names each number", "as CSV"),
+        ("a.pkl", b"\x80\x04\x95\xb6\0", "a pickle of Python", "as .npz or CSV, with a name for each column"),
         ("a.bin", b"", "an empty file", "the copy failed"),
         ("a.log", b"", "an empty file", "the copy failed"),
         ("a.ulg", b"", "an empty file", "the copy failed"),

@@ -47,6 +47,41 @@ def test_messages_are_flattened_and_stamped_by_who_sent_them(bag):
     assert contents.system == "ROS 2"
 
 
+def slowed(pace, jump=0):
+    """Write 10 s of recorder's time: a simulation's stamps from 0 on, one on the recorder's clock, one without any."""
+    vector = STORE.types["geometry_msgs/msg/Vector3"]
+    for number in range(1000):
+        now = BEGIN_NS + 10 * number * MILLISECOND
+        simulated = int((now - BEGIN_NS) * (pace(number) if callable(pace) else pace)) + jump * (number > 500)
+        yield "/odometry", now, imu(simulated, (number, 0.0, 0.0), (0.0, 0.0, 9.81))
+        yield "/wanted", now, imu(now, (number, 0.0, 0.0), (0.0, 0.0, 9.81))
+        yield "/motors", now, vector(float(number), 0.0, 0.0)
+
+
+def test_all_stamps_are_put_on_the_clock_of_a_simulation_that_runs_slower_than_the_recorder(tmp_path):
+    contents = log_contents(write_bag(tmp_path / "bag", ".mcap", slowed(0.5)))
+    for topic in ("/odometry", "/wanted", "/motors"):
+        np.testing.assert_allclose(contents.topics[topic]["timestamp"], 0.005 * np.arange(1000), atol=1e-6)
+    (warning,) = contents.warnings
+    assert warning.startswith("all stamps are put on a clock at another pace")
+    assert warning.endswith(": /odometry")
+
+
+def test_a_simulation_may_change_its_pace(tmp_path):
+    contents = log_contents(write_bag(tmp_path / "bag", ".mcap", slowed(lambda number: 0.4 + number / 5000)))
+    own, motors = contents.topics["/odometry"], contents.topics["/motors"]
+    np.testing.assert_allclose(motors["timestamp"], own["timestamp"], atol=1e-6)
+    assert own["timestamp"][-1] == pytest.approx(0.6 * 9.99, rel=1e-3)
+
+
+@pytest.mark.parametrize(("pace", "jump"), [(1.0, 0), (1.0, 5 * 10**9), (1.05, 0), (0.001, 0)])
+def test_a_clock_that_keeps_pace_or_jumps_once_or_hardly_runs_is_shifted_by_the_median(tmp_path, pace, jump):
+    contents = log_contents(write_bag(tmp_path / "bag", ".mcap", slowed(pace, jump)))
+    np.testing.assert_allclose(contents.topics["/motors"]["timestamp"], 0.01 * np.arange(1000), atol=1e-6)
+    (warning,) = contents.warnings
+    assert "shifted by the median offset: /odometry" in warning
+
+
 def test_standard_messages_have_the_units_of_the_standard(bag):
     units = log_contents(bag).units
     assert units["/imu/data.angular_velocity.z"] == "rad/s"

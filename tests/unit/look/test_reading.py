@@ -234,6 +234,16 @@ def test_columns_that_are_called_rates_and_are_none_are_named():
             read(contents)
 
 
+def test_of_derivatives_without_angles_it_is_said_what_a_gyroscope_is_best_called():
+    contents = logs.WRITERS[""](OWN)
+    fields = contents.topics[""]
+    for name in [name for name in fields if name.startswith(("gyro", "q", "roll", "pitch", "yaw"))]:
+        del fields[name]
+    fields |= named(OWN.rate, "phi_dot_cal", "theta_dot_cal", "psi_dot_cal")
+    with pytest.raises(InputError, match=r"psi_dot_cal may be derivatives of angles; .* best called gyro_x"):
+        read(contents)
+
+
 def _frozen(rates):
     return np.where((OWN.time > 8.0)[:, None] & (OWN.time < 12.0)[:, None], rates[800], rates)
 
