@@ -43,11 +43,9 @@ def _discharging(signals: Signals, full: float) -> Signals:
         return signals
     # The fullest battery of other flights is another one; 1 is that of shares.
     ratio = 1.0 if 1.0 in {signals.full_voltage, full} else signals.full_voltage / full
-    time = np.linspace(-1.0, 1.0, len(signals))
-    line = np.polynomial.Polynomial.fit(time, signals.voltage, min(1, len(signals) - 1))(time)
-    samples = max(1, round(_DISCHARGE_S / signals.period))
-    slow = line + uniform_filter1d(signals.voltage - line, samples, mode="nearest")
-    return replace(signals, voltage=ratio * slow, full_voltage=signals.full_voltage / ratio)
+    line = np.polynomial.Polynomial.fit(signals.time, signals.voltage, 1)(signals.time)
+    dips = uniform_filter1d(signals.voltage - line, max(1, round(_DISCHARGE_S / signals.period)), mode="nearest")
+    return replace(signals, voltage=ratio * (line + dips), full_voltage=signals.full_voltage / ratio)
 
 
 @result

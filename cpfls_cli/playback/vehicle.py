@@ -61,8 +61,7 @@ _LINEAR = 0.5
 """Power of squared commands with which thrust rises that goes with the commands themselves."""
 _PIECE_S = 2.0
 """Length of pieces over which thrust carries the weight: gusts and climbs are shorter, a discharge is longer."""
-_STEADY = 1e-3
-"""Share by which the voltage of no battery in flight is constant: less is rounding."""
+_STEADY = 1e-3  # Share by which a voltage varies in flight: less is rounding.
 
 _SI = About("estimate", unit="SI")
 _LOW, _HIGH = (About(f"{end} end of the 95 % interval", unit="SI") for end in ("lower", "upper"))
@@ -416,9 +415,9 @@ def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
     and flight are the instruments of the voltage: the discharge alone shows its power.
     """
     parts = [(number, part) for number, flight in enumerate(flights) for part in flight.parts if part.commanded]
-    rows = np.array([(*row, number) for number, part in parts for row in _carried(part)])
+    rows = np.array([(*row, number) for number, part in parts for row in _carried(part)]).reshape(-1, 5)
     # Neither on the ground, where nothing turns, nor in a fall do rotors carry the weight.
-    rows = rows[np.isfinite(rows[:, :2]).all(axis=1)] if len(rows) else rows
+    rows = rows[np.isfinite(rows[:, :2]).all(axis=1)]
     if len(rows) < ENOUGH_BLOCKS:
         return CommandedThrust()
     known = np.isfinite(rows).all() and np.ptp(rows[:, 2]) > _STEADY
@@ -428,11 +427,8 @@ def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
 
     def powers(kept: BoolArray) -> Array:
         def slopes(of: Array, by: Array) -> list[float]:
-            columns, known_by = (
-                np.column_stack([np.ones(len(rows)), by, apart])[kept],
-                np.column_stack([by, slow])[kept],
-            )
-            columns = known_by @ np.linalg.lstsq(known_by, columns)[0]
+            columns, given = np.column_stack([np.ones(len(rows)), by, apart])[kept], np.column_stack([by, slow])[kept]
+            columns = given @ np.linalg.lstsq(given, columns)[0]
             return [float(own) for own in np.linalg.lstsq(columns, of[kept])[0][1:]]
 
         # A supply acts on the command; gusts that the loop answers blur what is carried less than what carries it.
@@ -471,7 +467,7 @@ def _carried(part: Signals) -> Iterator[tuple[float, float, float, float]]:
             return
         carries = float((squares[own] * upward).mean())
         with np.errstate(invalid="ignore", divide="ignore"):
-            logs = float(np.log(needed)), float(np.log(carries)), float(np.log(volts[own].mean()))
+            logs = np.log([needed, carries, volts[own].mean()]).tolist()
         yield *logs, float(part.time[own].mean())
 
 
@@ -578,8 +574,7 @@ def widened_by_law(numbers: Sequence[FoundNumber], commands: CommandedThrust) ->
     if LAW not in {number.name for number in numbers}:
         ends |= {f"inertia.{name}": commands.rises for name in INERTIA_PARAMETERS[:3]}
     for number in numbers:
-        below, above = ends.get(number.name, (1.0, 1.0))
-        low, high = number.low * below, number.high * above
+        low, high = (end * own for end, own in zip(number[3:5], ends.get(number.name, (1.0, 1.0)), strict=True))
         known = number.name not in ends or high <= KNOWN * low
         yield number._replace(low=low, high=high, determined=number.determined and known)
 

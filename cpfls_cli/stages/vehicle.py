@@ -305,8 +305,8 @@ def vehicle(
     if write_config is not None:
         refuse_own(write_config, run.output)
         check_output(write_config, run.force, run.inputs)
-    read = _grouped(flights_to_play([*flights, *others], run.study), [*flights, *others], run.study.playback.groups)
-    read, lacking = _supplied_alike(read)
+    named = [*flights, *others]
+    read, lacking = supplied_alike(_grouped(flights_to_play(named, run.study), named, run.study.playback.groups))
     for flight in read:
         _require_rotors(flight)
         flight.playback.starts(_horizon(run, flight), 1)
@@ -388,7 +388,7 @@ def _what_can_come(
     return replace(settings, leave_out=blocks_of(run.study.vehicle), history_s=0.0), (said,)
 
 
-def _supplied_alike(flights: Sequence[LoggedFlight]) -> tuple[Sequence[LoggedFlight], tuple[str, ...]]:
+def supplied_alike(flights: Sequence[LoggedFlight]) -> tuple[Sequence[LoggedFlight], tuple[str, ...]]:
     """Use the voltage behind commands in all flights or in none: a model that needs it is judged on none without it."""
     without = [flight.name for flight in flights if any(part.voltage is None for part in flight.parts)]
     if not without or len(without) == len(flights) or not flights[0].parts[0].commanded:

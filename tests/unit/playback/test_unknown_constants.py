@@ -1,3 +1,5 @@
+from cpfls_cli.stages.vehicle import supplied_alike
+
 """Constants that no config states: where their fit begins, and what shows the scale."""
 
 from dataclasses import replace
@@ -225,6 +227,16 @@ def test_where_speeds_are_measured_or_no_voltage_is_known_commands_count_as_they
     assert commanded_thrust([emptying(commanded=False)]) == CommandedThrust()
     assert commanded_thrust([emptying(voltage=False)]).numbers == ()
     assert commanded_thrust([emptying(power=0.0)]).numbers == ()
+
+
+def test_a_voltage_is_used_of_all_flights_or_of_none():
+    known, without = emptying(), emptying(voltage=False)
+    assert supplied_alike([known, known]) == ([known, known], ())
+    alike, (said,) = supplied_alike([known, without])
+    assert said.startswith("the voltage of the battery is not used")
+    assert all(part.voltage is None for flight in alike for part in flight.parts)
+    measured = [emptying(commanded=False), emptying(voltage=False, commanded=False)]
+    assert supplied_alike(measured) == (measured, ())
 
 
 def test_an_inertia_of_commands_is_as_open_as_their_law():
