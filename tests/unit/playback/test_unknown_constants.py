@@ -1,5 +1,3 @@
-from cpfls_cli.stages.vehicle import supplied_alike
-
 """Constants that no config states: where their fit begins, and what shows the scale."""
 
 from dataclasses import replace
@@ -26,6 +24,7 @@ from cpfls_cli.playback.vehicle import (
     widened_by_law,
     widened_by_loop,
 )
+from cpfls_cli.stages.vehicle import supplied_alike
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
 TRUE = truth()
