@@ -115,11 +115,16 @@ class Constants:
         """Whether the moments of inertia about roll and pitch are known to a factor of two."""
         return bool((2 * self.half[:2] <= np.log(KNOWN)).all())
 
-    def contradict(self, inertia: Array) -> bool:
-        """Check whether a body, shape (3, 3), is another one about roll or pitch: off by its interval, and visibly."""
+    def contradict(self, inertia: Array, low: Array, high: Array) -> bool:
+        """Check whether a body, shape (3, 3), is another one about roll or pitch: off by its interval, and visibly.
+
+        `low`, `high`: factors on its moments, shape (3,), between which torque and rotation leave the vehicle's own.
+        What is none of these is no body of the vehicle, and contradicts none.
+        """
         own = np.diag(self.fitted.model.body.inertia)[:2]
-        off = np.abs(np.log(np.diag(inertia)[:2] / own))
-        return bool((off > np.maximum(self.half[:2], VISIBLE)).any())
+        apart, half = np.log(own / np.diag(inertia)[:2]), self.half[:2]
+        possible = (apart + half >= np.log(low[:2])) & (apart - half <= np.log(high[:2]))
+        return bool((np.abs(apart) > np.maximum(half, VISIBLE)).any() and possible.all())
 
 
 @dataclass(frozen=True)

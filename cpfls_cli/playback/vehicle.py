@@ -272,7 +272,7 @@ def _identified(
     if constants is None or not constants.identified:
         return None
     # Where instruments find the same body the fit is the vehicle's, and takes more from the flights.
-    return constants if loop.unexplained or constants.contradict(fitted.body.inertia) else None
+    return constants if loop.unexplained or constants.contradict(fitted.body.inertia, loop.low, loop.high) else None
 
 
 class Held(NamedTuple):
@@ -568,11 +568,14 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
 def widened_by_law(numbers: Sequence[FoundNumber], commands: CommandedThrust) -> Iterator[FoundNumber]:
     """Widen the intervals of factors by the power of the voltage, and of the inertia where no thrust law was found.
 
-    Weight shows the thrust that carries it, and rotation how it changes over the moments of inertia.
+    Weight shows the thrust that carries it, and rotation how it changes over the moments of inertia, and how their drag
+    does.
     """
-    ends = {"thrust_factor": commands.full, "drag_factor": commands.full}
+    ends = dict.fromkeys(("thrust_factor", "drag_factor"), commands.full)
     if LAW not in {number.name for number in numbers}:
-        ends |= {f"inertia.{name}": commands.rises for name in INERTIA_PARAMETERS[:3]}
+        (low, high), (least, most) = commands.rises, commands.full
+        ends |= dict.fromkeys((f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]), (low, high))
+        ends["drag_factor"] = low * least, high * most
     for number in numbers:
         low, high = (end * own for end, own in zip(number[3:5], ends.get(number.name, (1.0, 1.0)), strict=True))
         known = number.name not in ends or high <= KNOWN * low
