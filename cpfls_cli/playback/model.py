@@ -9,6 +9,7 @@ from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
@@ -31,6 +32,20 @@ from cpfls_cli.vehicle.values import Functions, Tangent, Value, Vector, dot, min
 
 if TYPE_CHECKING:
     from cpfls_cli.regressor.regressor import InertiaValues
+
+_DISCHARGE_S = 10.0
+"""Over which a voltage is averaged: dips are shorter, which answer commands or are noise, a discharge is longer."""
+
+
+def _discharging(signals: Signals, full: float) -> Signals:
+    """Take the voltage of a flight as a share of a full one, in V, without its dips and noise about the discharge."""
+    if signals.voltage is None:
+        return signals
+    # The fullest battery of other flights is another one; 1 is that of shares.
+    ratio = 1.0 if 1.0 in {signals.full_voltage, full} else signals.full_voltage / full
+    line = np.polynomial.Polynomial.fit(signals.time, signals.voltage, 1)(signals.time)
+    dips = uniform_filter1d(signals.voltage - line, max(1, round(_DISCHARGE_S / signals.period)), mode="nearest")
+    return replace(signals, voltage=ratio * (line + dips), full_voltage=signals.full_voltage / ratio)
 
 
 @result
@@ -307,10 +322,7 @@ class VehicleModel:
             signals = replace(signals, vehicle=self.vehicle)
         if any(self.wind):
             signals = replace(signals, wind=np.array(self.wind))
-        if signals.voltage is not None and {signals.full_voltage, self.full_voltage}.isdisjoint({1.0}):
-            # The fullest battery of other flights is another one.
-            share = signals.voltage * (signals.full_voltage / self.full_voltage)
-            signals = replace(signals, voltage=share, full_voltage=self.full_voltage)
+        signals = _discharging(signals, self.full_voltage)
         for one in self.filters:
             apply = one.effect.apply
             if apply is not None and not one.effect.missing(signals):

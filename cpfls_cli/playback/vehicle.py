@@ -61,6 +61,7 @@ _LINEAR = 0.5
 """Power of squared commands with which thrust rises that goes with the commands themselves."""
 _PIECE_S = 2.0
 """Length of pieces over which thrust carries the weight: gusts and climbs are shorter, a discharge is longer."""
+_STEADY = 1e-3  # Share by which a voltage varies in flight: less is rounding.
 
 _SI = About("estimate", unit="SI")
 _LOW, _HIGH = (About(f"{end} end of the 95 % interval", unit="SI") for end in ("lower", "upper"))
@@ -160,11 +161,13 @@ class CommandedThrust(NamedTuple):
     """How the thrust of commands goes with the voltage of the battery, and with the commands.
 
     `numbers`: the power of the voltage, where one is known. `rises`: ends of the power of squared commands with which
-    it rises, 1 for a square, one half for a line.
+    it rises, 1 for a square, one half for a line. `full`: those of the factor by which the power of the voltage leaves
+    the thrust of a full battery open.
     """
 
     numbers: tuple[FoundNumber, ...] = ()
     rises: tuple[float, float] = (1.0, 1.0)
+    full: tuple[float, float] = (1.0, 1.0)
 
     def whole(self, model: VehicleModel) -> VehicleModel:
         """Let a model with known numbers take commands as they are logged."""
@@ -220,7 +223,7 @@ def find_vehicle(
         solved, spread = fitted, uncertainty(fitted, windows)
     model = commands.whole(solved.model)
     of_fit = bodily(begun, (*held.numbers, *found_numbers(solved, spread)))
-    numbers = tuple(widened_by_law((*sensed, *commands.numbers, *of_fit), commands.rises))
+    numbers = tuple(widened_by_law((*sensed, *commands.numbers, *of_fit), commands))
     if constants is None:
         numbers = tuple(widened_by_loop(numbers, held.loop))
     gusts: FoundGusts | None = None
@@ -408,19 +411,24 @@ def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
 
     Over short pieces, logarithms of what is carried, by velocity or else by accelerometer, and of the squared commands
     are regressed on each other, and on that of the voltage where all flights know it. A loop that answers gusts leaves
-    the power of squared commands between the two (see `loop_bounds`).
+    the power of squared commands between the two (see `loop_bounds`). A command also draws the voltage down, so time
+    and flight are the instruments of the voltage: the discharge alone shows its power.
     """
-    parts = [part for flight in flights for part in flight.parts]
-    rows = np.array([row for part in parts if part.commanded for row in _carried(part)])
-    if len(rows) < ENOUGH_BLOCKS or not np.isfinite(rows[:, :2]).all():
+    parts = [(number, part) for number, flight in enumerate(flights) for part in flight.parts if part.commanded]
+    rows = np.array([(*row, number) for number, part in parts for row in _carried(part)]).reshape(-1, 5)
+    # Neither on the ground, where nothing turns, nor in a fall do rotors carry the weight.
+    rows = rows[np.isfinite(rows[:, :2]).all(axis=1)]
+    if len(rows) < ENOUGH_BLOCKS:
         return CommandedThrust()
-    known = np.isfinite(rows).all() and np.ptp(rows[:, 2]) > 0
-    carried, squares, volts = rows.T
+    known = np.isfinite(rows).all() and np.ptp(rows[:, 2]) > _STEADY
+    carried, squares, volts, time, number = rows.T
     apart = volts[:, None] if known else np.zeros((len(rows), 0))
+    slow = np.column_stack([time, number[:, None] == np.unique(number)])
 
     def powers(kept: BoolArray) -> Array:
         def slopes(of: Array, by: Array) -> list[float]:
-            columns = np.column_stack([np.ones(len(rows)), by, apart])[kept]
+            columns, given = np.column_stack([np.ones(len(rows)), by, apart])[kept], np.column_stack([by, slow])[kept]
+            columns = given @ np.linalg.lstsq(given, columns)[0]
             return [float(own) for own in np.linalg.lstsq(columns, of[kept])[0][1:]]
 
         # A supply acts on the command; gusts that the loop answers blur what is carried less than what carries it.
@@ -435,12 +443,15 @@ def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
     shape = CATALOGUE[_SAG].shapes[0]
     if not known or not half[2] < found[2] <= shape.grid[-1]:
         return CommandedThrust((), rises)
-    ends = (float(found[2]), float(found[2] - half[2]), float(found[2] + half[2]))
-    return CommandedThrust((FoundNumber(f"{_SAG}.{shape.name}", shape.unit, *ends, np.nan, True, False),), rises)
+    power, low, high = (float(found[2] + sign * half[2]) for sign in (0, -1, 1))
+    number = FoundNumber(f"{_SAG}.{shape.name}", shape.unit, power, low, high, np.nan, high <= KNOWN * low, False)
+    # What carries the weight at the mean voltage is known, and extrapolated to the full battery.
+    below, above = (float(np.exp((power - end) * volts.mean())) for end in (low, high))
+    return CommandedThrust((number,), rises, (below, above))
 
 
-def _carried(part: Signals) -> Iterator[tuple[float, float, float]]:
-    """Give by pieces logarithms: of what is carried, of the squared commands that carry it, of the voltage."""
+def _carried(part: Signals) -> Iterator[tuple[float, float, float, float]]:
+    """Give by pieces logarithms of what is carried, of the squared commands that carry it, of the voltage; and time."""
     squares = (part.speed**2).sum(axis=1) if part.rotor_speed is not None else np.zeros(len(part))
     velocity, force = part.velocity, part.specific_force
     volts = np.full(len(part), np.nan) if part.voltage is None else part.voltage
@@ -456,7 +467,8 @@ def _carried(part: Signals) -> Iterator[tuple[float, float, float]]:
             return
         carries = float((squares[own] * upward).mean())
         with np.errstate(invalid="ignore", divide="ignore"):
-            yield float(np.log(needed)), float(np.log(carries)), float(np.log(volts[own].mean()))
+            logs = np.log([needed, carries, volts[own].mean()]).tolist()
+        yield *logs, float(part.time[own].mean())
 
 
 def _shares(model: VehicleModel, flights: Sequence[PlaybackFlight]) -> tuple[tuple[Share, ...], float]:
@@ -553,17 +565,20 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and identified)
 
 
-def widened_by_law(numbers: Sequence[FoundNumber], rises: tuple[float, float]) -> Iterator[FoundNumber]:
-    """Widen the intervals of the inertia by what is not known of the thrust of commands where no law was found.
+def widened_by_law(numbers: Sequence[FoundNumber], commands: CommandedThrust) -> Iterator[FoundNumber]:
+    """Widen the intervals of factors by the power of the voltage, and of the inertia where no thrust law was found.
 
     Weight shows the thrust that carries it, and rotation how it changes over the moments of inertia, and how their drag
     does.
     """
-    lawless = LAW not in {number.name for number in numbers}
+    ends = dict.fromkeys(("thrust_factor", "drag_factor"), commands.full)
+    if LAW not in {number.name for number in numbers}:
+        (low, high), (least, most) = commands.rises, commands.full
+        ends |= dict.fromkeys((f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]), (low, high))
+        ends["drag_factor"] = low * least, high * most
     for number in numbers:
-        widened = lawless and number.name.startswith(("inertia.", "drag_factor"))
-        low, high = (number.low * rises[0], number.high * rises[1]) if widened else number[3:5]
-        known = not widened or high <= KNOWN * low
+        low, high = (end * own for end, own in zip(number[3:5], ends.get(number.name, (1.0, 1.0)), strict=True))
+        known = number.name not in ends or high <= KNOWN * low
         yield number._replace(low=low, high=high, determined=number.determined and known)
 
 

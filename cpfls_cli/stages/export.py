@@ -286,26 +286,29 @@ def _bare_sheet(path: Path, record: AnyModel, origin: Origin) -> Sheet:
     sheet = bare_sheet(record, still, origin)
     if isinstance(record, IdentifiedModel):
         return replace(sheet, warnings=tuple(_warnings(record, origin.config, path)))
-    outside = tuple(_missing(record, (*model.filters, *model.along)))
+    outside = tuple(_missing(record, model))
     floor = tuple(record.gap.floor.tolist()) if isinstance(record, Extended) else sheet.floor
     return replace(sheet, outside=outside, wind=model.wind, floor=floor)
 
 
-def _missing(record: AnyModel, effects: tuple[ModelEffect, ...]) -> Iterator[Missing]:
+def _missing(record: AnyModel, model: VehicleModel) -> Iterator[Missing]:
     """List effects that no table of weights holds, with their sizes along held-out flights where these are known."""
     known = {each.name: each for each in record.left_out} if isinstance(record, Extended) else {}
-    for effect in effects:
+    for effect in (*model.filters, *model.along):
+        title = _in_numbers(effect, model.full_voltage)
         if isinstance(record, Extended) and effect.name in known:
             own, floor = known[effect.name], record.gap.floor
-            yield sized(_in_numbers(effect), own.wrench, floor, Off.of(own.ends), "along its held-out flights")
+            yield sized(title, own.wrench, floor, Off.of(own.ends), "along its held-out flights")
         else:
-            yield Missing(_in_numbers(effect), np.nan, np.nan, np.nan, None)
+            yield Missing(title, np.nan, np.nan, np.nan, None)
 
 
-def _in_numbers(effect: ModelEffect) -> str:
+def _in_numbers(effect: ModelEffect, full_voltage: float) -> str:
     """Say what an effect is and which numbers it has, so that others can add it."""
     units = {each.name: "" if each.unit in ("", "1") else f" {each.unit}" for each in effect.known.numbers}
     numbers = ", ".join(f"{name} = {value:.4g}{units[name]}" for name, value in effect.values.items())
+    if "voltage" in effect.known.needs and full_voltage != 1.0:
+        numbers += f", V_0 = {full_voltage:.4g} V"
     title = REFITTED if effect.known.kind == "parameter" else effect.known.title
     return f"{title} ({effect.known.formula}; {numbers})"
 

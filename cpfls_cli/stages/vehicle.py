@@ -305,7 +305,8 @@ def vehicle(
     if write_config is not None:
         refuse_own(write_config, run.output)
         check_output(write_config, run.force, run.inputs)
-    read = _grouped(flights_to_play([*flights, *others], run.study), [*flights, *others], run.study.playback.groups)
+    named = [*flights, *others]
+    read, lacking = supplied_alike(_grouped(flights_to_play(named, run.study), named, run.study.playback.groups))
     for flight in read:
         _require_rotors(flight)
         flight.playback.starts(_horizon(run, flight), 1)
@@ -324,7 +325,7 @@ def vehicle(
     rotors_hz = min(flight.logged_hz for flight in training if not flight.group)
     found = replace(found, loop=found.loop.up_to(rotors_hz / 2))
     first = [_FIRST_ANSWER] if settings.quick else []
-    warnings = [*first, *limit, *twice, *(warning for flight in read for warning in flight.warnings)]
+    warnings = [*first, *limit, *twice, *lacking, *(warning for flight in read for warning in flight.warnings)]
     sizes = [sum(map(len, flight.parts)) for flight in training]
     # All samples that were used were learned from.
     own = [flight._replace(samples=size, of=size) for flight, size in zip(known, sizes, strict=True)]
@@ -387,6 +388,16 @@ def _what_can_come(
     return replace(settings, leave_out=blocks_of(run.study.vehicle), history_s=0.0), (said,)
 
 
+def supplied_alike(flights: Sequence[LoggedFlight]) -> tuple[Sequence[LoggedFlight], tuple[str, ...]]:
+    """Use the voltage behind commands in all flights or in none: a model that needs it is judged on none without it."""
+    without = [flight.name for flight in flights if any(part.voltage is None for part in flight.parts)]
+    if not without or len(without) == len(flights) or not flights[0].parts[0].commanded:
+        return flights, ()
+    said = f"the voltage of the battery is not used, because not all flights have it: {joined(without)} without"
+    alike = [replace(flight, parts=tuple(replace(part, voltage=None) for part in flight.parts)) for flight in flights]
+    return alike, (said,)
+
+
 def _require_rotors(flight: LoggedFlight) -> None:
     if flight.playback.wrench is not None:
         raise InputError(
@@ -430,7 +441,7 @@ def _judged(
     behind = any(flight.parts[0].commanded for flight in training)
     shares = any(flight.shares for flight in training)
     own = {each.name: getattr(found, each.name) for each in fields(found)}
-    known = {"commanded": behind, "full_voltage": flights[0].parts[0].full_voltage}
+    known = {"commanded": behind, "full_voltage": max(flight.parts[0].full_voltage for flight in flights)}
     own |= {name: replace(own[name], **known) for name in ("model", "forecast") if own[name] is not None}
     responses = mismatches(_responses(found, training), instrumented=found.instruments is not None)
     return Vehicle(

@@ -85,11 +85,13 @@ def test_what_an_export_cannot_hold_is_named_on_the_screen_and_in_the_file(cpfls
     path, output = tmp_path / "vehicle.h5", tmp_path / f"m.{ENDINGS[form]}"
     none = np.zeros(0)
     beside = ModelEffect("ground_effect", {"G": 1.2}, none), ModelEffect("battery_sag", {"exponent": 1.5}, none)
-    write_vehicle(path, vehicle_of(replace(whole(effects=beside, remainder=None), wind=(3.0, 0.5, 0.0))))
+    write_vehicle(
+        path, vehicle_of(replace(whole(effects=beside, remainder=None), wind=(3.0, 0.5, 0.0), full_voltage=16.8))
+    )
     titles = [each["title"] for each in cpfls.summary("export", path, "-o", output)["missing"]]
     # Nothing of this vehicle meets the air, so that the wind does nothing.
     assert [title.partition(" (")[0] for title in titles] == ["battery sag", "ground effect"]
-    assert titles[0].endswith("; exponent = 1.5)")
+    assert titles[0].endswith("; exponent = 1.5, V_0 = 16.8 V)")
     said = cpfls("export", path, "-o", output, "--force").stdout.splitlines()
     assert said[-2:] == [
         f"Not held: {' '.join(title.split())}; its size depends on the flight and was not measured along one."

@@ -26,6 +26,7 @@ from cpfls_cli.playback.vehicle import (
     widened_by_law,
     widened_by_loop,
 )
+from cpfls_cli.stages.vehicle import supplied_alike
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
 TRUE = truth()
@@ -180,7 +181,47 @@ def test_what_carries_the_weight_shows_how_commands_go_with_the_voltage(power, g
     assert low - 0.01 <= (0.5 * 0.3 + 0.7 * 0.4) / (0.3 + 0.7 * 0.4) <= high
     flight = emptying(power=power, gust=gust, sensor=sensor)
     full = flight.parts[0].voltage[:, None] ** (number.value / 2) * flight.playback.speed
-    np.testing.assert_allclose(found.acting(flight).speed, full)
+    # Noise of the voltage does not turn the rotors.
+    np.testing.assert_allclose(found.acting(flight).speed, full, rtol=0.02)
+    # The thrust of a full battery is as open as the power over what the battery lost in the mean.
+    assert found.full == pytest.approx(
+        (0.94 ** (number.value - number.low), 0.94 ** (number.value - number.high)), rel=0.01
+    )
+    thrust = FoundNumber("thrust_factor", "", 1.0, 0.99, 1.01, np.nan, True, False)
+    wide = next(widened_by_law([thrust], found))
+    assert (wide.low, wide.high) == pytest.approx((0.99 * found.full[0], 1.01 * found.full[1]))
+
+
+def loaded(flight, discharge, *, power=2.0, resistance=0.06, seed=0):
+    """The same where what carries the weight also varies with what no log has, and a command draws the voltage down."""
+    own, rng = flight.parts[0], np.random.default_rng(100 + seed)
+    base = own.speed * np.sqrt(1 + memory(rng, 0.04, 4.0, own.period, len(own)))[:, None]
+    speed, volts = base, np.ones(len(own))
+    for _ in range(20):
+        load = ((speed**2).sum(axis=1) / (base**2).sum(axis=1).mean()) ** 1.5
+        volts = np.linspace(1.0, 1.0 - discharge, len(own)) - resistance * np.minimum(load, 2.0)
+        speed = base * (volts / (1 - resistance))[:, None] ** (-power / 2)
+    volts = volts + rng.normal(0.0, 0.002, len(own))
+    return LoggedFlight.of(replace(own, rotor_speed=speed, voltage=volts / volts.max()))
+
+
+@pytest.mark.parametrize("discharge", [0.0, 0.02, 0.1])
+def test_a_voltage_that_a_command_draws_down_shows_no_power_but_that_of_the_discharge(discharge):
+    for seed in range(4):
+        found = commanded_thrust([loaded(emptying(power=0.0, seed=seed), discharge, seed=seed)])
+        assert len(found.numbers) == 1 if discharge == 0.1 else len(found.numbers) <= 1
+        for number in found.numbers:
+            assert number.low <= 2.0 <= number.high
+            assert number.determined == (number.high <= 2.0 * number.low)
+
+
+def test_a_constant_voltage_shows_nothing_and_a_piece_on_the_ground_spoils_nothing():
+    flight = emptying(power=0.0)
+    part = flight.parts[0]
+    constant = LoggedFlight.of(replace(part, voltage=np.full(len(part), 0.95)))
+    assert commanded_thrust([constant]).numbers == ()
+    stands = part.speed * (np.arange(len(part)) >= 200)[:, None]
+    assert commanded_thrust([LoggedFlight.of(replace(part, rotor_speed=stands))]).rises != (1.0, 1.0)
 
 
 def test_where_speeds_are_measured_or_no_voltage_is_known_commands_count_as_they_are():
@@ -189,16 +230,27 @@ def test_where_speeds_are_measured_or_no_voltage_is_known_commands_count_as_they
     assert commanded_thrust([emptying(power=0.0)]).numbers == ()
 
 
+def test_a_voltage_is_used_of_all_flights_or_of_none():
+    known, without = emptying(), emptying(voltage=False)
+    assert supplied_alike([known, known]) == ([known, known], ())
+    alike, (said,) = supplied_alike([known, without])
+    assert said.startswith("the voltage of the battery is not used")
+    assert all(part.voltage is None for flight in alike for part in flight.parts)
+    measured = [emptying(commanded=False), emptying(voltage=False, commanded=False)]
+    assert supplied_alike(measured) == (measured, ())
+
+
 def test_an_inertia_of_commands_is_as_open_as_their_law():
     numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in ("inertia.Ixx", "thrust_factor")]
-    inertia, thrust = widened_by_law(numbers, (0.8, 1.0))
+    inertia, thrust = widened_by_law(numbers, CommandedThrust((), (0.8, 1.0)))
     assert (inertia.low, inertia.high, inertia.determined) == (pytest.approx(0.72), 1.1, True)
     assert thrust == numbers[1]
-    assert not next(widened_by_law(numbers, (0.5, 1.0))).determined
+    assert not next(widened_by_law(numbers, CommandedThrust((), (0.5, 1.0)))).determined
     drag = FoundNumber("drag_factor", "", 1.0, 0.9, 1.1, np.nan, True, False)
-    assert next(widened_by_law([drag], (0.5, 1.0))) == drag._replace(low=0.45, determined=False)
+    wide = next(widened_by_law([drag], CommandedThrust((), (0.5, 1.0), (0.8, 1.2))))
+    assert (wide.low, wide.high, wide.determined) == (pytest.approx(0.36), pytest.approx(1.32), False)
     law = FoundNumber("thrust_law.linear", "", 0.3, 0.2, 0.4, np.nan, True, False)
-    assert next(widened_by_law([*numbers, law], (0.5, 1.0))) == numbers[0]
+    assert next(widened_by_law([*numbers, law], CommandedThrust((), (0.5, 1.0)))) == numbers[0]
 
 
 def test_rotors_that_stand_or_turn_for_a_moment_tell_no_thrust():
