@@ -19,6 +19,9 @@ VEHICLE_NUMBERS: Effect = next(known for known in CATALOGUE.values() if known.ki
 CENTRE_OF_MASS: Effect = next(known for known in CATALOGUE.values() if known.of_all_forces)
 """The effect that has a lever for all forces."""
 
+SUPPLY: Effect = next(known for known in CATALOGUE.values() if known.actuation and known.actuation.supply)
+"""The effect of the voltage of a supply."""
+
 
 def effect(name: str) -> Effect:
     """Find an effect by its identifier.

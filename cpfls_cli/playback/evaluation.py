@@ -38,6 +38,7 @@ from cpfls_cli.playback.parameters import (
     FreeNumbers,
     Number,
     Physical,
+    of_vehicle,
     unit_wrenches,
 )
 from cpfls_cli.playback.rotors import RotorResponse, TimeOfResponse
@@ -120,8 +121,10 @@ class ParameterPoint:
         for block in self.free.effects:
             before, found = (unit_wrenches(block, vehicle) for vehicle in (flown, self.vehicle))
             ratio = (before * found).sum(axis=(1, 2)) / (found**2).sum(axis=(1, 2))
-            own = [self.coefficients[number.name] for number in self.free.of_block(block)]
-            effects.append(ModelEffect(block, {}, np.array(own) * ratio))
+            known, places = of_vehicle(block, self.vehicle)
+            own = np.zeros(len(known.coefficients))
+            own[places] = [self.coefficients[number.name] for number in self.free.of_block(block)] * ratio
+            effects.append(ModelEffect(block, {}, own))
         return tuple(effects)
 
     @property
@@ -154,7 +157,8 @@ class ParameterPoint:
         others = {SLOW: self.response.slow_s, **self.coefficients}
         for effect in self.effects:
             names = (number.name for number in free.of_block(effect.name))
-            others |= dict(zip(names, effect.coefficients.tolist(), strict=True))
+            _, places = of_vehicle(effect.name, self.vehicle)
+            others |= dict(zip(names, effect.coefficients[places].tolist(), strict=True))
         found: dict[str, Physical] = {}
         for number, value in zip(free.numbers, self.values.tolist(), strict=True):
             name, unit = _POSITIVE.get(number.name, (number.name, number.unit))

@@ -107,16 +107,20 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
 """Blocks that are the same for all vehicles."""
 
 
-def _of_vehicle(block: str, vehicle: VehicleSettings) -> Effect:
-    """Give an effect with the numbers that act on a vehicle: what may be left out is of six rotors and more."""
+def of_vehicle(block: str, vehicle: VehicleSettings) -> tuple[Effect, list[int]]:
+    """Give an effect with the numbers that act on a vehicle, and the places of those that free runs identify.
+
+    What may be left out is of six rotors and more.
+    """
     known = CATALOGUE[block]
-    return known if len(vehicle.rotors) >= 6 else known.form(len(known.coefficients) - known.optional, ())
+    acting = known if len(vehicle.rotors) >= 6 else known.form(len(known.coefficients) - known.optional, ())
+    return acting, [place for place, each in enumerate(acting.coefficients) if not each.by_force]
 
 
 @lru_cache(maxsize=256)
 def unit_wrenches(block: str, vehicle: VehicleSettings) -> Array:
-    """Evaluate what a unit of each coefficient of an effect does at some motions, shape (coefficient, motion, 6)."""
-    known, rotors = _of_vehicle(block, vehicle), len(vehicle.rotors)
+    """Evaluate what a unit of each coefficient that is free does at some motions, shape (coefficient, motion, 6)."""
+    (known, places), rotors = of_vehicle(block, vehicle), len(vehicle.rotors)
     rng = np.random.default_rng(0)
     speed = rng.uniform(500.0, 1500.0, (_MOTIONS, rotors))
     signals = Signals(
@@ -131,7 +135,7 @@ def unit_wrenches(block: str, vehicle: VehicleSettings) -> Array:
     assert known.columns is not None, "blocks have them"
     columns = known.columns(signals, {})
     given = columns.direct if columns.momentum is None else columns.direct + columns.momentum
-    return np.moveaxis(given, 2, 0)
+    return np.moveaxis(given, 2, 0)[places]
 
 
 _MOTIONS = 8
@@ -242,8 +246,8 @@ class FreeNumbers:
             )
         if block in LEARNED:
             return self._remainder_numbers(block)
-        numbers = []
-        for each in _of_vehicle(block, vehicle).coefficients:
+        numbers, (known, places) = [], of_vehicle(block, vehicle)
+        for each in (known.coefficients[place] for place in places):
             scale, (low, high) = 1.0 if each.scale is None else each.scale(vehicle), each.bounds(vehicle)
             numbers.append(Number(f"{block}.{each.name}", each.unit, 0.0, scale, ROOM * low, ROOM * high, 1.0))
         return tuple(numbers)

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 
 from cpfls_cli.arrays import Array, BoolArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, MOST_BLOCKS, contiguous, half_width, jackknife_error, leaving_out
-from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
+from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS, SUPPLY
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.inertia import FLAT, INERTIA_PARAMETERS, KNOWN, MEASURED, beyond_any_body, more_than_others, rescaled
 from cpfls_cli.playback.constants import Constants, UsedInstruments, find_constants
@@ -54,7 +54,6 @@ _STEP = 1e-5
 """Of central differences, in natural sizes."""
 
 
-_SAG = "battery_sag"
 _CALIBRATED = 0.01
 """Share of its weight that an accelerometer may be off by, as calibrated before a flight: 0.1 m/s^2."""
 _LINEAR = 0.5
@@ -171,7 +170,7 @@ class CommandedThrust(NamedTuple):
 
     def whole(self, model: VehicleModel) -> VehicleModel:
         """Let a model with known numbers take commands as they are logged."""
-        sags = (ModelEffect(_SAG, {own.name.partition(".")[2]: own.value}, np.zeros(0)) for own in self.numbers)
+        sags = (ModelEffect(SUPPLY.name, {own.name.partition(".")[2]: own.value}, np.zeros(0)) for own in self.numbers)
         return replace(model, vehicle=replace(model.vehicle, unknown=()), effects=(*model.effects, *sags))
 
     def acting(self, flight: LoggedFlight) -> PlaybackFlight:
@@ -440,11 +439,13 @@ def commanded_thrust(flights: Sequence[LoggedFlight]) -> CommandedThrust:
     half = half_width(jackknife_error(left_out), blocks)
     low, high = np.clip([found[0] - half[0], found[1] + half[1]], _LINEAR, 1 / _LINEAR).tolist()
     rises = min(low, 1.0), max(high, 1.0)
-    shape = CATALOGUE[_SAG].shapes[0]
+    shape = SUPPLY.shapes[0]
     if not known or not half[2] < found[2] <= shape.grid[-1]:
         return CommandedThrust((), rises)
     power, low, high = (float(found[2] + sign * half[2]) for sign in (0, -1, 1))
-    number = FoundNumber(f"{_SAG}.{shape.name}", shape.unit, power, low, high, np.nan, high <= KNOWN * low, False)
+    number = FoundNumber(
+        f"{SUPPLY.name}.{shape.name}", shape.unit, power, low, high, np.nan, high <= KNOWN * low, False
+    )
     # What carries the weight at the mean voltage is known, and extrapolated to the full battery.
     below, above = (float(np.exp((power - end) * volts.mean())) for end in (low, high))
     return CommandedThrust((number,), rises, (below, above))
@@ -553,7 +554,7 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}
     factors["drag_factor"] = [1 / high[2], 1 / low[2]]
     carries = {"thrust_factor"} if LAW not in {number.name for number in numbers} else set[str]()
-    carries |= {number.name for number in numbers if number.name.startswith(_SAG)}
+    carries |= {number.name for number in numbers if number.name.startswith(SUPPLY.name)}
     for number in numbers:
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above

@@ -44,6 +44,7 @@ from cpfls_cli.artifacts.vehicle_model import (
     vehicle_section,
 )
 from cpfls_cli.config.study import Study, settings_of, to_yaml
+from cpfls_cli.effects.registry import SUPPLY
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import ConfigError, InputError
 from cpfls_cli.flightlog.stated_vehicle import FAST_HZ, log_faster, shown_slowly
@@ -197,6 +198,7 @@ WORDS: Mapping[str, Any] = {
     "OF_TURNING": OF_TURNING,
     "ON_BOUND": ON_BOUND,
     "THRUST": THRUST,
+    "SUPPLIED": f"{SUPPLY.name}.{SUPPLY.numbers[0].name}",
     "TRIED": _TRIED,
     "WHAT_TO_FLY": WHAT_TO_FLY,
     "by_name": lambda rows: {each.name: each for each in rows},

@@ -30,7 +30,6 @@ _EFFECT = Effect(
         "torque_bias": "change the thrust: a bias stays, the torque of an offset grows with thrust",
         "rotor_mismatch": "apply yaw effort: it loads one pair of rotors more than the other",
         "wind": "turn in yaw, and change the thrust",
-        "flapping_moment": "balance the vehicle on its side, which shows the height",
     },
     source="geometry; RotorPy (hub positions relative to the centre of mass)",
     of_all_forces=True,

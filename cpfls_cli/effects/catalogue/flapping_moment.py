@@ -27,6 +27,7 @@ EFFECT = Effect(
         "rotor_drag": "log acceleration, so that the force is seen; or turn in yaw while flying fast",
         "wind": "fly legs in opposite directions",
         "parasitic_drag": "fly legs at two speeds, one twice the other",
+        "com_offset": "balance the vehicle on its side, which shows the height of its centre of mass",
     },
     source="RotorPy multirotor.py (M_flap, nose down); Bauersfeld et al. 2021, NeuroBEM, eq. 17 (nose up)",
     acts=_acts,
