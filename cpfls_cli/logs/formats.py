@@ -266,7 +266,7 @@ def _format_of(path: Path) -> LogFormat | None:
 
 
 def _is_table(path: Path) -> bool:
-    """Tell whether a line of column names comes first, and numbers in the next."""
+    """Check whether a line of column names comes first, and numbers in the next."""
     try:
         with path.open("rb") as stream:
             names, numbers = stream.readline(_LONGEST_LINE), stream.readline(_LONGEST_LINE)

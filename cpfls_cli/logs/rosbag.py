@@ -165,7 +165,7 @@ def _sent(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _drifts(received: np.ndarray, sent: dict[str, np.ndarray]) -> bool:
-    """Tell whether a sender's clock runs steadily away from the recorder's, at a pace that a simulation may have."""
+    """Check whether a sender's clock runs steadily away from the recorder's, at a pace that a simulation may have."""
     own = sent.get(STAMP, received)
     late, spans = received - own, (own[-1] - own[0], received[-1] - received[0])
     same = _SAME_CLOCK_S * _NANOSECOND
