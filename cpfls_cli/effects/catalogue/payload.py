@@ -392,7 +392,7 @@ EFFECT = Effect(
             valley=0.02,
         ),
         # A swing that is forgotten sooner forgives more of a length and of a start that are a little off.
-        Shape("damping_1_s", "1/s", (0.02, 0.4, 0.6), "damping of the swing", first=0.4),
+        Shape("damping_1_s", "1/s", (0.02, 0.2, 0.4, 0.6), "damping of the swing", first=0.4),
         Shape("depth_m", "m", (0.0, 0.1, 0.3), "depth of the hook below the centre of mass", first=0.0, follows=_hook),
     ),
     carried=Body(_pull, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)),
