@@ -28,7 +28,8 @@ from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.parameters import MASS
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure
-from cpfls_cli.playback.vehicle import carrying_weight, differences, find_vehicle, found_numbers
+from cpfls_cli.playback.vehicle import differences, find_vehicle, found_numbers
+from cpfls_cli.playback.weight import carrying_weight
 from cpfls_cli.vehicle.settings import VehicleSettings
 from tests.builders.playback_flights import (
     ADDED_AT,

@@ -14,8 +14,8 @@ from cpfls_cli.effects.registry import CENTRE_OF_MASS
 from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.inertia import INERTIA_PARAMETERS, MEASURED, beyond_any_body, more_than_others, six_parameters, symmetric
 from cpfls_cli.playback.errors import FADING, AlongFlights
-from cpfls_cli.playback.parameters import LAW
-from cpfls_cli.playback.vehicle import FoundNumber, VehicleFit
+from cpfls_cli.playback.parameters import LAW, FoundNumber
+from cpfls_cli.playback.vehicle import VehicleFit
 from cpfls_cli.response import spectra
 from cpfls_cli.response.flown import VehicleResponse
 from cpfls_cli.response.spectra import NOT_ACCEPTABLE, NOT_JUDGED, ROTATION, response_word

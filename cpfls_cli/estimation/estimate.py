@@ -328,3 +328,38 @@ def positive_ratio(numerator: Array, denominator: Array) -> tuple[float, float]:
         return max(float(ends[0]), 0.0), max(float(ends[1]), 0.0)
     # What lies between the ends is excluded.
     return (max(float(ends[1]), 0.0) if ends[0] <= 0 else 0.0), np.inf
+
+
+def power_between(of: Array, by: Array, joint: Array | None = None, instruments: Array | None = None) -> Array:
+    """Bound the power with which something goes with another, by logarithms of both, either of which may be noisy.
+
+    The slope of one on the other is too small, and the inverse of that of the other on the one too large.
+
+    Parameters
+    ----------
+    of, by : array, shape (sample,)
+    joint : array, shape (sample, other), optional
+        What `by` goes with too; as what answers `by` is no measure of it, `instruments` have to identify it.
+    instruments : array, shape (sample, instrument), optional
+        A constant among them.
+
+    Returns
+    -------
+    array, shape (2 + other,)
+        Lower and upper bound, infinite where neither rises with the other; slopes of `by` on `joint`.
+
+    References
+    ----------
+    Frisch 1934 (bounds); Wooldridge 2010, chapter 5 (two-stage least squares).
+    """
+    constant = np.ones((len(of), 1))
+    joint = constant[:, :0] if joint is None else joint
+
+    def slopes(left: Array, right: Array) -> Array:
+        first = np.column_stack([right, constant if instruments is None else instruments])
+        columns = np.column_stack([right, joint, constant])
+        fitted = first @ np.linalg.lstsq(first, columns)[0]
+        return np.asarray(np.linalg.lstsq(fitted, left)[0][:-1], dtype=float)
+
+    rise, *others = slopes(by, of)
+    return np.array([slopes(of, by)[0], 1 / rise if rise > 0 else np.inf, *others])

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray
+from cpfls_cli.arrays import Array
 from cpfls_cli.autopilots.registry import AUTOPILOTS
+from cpfls_cli.estimation.estimate import power_between
 from cpfls_cli.look.flight import LogFlight
 from cpfls_cli.look.steady import (
     WINDOW_S,
@@ -167,11 +168,7 @@ def _shape(flight: LogFlight, stated: StatedCurve) -> ThrustShape | None:
     share, up, collective = share[used], up[used], collective[used]
     by, of = np.log(share), np.log(up)
 
-    def bounds(kept: BoolArray) -> Array:
-        inverse = _slope(of[kept], by[kept])[0]
-        return np.array([_slope(by[kept], of[kept])[0], 1 / inverse if inverse > 0 else np.inf])
-
-    known = jackknifed(bounds, len(share))
+    known = jackknifed(lambda kept: power_between(of[kept], by[kept]), len(share))
     if known is None:
         return None
     lower, upper = known.estimate(0), known.estimate(1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from cpfls_cli.effects.signals import Signals
 from cpfls_cli.fuzzy.periodic import PeriodicStructure
 from cpfls_cli.inertia import INERTIA_PARAMETERS
 from cpfls_cli.playback.model import Remainder
+from cpfls_cli.result import About
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 INERTIA = "inertia"
@@ -87,6 +88,49 @@ class Physical(NamedTuple):
     unit: str
     positive: bool = False
     stated: bool = False
+
+
+_SI = About("estimate", unit="SI")
+_LOW, _HIGH = (About(f"{end} end of the 95 % interval", unit="SI") for end in ("lower", "upper"))
+
+
+class FoundNumber(NamedTuple):
+    """A number of a vehicle that was free.
+
+    It is determined where the flights say more of it than what was believed before: to a factor of two where it cannot
+    be negative, else to its natural size, or half of the range that is possible if that is less. What turns torque into
+    rotation is not where it makes a body that cannot be.
+    """
+
+    name: Annotated[str, About("block and number")]
+    unit: Annotated[str, About("empty for a ratio")]
+    value: Annotated[float, _SI]
+    low: Annotated[float, _LOW]
+    high: Annotated[float, _HIGH]
+    stated: Annotated[float, About("in the config; not finite where no config does", unit="SI", gaps=True)]
+    determined: Annotated[bool, About("1 where the flights say more than what was believed before")]
+    at_bound: Annotated[bool, About("1 where it lies on a bound, so the interval says little")]
+    possible: Annotated[bool, About("0 where no such vehicle has the estimate, see `bodily`")] = True
+
+
+class Difference(NamedTuple):
+    """What a configuration has that the vehicle of the config has not."""
+
+    name: Annotated[str, About("configuration, and what differs")]
+    unit: Annotated[str, About("of the difference")]
+    value: Annotated[float, _SI]
+    low: Annotated[float, _LOW]
+    high: Annotated[float, _HIGH]
+
+
+def interval(value: float, half: float, *, positive: bool) -> tuple[float, float]:
+    """Give the ends of an interval; by a factor for what cannot be below 0."""
+    if not positive:
+        return value - half, value + half
+    # What is not known at all is known to a factor beyond any number.
+    with np.errstate(over="ignore"):
+        factor = float(np.exp(half / value))
+    return value / factor, value * factor
 
 
 _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {

@@ -16,8 +16,8 @@ from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, MEASURED, nea
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
-from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES
-from cpfls_cli.playback.vehicle import FoundNumber, VehicleFit, bodily
+from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES, FoundNumber
+from cpfls_cli.playback.vehicle import VehicleFit, bodily
 from cpfls_cli.vehicle.rotors import figures_of_vehicle, with_factors
 from cpfls_cli.vehicle_limits import broken_limits
 

@@ -24,8 +24,8 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.playback.gusts import GUST_AXES
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.parameters import FoundNumber
 from cpfls_cli.playback.spread import Spread, drawn, require_sure
-from cpfls_cli.playback.vehicle import FoundNumber
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
 from cpfls_cli.stage import Run, stage

@@ -64,7 +64,8 @@ from cpfls_cli.playback.parameters import MASS, blocks_of
 from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
-from cpfls_cli.playback.vehicle import Share, VehicleFit, commanded_thrust, find_vehicle
+from cpfls_cli.playback.vehicle import Share, VehicleFit, find_vehicle
+from cpfls_cli.playback.weight import commanded_thrust
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, legend_over, line, style_of
 from cpfls_cli.report.content import percent
 from cpfls_cli.response.flown import VehicleResponse, vehicle_responses

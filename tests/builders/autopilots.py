@@ -11,8 +11,8 @@ from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.playback.constants import ExplainedBand, Repeat, UsedInstruments
 from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.parameters import FoundNumber
 from cpfls_cli.playback.rotors import RotorResponse
-from cpfls_cli.playback.vehicle import FoundNumber
 from cpfls_cli.simulation.autopilot import GyroscopeNoise
 from cpfls_cli.simulation.closed_loop import ClosedLoop, Setpoints, clock_of, fly_setpoints
 from cpfls_cli.simulation.settings import ClosedLoopSettings

@@ -9,7 +9,7 @@ from cpfls_cli.playback.disturbance import FoundGusts
 from cpfls_cli.playback.gusts import Gusts
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.loop import LoopBounds
-from cpfls_cli.playback.vehicle import FoundNumber
+from cpfls_cli.playback.parameters import FoundNumber
 from tests.builders.playback_flights import truth
 from tests.builders.vehicle_models import vehicle_of
 

@@ -13,9 +13,10 @@ from cpfls_cli.export.numbers import weights_of
 from cpfls_cli.playback.errors import AlongFlights, Errors, Prediction
 from cpfls_cli.playback.loop import LoopBounds
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
+from cpfls_cli.playback.parameters import FoundNumber
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.playback.structure import TriedStructure
-from cpfls_cli.playback.vehicle import FoundNumber, Share
+from cpfls_cli.playback.vehicle import Share
 from cpfls_cli.report.source import source_of_result
 from cpfls_cli.vehicle.motion import Acting
 from cpfls_cli.vehicle.settings import RotorSettings, VehicleSettings

@@ -14,6 +14,7 @@ from cpfls_cli.estimation.estimate import (
     first_stage_fit_by_run,
     fits_of_others,
     positive_ratio,
+    power_between,
 )
 from cpfls_cli.estimation.spectra import block_spectra, cut_blocks, eroded, transforms, window_starts, without_slow
 
@@ -130,6 +131,27 @@ def test_values_and_errors_are_those_of_another_package():
     other = IV2SLS(y, None, x, more, weights=weight).fit(cov_type="clustered", clusters=block)
     np.testing.assert_allclose(found.values, other.params, rtol=1e-8)
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), other.std_errors, rtol=0.06)
+
+
+def test_a_power_lies_between_its_bounds_whichever_side_is_noisy():
+    """What it goes with as well is that of two-stage least squares of another package."""
+    from linearmodels.iv import IV2SLS
+
+    rng = np.random.default_rng(12)
+    by, slow, answers = rng.standard_normal(4000), rng.standard_normal(4000), rng.standard_normal((2, 4000))
+    of = 2.0 * by + 1.5 * slow
+    for noisy in (0.0, 0.6):
+        seen = of + noisy * answers[0], by + (0.6 - noisy) * answers[1]
+        low, high = power_between(*seen, slow[:, None], slow[:, None])[:2]
+        assert low < 2.02
+        assert high > max(1.98, low)
+    # Where `by` answers what moves the other, as a voltage that sinks under load does.
+    moved = slow - 0.5 * (by + answers[0])
+    z = np.column_stack([np.ones(4000), slow])
+    found = power_between(of, by + answers[0], moved[:, None], z)
+    left, right = by + answers[0], np.column_stack([of, np.ones(4000)])
+    other = IV2SLS(left, right, moved, slow).fit().params
+    np.testing.assert_allclose([1 / found[1], found[2]], other.iloc[[0, 2]], rtol=1e-8)
 
 
 def test_each_part_is_predicted_by_the_others():

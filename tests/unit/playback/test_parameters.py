@@ -19,9 +19,9 @@ from cpfls_cli.playback.fit import (
     windows_of,
 )
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import FreeNumbers, Rules, blocks_of
+from cpfls_cli.playback.parameters import Difference, FreeNumbers, Rules, blocks_of
 from cpfls_cli.playback.player import free_runs, player_of
-from cpfls_cli.playback.vehicle import Difference, differences
+from cpfls_cli.playback.vehicle import differences
 from cpfls_cli.playback.windows import Runs, Steps, errors_of_runs
 from tests.builders.playback_flights import (
     ADDED_AT,

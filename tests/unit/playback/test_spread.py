@@ -9,9 +9,8 @@ from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.evaluation import ParameterPoint
 from cpfls_cli.playback.model import ModelEffect
-from cpfls_cli.playback.parameters import FreeNumbers
+from cpfls_cli.playback.parameters import FoundNumber, FreeNumbers
 from cpfls_cli.playback.spread import POSITIVE, drawn, model_at
-from cpfls_cli.playback.vehicle import FoundNumber
 from tests.builders.playback_flights import STATED, pushed, truth
 from tests.builders.spread_vehicles import found_record, inertia_and_mass
 from tests.builders.vehicle_models import wrench_somewhere

@@ -13,19 +13,10 @@ from cpfls_cli.playback.constants import Constants
 from cpfls_cli.playback.fit import Fitted
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.loop import LoopBounds, _explained, _factors
-from cpfls_cli.playback.parameters import blocks_of
+from cpfls_cli.playback.parameters import FoundNumber, blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.vehicle import (
-    CommandedThrust,
-    FoundNumber,
-    bodily,
-    carrying_weight,
-    commanded_thrust,
-    find_vehicle,
-    held_by_bounds,
-    widened_by_law,
-    widened_by_loop,
-)
+from cpfls_cli.playback.vehicle import bodily, find_vehicle, held_by_bounds, widened_by_loop
+from cpfls_cli.playback.weight import CommandedThrust, carrying_weight, commanded_thrust, widened_by_law
 from cpfls_cli.stages.vehicle import supplied_alike
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
 
