@@ -10,7 +10,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, jackknife_error
 from cpfls_cli.effects.catalogue.parameter_error import NUMBERS, shown
-from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step
 from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
@@ -160,17 +160,17 @@ def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array | Non
     if fit_error is not None:
         apart = _apart(sources, values, prior, fit_error)
     without = change + apart
-    # The only number of an effect may be 0: then there is none.
-    shapes = [
-        (0.0 if len(each.effect.shapes) == 1 else shape.grid[0], shape.grid[-1])
-        for each in found.hypothesis.chosen
-        for shape in each.effect.shapes
-    ]
+    shapes = [_ends(each.effect, shape) for each in found.hypothesis.chosen for shape in each.effect.shapes]
     ends, linear = np.array([(-np.inf, np.inf)] * len(found.estimates.linear) + shapes), len(found.estimates.linear)
     rows = np.clip(values + np.vstack([change, without]), *ends.T)
     said = np.array([found.hypothesis.following(row[:linear]) for row in rows])
     rows[:, linear:] = np.where(np.isnan(said), rows[:, linear:], said)
     return rows[0], rows[1:]
+
+
+def _ends(effect: Effect, shape: Shape) -> tuple[float, float]:
+    """Bound a shape; the only number of an effect may be 0, where there is no effect."""
+    return 0.0 if effect.numbers == (shape,) else shape.grid[0], shape.grid[-1]
 
 
 def _apart(sources: Sequence[_Source], values: Array, prior: Array, fit_error: Array) -> Array:

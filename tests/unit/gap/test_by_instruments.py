@@ -13,6 +13,7 @@ from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_instruments, by_samples
 from cpfls_cli.gap.naming.by_instruments import (
     _chance,
+    _ends,
     _Source,
     _sources,
     _stepped,
@@ -286,6 +287,12 @@ def test_what_follows_from_others_that_did_not_go_far_is_not_asked_for_again_and
     monkeypatch.setattr(by_instruments, "_sources", lambda *_: nothing)
     monkeypatch.setattr(by_instruments, "_stepped", stepped)
     assert by_instruments.by_instruments(found, None).values[-1] == pytest.approx(depth + 0.05)
+
+
+@pytest.mark.parametrize(("name", "least"), [("motor_lag", 0.0), ("vertical_descent", 0.4)])
+def test_the_only_number_of_an_effect_may_be_0_and_no_other_shape(name, least):
+    effect = CATALOGUE[name]
+    assert _ends(effect, effect.shapes[0]) == (least, effect.shapes[0].grid[-1])
 
 
 def test_what_cannot_be_below_0_and_would_be_is_0(monkeypatch):
