@@ -166,6 +166,7 @@ class Effect:
     # What takes the place of this one once it is chosen: the same effect with numbers for which alone another effect
     # would do as well, or with those that others depend on as shapes, under the same names.
     exact: Effect | None = None
+    tried_last: bool = False  # Whether it looks like many others: tried where a gap is left without it.
     added: str = ""  # The effect that the numbers which `exact` adds are, where all others are 0.
     # ``lever(linear, error, vehicle) -> array of bool, shape (coefficient,)``: coefficients that the others leave
     # possible, a torque being no larger than its force on a lever as long as the body.

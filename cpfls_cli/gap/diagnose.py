@@ -50,6 +50,7 @@ from cpfls_cli.gap.naming.noisy_rate import with_noisy_rate
 from cpfls_cli.gap.naming.open_questions import not_excited, not_separated, unexplained_channels, untried, with_unnamed
 from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
 from cpfls_cli.gap.naming.results import (
+    NAMES_EFFECTS,
     Alternative,
     ByKind,
     Conclusion,
@@ -101,7 +102,8 @@ def diagnose(
     The sensors are audited first and repaired where they are at fault. Effects are then added one at a time while each
     explains more of blocks it has not seen than chance does anywhere in the catalogue; what is chosen is judged on
     the held-out flights, once. Where the residual is gusts by instruments, these are a part of the noise, the effects
-    are sought once more above them, and their numbers come by instruments.
+    are sought once more above them, and their numbers come by instruments. What looks like many others is tried last:
+    where, without it, a gap or a wrong number of the vehicle is left.
 
     `training`, `held`: at least one each.
     `whole`: the flights that these are parts of, where they are.
@@ -109,6 +111,43 @@ def diagnose(
     `progress`: takes the share of the work that is done and a note.
     Raises InputError if the flights are too short, of different rates, or have nothing in common with the catalogue.
     """
+    last = [name for name, each in CATALOGUE.items() if each.tried_last and name not in settings.ignore]
+    can = [name for name in last if not any(CATALOGUE[name].missing(own) for own in (*training, *held))]
+
+    def run(ignored: Sequence[str]) -> DiagnosisRun:
+        without = replace(settings, ignore=(*settings.ignore, *ignored))
+        return _diagnosed(training, held, without, rng, whole, model, progress)
+
+    first = run(can)
+    if not can or not _left_open(first.diagnosis):
+        return first
+    second = run(())
+    return second if {*can} & _causes(second.diagnosis) else first
+
+
+def _left_open(found: Conclusion) -> bool:
+    """Check whether a gap, or a wrong number of the vehicle, is left."""
+    return found.verdict in _OPEN or any(each.name == VEHICLE_NUMBERS.name for each in found.effects)
+
+
+def _causes(found: Conclusion) -> set[str]:
+    """Name what may be the cause: effects that are named, and rivals of wrong numbers of the vehicle."""
+    rivals = {each.name for each in found.alternatives if each.instead_of == VEHICLE_NUMBERS.name}
+    return rivals.union(each.name for each in found.effects) if found.verdict in NAMES_EFFECTS else set()
+
+
+_OPEN = (GapVerdict.PARTIAL, GapVerdict.UNEXPLAINED, GapVerdict.FLIGHTS_DIFFER)
+
+
+def _diagnosed(
+    training: Sequence[Signals],
+    held: Sequence[Signals],
+    settings: GapSettings,
+    rng: np.random.Generator,
+    whole: Sequence[Signals],
+    model: InertiaModel | None,
+    progress: Callable[[float, str], None],
+) -> DiagnosisRun:
     progress(0.0, "sensor audit")
     windows = common_windows([*training, *held], settings)
     audited = audit(training, windows, whole).with_offsets(held, windows)

@@ -263,7 +263,8 @@ class VehicleModel:
     @property
     def needs(self) -> frozenset[str]:
         """What a flight has to have for all of its parts, as `Signals.available` names it."""
-        of_effects = (one.effect.needs - ({"command"} if one.is_filter else set()) for one in self.effects)
+        # To be found an effect may need the command and the measured force, to act it does not.
+        of_effects = (one.effect.needs - {"command", "force"} for one in self.effects)
         learned = {"rotor_speed", "velocity"} if self.remainder else {"rotor_speed"} if self.thrust_linear else set()
         needs = frozenset(learned).union(*of_effects)
         return needs - {"torque", "thrust"} if "rotor_speed" in needs else needs

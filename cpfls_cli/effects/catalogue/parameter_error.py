@@ -170,6 +170,7 @@ EFFECT = Effect(
         "rotor_mismatch": "apply yaw effort at constant roll and pitch",
         "rotor_acceleration": "compare slow with fast yaw: a wrong Izz acts in both",
         "motor_lag": "compare slow with fast torque: a wrong inertia acts in both",
+        "thrust_slope": "roll and pitch at little and at much thrust: a wrong inertia stays",
         "payload": "accelerate and stop, then wait for some swings: a wrong mass, or thrust, does not swing",
     },
     source="Newton-Euler equations",

@@ -56,6 +56,8 @@ USUAL = {
     ("rotor_mismatch", "lift_imbalance"): ((-0.1, 0.1), (-0.1, 0.1)),
     ("parameter_error", "inertia_x"): ((-0.5, 1.0), (-0.5, 1.0)),
     ("parameter_error", "reference_z"): ((-0.15, 0.15), (-0.02, 0.02)),
+    # Commands of shares of the full thrust are a line.
+    ("thrust_slope", "linear"): ((-0.3, 1.0), (-0.3, 1.0)),
     ("vertical_descent", "f_2"): ((-0.2, 0.7), (-0.2, 0.7)),
     ("payload", "length_m"): ((0.5, 4.0), None),
     ("gyro_bias", "b_x"): ((-0.1, 0.1), (-0.1, 0.1)),

@@ -71,6 +71,20 @@ def test_what_acts_on_the_body(columns, flight, name):
     assert not found[:, 3:].any()
 
 
+def test_a_thrust_that_is_half_a_line_turns_with_the_factors_of_each_rotor(columns, flight):
+    """In hover thrust and drag torque are as they were; their sum is ``(1 - a) w^2 + a w_h w``, times the factors."""
+    found = columns("thrust_slope", flight).direct[..., 0]
+    vehicle = flight.vehicle
+    hover = np.sqrt(vehicle.mass_kg * 9.81 / sum(rotor.thrust_factor_n_s2 for rotor in vehicle.rotors))
+    for k in (0, 211, 599):
+        half = np.sqrt(0.5 * flight.rotor_speed[k] ** 2 + 0.5 * hover * flight.rotor_speed[k])
+        square, mixed = (
+            np.concatenate([given.body_torque[0], [0.0, 0.0, given.thrust[0]]])
+            for given in (body_wrench(vehicle, speed[None]) for speed in (flight.rotor_speed[k], half))
+        )
+        np.testing.assert_allclose(square + 0.5 * found[k], mixed, atol=1e-9)
+
+
 def test_discs_that_lag_brake_the_body_and_lean_the_thrust(columns, flight):
     """Thrust at hub i turns by -(p, q) about x and y against the body; its roll and pitch lever is in k_w."""
     found = columns("rotor_plane_damping", flight).direct

@@ -1,0 +1,37 @@
+"""Slope of the thrust: thrust that does not go with the square of the command."""
+
+from cpfls_cli.effects import scales
+from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+
+
+def _acts(see: Instant, p: Numbers) -> Wrench:
+    # As it is in hover, so that neither the mass nor the thrust factor is another one.
+    hover = see.functions.sqrt(scales.weight(see.vehicle) / see.functions.total(see.thrust_factors))
+    apart = p["linear"] * (see.rotor_speed * (hover - see.rotor_speed))
+    yaw = -see.functions.total(see.spins * see.drag_factors * apart)
+    return Wrench((0, 0, yaw), at_hubs=(0, 0, see.thrust_factors * apart))
+
+
+EFFECT = Effect(
+    name="thrust_slope",
+    order=285,
+    title="thrust curve of the commands (no square)",
+    kind="wrench",
+    formula="dT_i = a k (w_h w_i - w_i^2), drag torque alike,  M = sum r_i x dT_i z,  w_h commanded in hover",
+    sentence="Thrust rises less steeply with the commands than their square, or more steeply. The torque that turns "
+    "the vehicle is then less, or more, than the config says, as if its inertia were another one.",
+    coefficients=(
+        Coefficient("linear", "1", -1.0, 1.0, "share of the hover thrust that goes with the command, not its square"),
+    ),
+    # Measured speeds have the square of blades; torque alone shows the slope in hover, that of a wrong inertia.
+    needs=frozenset({"rotor_speed", "command", "force"}),
+    excitation="climbs and drops, with roll and pitch at much and at little thrust",
+    rivals={
+        "parameter_error": "roll and pitch at much and at little thrust: a wrong inertia stays",
+        "inflow": "change the thrust quickly: inflow acts only once the vehicle climbs",
+    },
+    source="thrust of commands as of PX4 (THR_MDL_FAC), Betaflight (thrust_linear) and Crazyflie: a square and a line",
+    tried_last=True,
+    acts=_acts,
+)

@@ -1,0 +1,49 @@
+"""Commands whose thrust is no square of them are named as such, and are no wrong inertia; a wrong inertia is one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cpfls_cli.gap.diagnose import diagnose
+from cpfls_cli.gap.settings import GapSettings
+from tests.builders.gap_flights import VEHICLE, fly
+
+FEW = GapSettings(shifts=39)
+HOVER = np.sqrt(VEHICLE.mass_kg * 9.81 / sum(rotor.thrust_factor_n_s2 for rotor in VEHICLE.rotors))
+
+
+def commanded(seed, share=0.0, **given):
+    """A log of the commands of rotors whose thrust is a square and, this share of it in hover, a line of them."""
+    signals = fly(seed, gyro=0.005)
+    ratio = (signals.rotor_speed / HOVER) ** 2
+    command = HOVER * (-share + np.sqrt(share**2 + 4 * (1 - share) * ratio)) / (2 * (1 - share))
+    assert (1 - share) * command**2 + share * HOVER * command == pytest.approx(signals.rotor_speed**2)
+    force = signals.specific_force + 0.05 * np.random.default_rng(100 + seed).standard_normal((len(signals), 3))
+    vehicle = replace(VEHICLE, **given)
+    return replace(signals, rotor_speed=command, commanded=True, specific_force=force, vehicle=vehicle)
+
+
+def named(**known):
+    flights = [commanded(seed, **known) for seed in (1, 2, 3)]
+    return diagnose(flights[:2], flights[2:], FEW, np.random.default_rng(1)).diagnosis
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_a_curve_of_the_commands_is_no_wrong_inertia(share):
+    found = named(share=share)
+    assert (found.verdict, [each.name for each in found.effects]) == ("NAMED", ["thrust_slope"])
+    number = found.effects[0].coefficients["linear"]
+    assert number.low < share < number.high
+    assert number.value == pytest.approx(share, abs=0.02)
+
+
+def test_a_wrong_inertia_is_no_curve_of_the_commands():
+    moments = tuple(1.25 * each for each in VEHICLE.inertia_kg_m2[:3])
+    found = named(inertia_kg_m2=moments)
+    assert [each.name for each in found.effects] == ["parameter_error"]
+    assert found.effects[0].coefficients["inertia_x"].value == pytest.approx(-0.2, abs=0.02)
+
+
+def test_a_square_is_named_nothing():
+    assert named().verdict == "NO_GAP"
