@@ -320,7 +320,7 @@ class Model:
         if self.artifact is None:
             return VehicleModel(vehicle=self._study.vehicle)
         record: Any = self.artifact._record
-        model = modelled(self._path, record)
+        model = modelled(self._path, record).commanded_anew
         if model.unsimulated:
             parts = ", ".join(model.unsimulated)
             raise InputError(f"{self._path}: holds {parts}, which depends on more than the state; use Model.replay")

@@ -280,7 +280,7 @@ def _require_usable(functions: InertiaFunctions, path: Path) -> None:
 
 def _bare_sheet(path: Path, record: AnyModel, origin: Origin) -> Sheet:
     """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
-    model = modelled(path, record)
+    model = modelled(path, record).commanded_anew
     held = tuple(each for each in model.effects if each.name not in model.unsimulated)
     still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
     sheet = bare_sheet(record, still, origin)

@@ -196,7 +196,7 @@ class Samples:
 
 def _columns(nominal: VehicleModel, models: tuple[VehicleModel, ...]) -> Iterator[tuple[str, str, Array]]:
     """Give names, units and values."""
-    vehicles, responses = [each.vehicle for each in models], [each.response for each in models]
+    vehicles, responses = [each.vehicle for each in models], [each.commanded_anew.response for each in models]
     rotors = [each.rotors for each in vehicles]
     yield "mass_kg", "kg, as stated", np.array([each.mass_kg for each in vehicles])
     inertia = np.array([symmetric(each.inertia_kg_m2) for each in vehicles])

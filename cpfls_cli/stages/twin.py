@@ -281,7 +281,7 @@ def _vehicles(study: Study, model: Path | None) -> dict[str, VehicleModel | None
     stated: dict[str, VehicleModel | None] = {VEHICLE: None}
     if model is None:
         return stated
-    given: dict[str, VehicleModel | None] = {model.name: read_model(model, study)}
+    given: dict[str, VehicleModel | None] = {model.name: read_model(model, study).commanded_anew}
     return given if study.vehicle.unknown else stated | given
 
 

@@ -443,7 +443,12 @@ def _judged(
     behind = any(flight.parts[0].commanded for flight in training)
     shares = any(flight.shares for flight in training)
     own = {each.name: getattr(found, each.name) for each in fields(found)}
-    known = {"commanded": behind, "full_voltage": max(flight.parts[0].full_voltage for flight in flights)}
+    held = [1 / flight.logged_hz for flight in training if flight.parts[0].commanded and flight.hold == "previous"]
+    known = {
+        "commanded": behind,
+        "held_s": sum(held) / len(training),
+        "full_voltage": max(flight.parts[0].full_voltage for flight in flights),
+    }
     own |= {name: replace(own[name], **known) for name in ("model", "forecast") if own[name] is not None}
     responses = mismatches(_responses(found, training), instrumented=found.instruments is not None)
     return Vehicle(

@@ -64,24 +64,28 @@ class Spread:
     ----------
     gain, lag, delay : tuple of float
         Lowest and highest factor on gain (with the other parts of torque), lag and delay.
+    delayed : float
+        Largest part of the lag that may be a delay instead, which no derivative of a law makes up for.
     """
 
     gain: tuple[float, float] = (1.0, 1.0)
     lag: tuple[float, float] = (1.0, 1.0)
     delay: tuple[float, float] = (1.0, 1.0)
+    delayed: float = 0.0
 
     def corners(self, plant: AxisPlant) -> Iterator[AxisPlant]:
         """Give the plant as it was found, then with each choice of ends."""
         yield plant
-        for gain, lag, delay in product(*(dict.fromkeys(each) for each in (self.gain, self.lag, self.delay))):
-            if (gain, lag, delay) != (1.0, 1.0, 1.0):
+        ends = (self.gain, self.lag, self.delay, (0.0, self.delayed))
+        for gain, lag, delay, delayed in product(*(dict.fromkeys(each) for each in ends)):
+            if (gain, lag, delay, delayed) != (1.0, 1.0, 1.0, 0.0):
                 yield replace(
                     plant,
                     gain=gain * plant.gain,
                     by_acceleration=gain * plant.by_acceleration,
                     slow=gain * plant.slow,
-                    lag=lag * plant.lag,
-                    delay=delay * plant.delay,
+                    lag=lag * (1 - delayed) * plant.lag,
+                    delay=delay * plant.delay + delayed * lag * plant.lag,
                 )
 
 
@@ -146,6 +150,26 @@ def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, 
         for axis in range(3)
     )
     return HoverPlant((axes[0], axes[1], axes[2]), share, motors.speed_at(share) / motors.speed_max)
+
+
+def on_less(hover: HoverPlant, drained: float, law: Law, model: VehicleModel, rotor_lag: float) -> HoverPlant:
+    """Let the gains of a vehicle in hover reach down to those on an empty battery, on which rotors turn slower.
+
+    `drained`: speed by command on it, over that on the full one. `ComputationError` where that does not carry the weight.
+    """
+    slower = replace(model.vehicle, rotor_speed_max_rad_s=drained * model.vehicle.rotor_speed_max_rad_s)
+    try:
+        empty = hover_plant(law, slower, replace(model, vehicle=slower), rotor_lag)
+    except ComputationError:
+        raise ComputationError(
+            "full thrust does not carry the weight on a battery that has lost as much of its voltage as "
+            "simulation.closed_loop.battery_use says; make that smaller"
+        ) from None
+    left = [min(low.gain / full.gain, 1.0) for low, full in zip(empty.axes, hover.axes, strict=True)]
+    spreads = [
+        replace(each, gain=(part * each.gain[0], each.gain[1])) for part, each in zip(left, hover.spreads, strict=True)
+    ]
+    return replace(hover, spreads=(spreads[0], spreads[1], spreads[2]))
 
 
 def _hover_share(flown: Vehicle, held: VehicleModel | None, motors: Motors) -> float:
