@@ -240,8 +240,8 @@ def _of_vehicle(
     drained = _drained(vehicle, 1 - use)
     if drained < 1:
         assumed.append(
-            f"battery: margins hold from the fullest one of the flights to one at {100 * (1 - use):.3g} % of its voltage "
-            "(simulation.closed_loop.battery_use)"
+            f"battery: margins hold from the fullest one of the flights to one at {100 * (1 - use):.3g} % of its "
+            "voltage (simulation.closed_loop.battery_use)"
         )
     gains = gains_for_vehicle(
         autopilot,
@@ -389,12 +389,13 @@ def _trusted(run: Run, model: Path) -> Vehicle:
         raise InputError(f"{model}: is {what}; gains need a vehicle that `cpfls vehicle` found")
     record = found_vehicle(model)
     if record.verdict not in GOOD:
-        good = " or ".join(trust_words(word).short for word in reversed(GOOD))
+        good = trust_words(Trust.CONTROL).short
         open_ = [name_of(name) for name in record.not_determined]
         weak = f"; not identified: {few(open_)}" if open_ else ""
         raise InputError(
-            f"{model}: {trust_words(record.verdict).short}{weak}. Gains need a vehicle that is {good}: a body "
-            f"that is too heavy gives gains that are too high. {_missing(run, record)}"
+            f"{model}: {trust_words(record.verdict).short}{weak}. Gains need a vehicle that is {good} at least: a "
+            f"body that is too heavy gives gains that are too high. {_missing(run, record)}; or `cpfls tune LOG`, from "
+            "a log of the autopilot alone"
         )
     return record
 
@@ -437,8 +438,8 @@ def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tu
     if not model.commanded:
         assumed.append(
             "speeds were measured, so no flight shows how the rotors follow their commands: "
-            f"{1e3 * rotor_lag:.3g} ms of simulation.closed_loop.rotor_time_constant_s are assumed, 30 % either way, up "
-            "to half of it a delay; margins hold where that does: log commands to know it"
+            f"{1e3 * rotor_lag:.3g} ms of simulation.closed_loop.rotor_time_constant_s are assumed, 30 % either way, "
+            "up to half of it a delay; margins hold where that does: log commands to know it"
         )
         intervals[LAG] = _ASSUMED_LAG
     named = {"lag": intervals.get(LAG, (1.0, 1.0)), "delay": intervals.get(DELAY, (1.0, 1.0))} | intervals

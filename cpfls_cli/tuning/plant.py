@@ -155,7 +155,7 @@ def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, 
 def on_less(hover: HoverPlant, drained: float, law: Law, model: VehicleModel, rotor_lag: float) -> HoverPlant:
     """Let the gains of a vehicle in hover reach down to those on an empty battery, on which rotors turn slower.
 
-    `drained`: speed by command on it, over that on the full one. `ComputationError` where that does not carry the weight.
+    `drained`: speed by command on it, over that on the full one. `ComputationError` where it does not carry the weight.
     """
     slower = replace(model.vehicle, rotor_speed_max_rad_s=drained * model.vehicle.rotor_speed_max_rad_s)
     try:
