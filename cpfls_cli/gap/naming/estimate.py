@@ -347,7 +347,7 @@ def may_be_another(found: NamedFit) -> Refusal | None:
     """Find an effect of which nothing differs from 0 that another one, which it holds, has not: a wind of no speed."""
     for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
         for other in (CATALOGUE[name] for name in sorted(effect.holds)):
-            theirs = {each.name for each in (*other.coefficients, *other.shapes)}
+            theirs = {each.name for each in other.coefficients} | {each.name for each in other.shapes}
             more = [number for number in numbers if number.name not in theirs]
             if more and all(number.low <= 0.0 <= number.high for number in more):
                 own = " and ".join(spoken(number.name) for number in more)
