@@ -214,10 +214,7 @@ class VehicleModel:
         "what a command is between samples, where the response was found so: linear or previous", default=None
     )
     held_s: float = about(
-        "time for which its flights, as they are logged, hold a command; 0 where speeds are measured, or not held",
-        unit="s",
-        least=0.0,
-        default=0.0,
+        "for how long logs of its flights hold a command; 0 for measured speeds", unit="s", least=0.0, default=0.0
     )
     full_voltage: float = about(
         "what the voltages of its flights are shares of; 1 for shares alone", unit="V", least=0.0, default=1.0
@@ -288,16 +285,6 @@ class VehicleModel:
         slow = response.slow_roll_pitch or response.slow_yaw
         late = (response.lag_s or response.delay_s) and not self.commanded
         return not (self.thrust_linear or self.remainder or slow or late)
-
-    @property
-    def commanded_anew(self) -> VehicleModel:
-        """It, for commands that are not those of a log.
-
-        A log shows some of the commands that an autopilot sends. Held from sample to sample they are half a sample late
-        on average, and so much of what is between command and torque its own lag and delay lack.
-        """
-        behind = replace(self.response, delay_s=self.response.delay_s + 0.5 * self.held_s)
-        return replace(self, response=behind, held_s=0.0) if self.held_s else self
 
     @property
     def unsimulated(self) -> tuple[str, ...]:
@@ -447,6 +434,17 @@ class VehicleModel:
     def body(self) -> Body:
         """What is moved, where its inertia is constant."""
         return Body.of(self.vehicle, symmetric(self.vehicle.inertia_kg_m2))
+
+
+def commanded_anew(model: VehicleModel) -> VehicleModel:
+    """Make of a model one for commands that are not those of a log.
+
+    A log shows some of the commands that an autopilot sends. Held from sample to sample they are half a sample late on
+    average, and so much of what is between command and torque the model's lag and delay lack.
+    """
+    behind = replace(model.response, delay_s=model.response.delay_s + 0.5 * model.held_s)
+    return replace(model, response=behind, held_s=0.0) if model.held_s else model
+
 
 
 def of_thrust(lever: Acts) -> Acts:

@@ -32,7 +32,7 @@ from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.viewed import view_of
 from cpfls_cli.flights.models import any_model, modelled
 from cpfls_cli.pages.model import against, impossible_in_words, said_by
-from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel, commanded_anew
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.validation.trust import Trust
@@ -281,7 +281,7 @@ def _require_usable(functions: InertiaFunctions, path: Path) -> None:
 
 def _bare_sheet(path: Path, record: AnyModel, origin: Origin) -> Sheet:
     """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
-    model = modelled(path, record).commanded_anew
+    model = commanded_anew(modelled(path, record))
     held = tuple(each for each in model.effects if each.name not in model.unsimulated)
     still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
     sheet = bare_sheet(record, still, origin)

@@ -140,9 +140,7 @@ def simulate(
         raise InputError(f"{model}: no model is flown in mode inverse; leave the mode out, or add --mode closed-loop")
     run.take({"trajectory": trajectory} | ({} if model is None else {"model": model}))
     time, planned = _plan(trajectory, closed)
-    flown = (
-        None if model is None else import_module("cpfls_cli.flights.models").read_model(model, run.study).commanded_anew
-    )
+    flown = None if model is None else import_module("cpfls_cli.flights.models").read_anew(model, run.study)
     with settings_of("simulation", run.study):
         with_effects(flown, simulated_effects(run.study.simulation.closed_loop.effects, run.study.vehicle))
         played_gusts(flown, run.study.simulation.closed_loop.gusts)

@@ -23,7 +23,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.parameter_files import parameter_file
 from cpfls_cli.flightlog.results import Flight, Imported
-from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_model
+from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_anew
 from cpfls_cli.flights.recordings import read_whole
 from cpfls_cli.flights.training import numbered_roles
 from cpfls_cli.logs.formats import about_flight, log_contents, read_log
@@ -227,7 +227,7 @@ def _of_vehicle(
     run.take({"model": model} | numbered_roles("flight", flights))
     record = _trusted(run, model)
     with_numbers(run, "tune", model, whole=True)
-    vehicle = read_model(model, run.study).commanded_anew
+    vehicle = read_anew(model, run.study)
     logs = [_read(each, run.study) for each in flights]
     known, refused = _todays(autopilot, logs)
     if run.dry_run:

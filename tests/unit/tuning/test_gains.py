@@ -9,7 +9,7 @@ import pytest
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel, commanded_anew
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.tuning.gains import AskedMargins, proposal_of, with_filters
 from cpfls_cli.tuning.margins import (
@@ -211,11 +211,11 @@ def test_commands_of_an_autopilot_are_met_half_a_sample_of_the_log_later():
     """A log at 100 Hz holds commands for 10 ms, which on average makes them 5 ms late in it, not in flight."""
     law, response = AUTOPILOTS["px4"].law(), RotorResponse(lag_s=0.05, delay_s=0.01)
     model = VehicleModel(vehicle=CROSS, response=response, commanded=True, held_s=0.01)
-    for anew in (model.commanded_anew, model.commanded_anew.commanded_anew):
+    for anew in (commanded_anew(model), commanded_anew(commanded_anew(model))):
         axis = hover_plant(law, CROSS, anew, 0.03).axes[0]
         assert (axis.lag, axis.delay) == pytest.approx((0.05, 0.015))
     measured = replace(model, held_s=0.0)
-    assert measured.commanded_anew is measured
+    assert commanded_anew(measured) is measured
 
 
 @pytest.mark.parametrize("name", ["px4", "ardupilot", "crazyflie"])
