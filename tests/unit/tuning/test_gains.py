@@ -240,3 +240,8 @@ def test_what_is_unstable_has_no_margins():
     assert found.roll.command.disk_deg == 0.0
     assert found.yaw.command.stable
     assert frequencies(law)[-1] < 200.0
+
+
+def test_no_gain_holds_nothing():
+    found = margins(FREQUENCY, 0.0 * S)
+    assert (found.stable, found.disk_deg) == (False, 0.0)
