@@ -446,7 +446,6 @@ def commanded_anew(model: VehicleModel) -> VehicleModel:
     return replace(model, response=behind, held_s=0.0) if model.held_s else model
 
 
-
 def of_thrust(lever: Acts) -> Acts:
     """Give a lever the thrust of the rotors in place of all forces."""
     return lambda see, p: lever(replace(see, force=(0, 0, see.thrust)), p)

@@ -445,7 +445,10 @@ def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tu
     named = {"lag": intervals.get(LAG, (1.0, 1.0)), "delay": intervals.get(DELAY, (1.0, 1.0))} | intervals
     delayed = 0.0 if model.commanded else _ASSUMED_DELAYED
     axes = [spread_of(named, INERTIA[axis], DRAG if axis == 2 else THRUST) for axis in range(3)]
-    return tuple(replace(each, delayed=delayed) for each in axes), assumed
+    names = [each.name for each in record.numbers]
+    late = [names.index(FOUND_AS[key]) for key in (LAG, DELAY) if FOUND_AS[key] in names]
+    trade = float(record.correlation[late[0], late[1]]) if len(late) > 1 else 0.0
+    return tuple(replace(each, delayed=delayed, trade=trade) for each in axes), assumed
 
 
 def _drained(model: VehicleModel, voltage: float) -> float:

@@ -66,27 +66,45 @@ class Spread:
         Lowest and highest factor on gain (with the other parts of torque), lag and delay.
     delayed : float
         Largest part of the lag that may be a delay instead, which no derivative of a law makes up for.
+    trade : float
+        Correlation of lag and delay; where it is below 0 their sum is known better than either, and the ends are those
+        of both, of either and of the sum on the ellipse of 95 %.
     """
 
     gain: tuple[float, float] = (1.0, 1.0)
     lag: tuple[float, float] = (1.0, 1.0)
     delay: tuple[float, float] = (1.0, 1.0)
     delayed: float = 0.0
+    trade: float = 0.0
 
     def corners(self, plant: AxisPlant) -> Iterator[AxisPlant]:
         """Give the plant as it was found, then with each choice of ends."""
         yield plant
-        ends = (self.gain, self.lag, self.delay, (0.0, self.delayed))
-        for gain, lag, delay, delayed in product(*(dict.fromkeys(each) for each in ends)):
-            if (gain, lag, delay, delayed) != (1.0, 1.0, 1.0, 0.0):
+        for gain, (lag, delay), delayed in product(
+            dict.fromkeys(self.gain), self._late(plant), dict.fromkeys((0.0, self.delayed))
+        ):
+            if (gain, lag, delay, delayed) != (1.0, plant.lag, plant.delay, 0.0):
                 yield replace(
                     plant,
                     gain=gain * plant.gain,
                     by_acceleration=gain * plant.by_acceleration,
                     slow=gain * plant.slow,
-                    lag=lag * (1 - delayed) * plant.lag,
-                    delay=delay * plant.delay + delayed * lag * plant.lag,
+                    lag=(1 - delayed) * lag,
+                    delay=delay + delayed * lag,
                 )
+
+    def _late(self, plant: AxisPlant) -> list[tuple[float, float]]:
+        """Give lags with delays at their ends, s."""
+        (short, long), (soon, late) = self.lag, self.delay
+        wide, deep = 0.5 * (long - short) * plant.lag, 0.5 * (late - soon) * plant.delay
+        if not (self.trade < 0 < min(wide, deep)):
+            ends = product(dict.fromkeys(self.lag), dict.fromkeys(self.delay))
+            return [(lag * plant.lag, delay * plant.delay) for lag, delay in ends]
+        shared = self.trade * wide * deep
+        both = max(wide**2 + deep**2 + 2 * shared, 1e-12) ** 0.5
+        steps = ((wide, shared / wide), (shared / deep, deep), ((wide**2 + shared) / both, (deep**2 + shared) / both))
+        signed = [(sign * lag, sign * delay) for lag, delay in steps for sign in (-1, 1)]
+        return [(max(plant.lag + lag, 0.0), max(plant.delay + delay, 0.0)) for lag, delay in signed]
 
 
 @dataclass(frozen=True)

@@ -192,6 +192,17 @@ def test_intervals_become_the_corners_of_the_plant():
     assert (late.lag, late.delay) == pytest.approx((0.03, 0.03))
 
 
+def test_a_lag_and_a_delay_of_which_the_sum_is_known_are_not_both_at_their_longest():
+    plant = AxisPlant(100.0, 0.0, 0.0, 1.0, 0.0, 0.03, 0.02)
+    apart = Spread(lag=(0.5, 1.5), delay=(0.5, 1.5))
+    assert max(each.lag + each.delay for each in apart.corners(plant)) == pytest.approx(0.075)
+    trade = list(replace(apart, trade=-0.96).corners(plant))
+    assert {round(1e3 * each.lag) for each in trade} >= {15, 45}
+    assert {round(1e3 * each.delay) for each in trade} >= {10, 30}
+    # Half widths of 15 and 10 ms, correlated by -0.96.
+    assert max(each.lag + each.delay for each in trade) == pytest.approx(0.05 + 1e-3 * 37**0.5)
+
+
 @pytest.mark.parametrize("name", ["px4", "betaflight", "crazyflie"])
 def test_gains_reach_down_to_those_on_an_emptier_battery(name):
     """On it the same command turns rotors slower, which hover at the speed that they always hover at."""
