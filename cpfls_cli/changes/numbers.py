@@ -65,6 +65,7 @@ _ABOVE_HZ, _ACROSS_HZ = 20.0, 3.0
 """Where vibration begins: above what a vehicle flies. Across its rotors the accelerometer feels the air alone, so that
 what turns with them shows at whatever the log's rate makes of its frequency."""
 
+_TURNING_S = 2.0  # Over which a torque about z is averaged, to see how it goes with the yaw rate.
 _TURNS_S, _ALIKE = 1.0, 0.03
 """Stretches over which what turns with a rotor adds up: rotors 1 Hz apart are separated. Of those that turn more alike
 each has its share, by the squared size below which a difference of theirs counts as none."""
@@ -255,7 +256,7 @@ _Numbers = tuple[list[str], Array, Array] | tuple[list[str], Array, Array, Array
 
 def _estimates(signals: Signals, flies: BoolArray, has_gyroscope: bool) -> Iterator[_Numbers]:
     rotors = [f"M{index + 1}" for index in range(len(signals.vehicle.rotors))]
-    yield _averaged([f"thrust {name}" for name in rotors], _thrust_shares(signals), flies, np.log)
+    yield _averaged([f"thrust {name}" for name in rotors], *_thrust_shares(signals, flies))
     if signals.rotor_command is not None:
         # Squares, as thrust and drag are.
         both = np.stack([signals.speed**2, signals.rotor_command**2], axis=2)
@@ -293,15 +294,34 @@ def _averaged(names: list[str], values: Array, flies: BoolArray, of: Callable[[A
         return names, whole, jackknife_error(left_out)
 
 
-def _thrust_shares(signals: Signals) -> Array:
-    """Give what each rotor is asked for over its share of what carries the vehicle, shape (time, rotor)."""
+def _thrust_shares(signals: Signals, flies: BoolArray) -> tuple[Array, BoolArray, Callable[[Array], Array]]:
+    """Give what each rotor is asked for over its share of what carries the vehicle, and its logarithm without turning.
+
+    A vehicle that turns to one side for most of a flight needs a torque against the air; the share is that at no rate.
+    """
+    from scipy.ndimage import uniform_filter1d
+
     vehicle = signals.vehicle
     factors = np.array([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     carried = np.full(len(signals), weight)
     if signals.attitude is not None:
         carried /= np.maximum(signals.rotation[:, 2, 2], 0.2)
-    return np.asarray(signals.speed**2 * factors * len(factors) / carried[:, None])
+    shares = np.asarray(signals.speed**2 * factors * len(factors) / carried[:, None])
+    # Slowly, for the torque that accelerates is nothing then, however late the rotors are logged.
+    slow, rate = (
+        uniform_filter1d(each, max(1, round(_TURNING_S / signals.period)), axis=0, mode="nearest")
+        for each in (shares, signals.body_rate[:, 2:])
+    )
+    values = np.stack(np.broadcast_arrays(shares, slow, slow * rate, rate, rate**2), axis=2)
+
+    def straight(means: Array) -> Array:
+        share, slowly, product, turning, square = means.T
+        spread = square - turning**2
+        slope = np.where(spread > 0, (product - turning * slowly) / np.where(spread > 0, spread, 1.0), 0.0)
+        return np.asarray(np.log(share - slope * turning))
+
+    return values, flies, straight
 
 
 def _above(values: Array, period: float, hertz: Sequence[float]) -> Array | None:

@@ -93,6 +93,8 @@ class Missing:
         How far half a second without it ends from the whole model; None where nobody measured that.
     where : str
         Along what both were measured.
+    instead : str or None
+        What makes up for it outside of the target; None where nothing simple does.
     """
 
     title: str
@@ -101,12 +103,14 @@ class Missing:
     floors: float
     off: Off | None
     where: str = "about hover"
+    instead: str | None = None
 
     @property
     def sentence(self) -> str:
         """What is missing, and its size."""
         if self.off is None:
-            return f"Not held: {self.title}; its size depends on the flight and was not measured along one."
+            unknown = "its size depends on the flight and was not measured along one"
+            return f"Not held: {self.title}; {self.instead or unknown}."
         size = f": {self.torque:.3g} N m and {self.force:.3g} N {self.where}" if self.torque or self.force else ""
         size += f", {self.floors:.3g} noise floors" if size and not np.isnan(self.floors) else ""
         ends = f"half a second without it ends {self.off.sentence} off"

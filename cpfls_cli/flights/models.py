@@ -16,7 +16,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.effects.registry import effect
 from cpfls_cli.errors import InputError, SettingError, about
 from cpfls_cli.flights.same_vehicle import require_vehicle_of, with_numbers_of
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import VehicleModel, commanded_anew
 from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import VEHICLE
 
@@ -83,6 +83,11 @@ def read_model(path: Path, study: Study, *, forecast: bool = False) -> VehicleMo
     record = model_of_vehicle(path, study)
     apart = record.forecast if forecast and isinstance(record, Vehicle) else None
     return apart or modelled(path, record)
+
+
+def read_anew(path: Path, study: Study) -> VehicleModel:
+    """Read a model of the vehicle of a study for commands that are not those of a log."""
+    return commanded_anew(read_model(path, study))
 
 
 def with_found_numbers(study: Study, path: Path) -> Study:

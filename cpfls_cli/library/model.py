@@ -315,12 +315,12 @@ class Model:
     def _whole(self) -> VehicleModel:
         """The model with its rotors, as far as a state and rotor speeds alone give its motion."""
         from cpfls_cli.flights.models import modelled
-        from cpfls_cli.playback.model import VehicleModel
+        from cpfls_cli.playback.model import VehicleModel, commanded_anew
 
         if self.artifact is None:
             return VehicleModel(vehicle=self._study.vehicle)
         record: Any = self.artifact._record
-        model = modelled(self._path, record)
+        model = commanded_anew(modelled(self._path, record))
         if model.unsimulated:
             parts = ", ".join(model.unsimulated)
             raise InputError(f"{self._path}: holds {parts}, which depends on more than the state; use Model.replay")

@@ -213,6 +213,9 @@ class VehicleModel:
     hold: Hold | None = about(
         "what a command is between samples, where the response was found so: linear or previous", default=None
     )
+    held_s: float = about(
+        "for how long logs of its flights hold a command; 0 for measured speeds", unit="s", least=0.0, default=0.0
+    )
     full_voltage: float = about(
         "what the voltages of its flights are shares of; 1 for shares alone", unit="V", least=0.0, default=1.0
     )
@@ -432,6 +435,16 @@ class VehicleModel:
     def body(self) -> Body:
         """What is moved, where its inertia is constant."""
         return Body.of(self.vehicle, symmetric(self.vehicle.inertia_kg_m2))
+
+
+def commanded_anew(model: VehicleModel) -> VehicleModel:
+    """Make of a model one for commands that are not those of a log.
+
+    A log shows some of the commands that an autopilot sends. Held from sample to sample they are half a sample late on
+    average, and so much of what is between command and torque the model's lag and delay lack.
+    """
+    behind = replace(model.response, delay_s=model.response.delay_s + 0.5 * model.held_s)
+    return replace(model, response=behind, held_s=0.0) if model.held_s else model
 
 
 def of_thrust(lever: Acts) -> Acts:

@@ -226,7 +226,10 @@ def actuators(
 
 _ROUNDING = 1e-6
 _STEPS_BETWEEN_REPORTS = 100
-_REMEDY = "fly more gently, make the effects smaller, or change the frequencies of simulation.closed_loop"
+_REMEDY = (
+    "fly more gently, make the effects smaller, or change the frequencies of simulation.closed_loop; of an autopilot "
+    "its gains, simulation.closed_loop.autopilot_parameters, which `cpfls tune` finds"
+)
 
 
 @dataclass(frozen=True)

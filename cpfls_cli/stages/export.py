@@ -32,7 +32,7 @@ from cpfls_cli.export.text import checked_identifier, identifier
 from cpfls_cli.export.viewed import view_of
 from cpfls_cli.flights.models import any_model, modelled
 from cpfls_cli.pages.model import against, impossible_in_words, said_by
-from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel, commanded_anew
 from cpfls_cli.result import about, result
 from cpfls_cli.stage import Run, kind_of, stage
 from cpfls_cli.validation.trust import Trust
@@ -75,6 +75,7 @@ NameOption = Annotated[
 VIEWERS = {"mcap": ".mcap", "csv": ".csv"}
 """What is drawn by other programs, which is no model."""
 ENDINGS = {form: chosen.ending for form, chosen in FORMS.items()} | VIEWERS
+_BY_VOLTAGE = "multiply commands by (V/V_0)^(n/2) before they are passed, by {:.3g} where V is 90 % of V_0"
 # What an autopilot states is no whole vehicle, so it is asked for by name.
 _BY_SUFFIX = {form: ending for form, ending in ENDINGS.items() if form in VIEWERS or not FORMS[form].lacks}
 # What the module imports besides the standard library: under such a name it would import itself.
@@ -280,7 +281,7 @@ def _require_usable(functions: InertiaFunctions, path: Path) -> None:
 
 def _bare_sheet(path: Path, record: AnyModel, origin: Origin) -> Sheet:
     """Put a model on a sheet that has no name yet, without what no table of weights holds and without the wind."""
-    model = modelled(path, record)
+    model = commanded_anew(modelled(path, record))
     held = tuple(each for each in model.effects if each.name not in model.unsimulated)
     still = replace(model, effects=held, wind=(0.0, 0.0, 0.0))
     sheet = bare_sheet(record, still, origin)
@@ -300,7 +301,9 @@ def _missing(record: AnyModel, model: VehicleModel) -> Iterator[Missing]:
             own, floor = known[effect.name], record.gap.floor
             yield sized(title, own.wrench, floor, Off.of(own.ends), "along its held-out flights")
         else:
-            yield Missing(title, np.nan, np.nan, np.nan, None)
+            supply = effect.effect.actuation and effect.effect.actuation.supply
+            instead = _BY_VOLTAGE.format(supply(effect.values, 0.9)) if supply else None
+            yield Missing(title, np.nan, np.nan, np.nan, None, instead=instead)
 
 
 def _in_numbers(effect: ModelEffect, full_voltage: float) -> str:

@@ -140,7 +140,7 @@ def simulate(
         raise InputError(f"{model}: no model is flown in mode inverse; leave the mode out, or add --mode closed-loop")
     run.take({"trajectory": trajectory} | ({} if model is None else {"model": model}))
     time, planned = _plan(trajectory, closed)
-    flown = None if model is None else import_module("cpfls_cli.flights.models").read_model(model, run.study)
+    flown = None if model is None else import_module("cpfls_cli.flights.models").read_anew(model, run.study)
     with settings_of("simulation", run.study):
         with_effects(flown, simulated_effects(run.study.simulation.closed_loop.effects, run.study.vehicle))
         played_gusts(flown, run.study.simulation.closed_loop.gusts)
@@ -200,5 +200,7 @@ def _closed_loop(run: Run, time: Array, planned: dict[str, Array], model: Vehicl
     flight = measure(time, planned, study.vehicle, study.simulation, rng, run.progress, model)
     if model is not None and model.gusts is not None and not study.simulation.closed_loop.gusts:
         run.say(STILL_AIR)
-    run.go_on("gap", run.output, output=run.sibling("gap"))
+    # No gap is measured against a body that is none.
+    if run.found is None or not import_module("cpfls_cli.stages._numbers").why_no_body_found(run, run.found):
+        run.go_on("gap", run.output, output=run.sibling("gap"))
     return flight

@@ -23,7 +23,7 @@ from cpfls_cli.flights.models import any_model, found_vehicle, is_found, is_mode
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.playback.gusts import GUST_AXES
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import VehicleModel, commanded_anew
 from cpfls_cli.playback.parameters import FoundNumber
 from cpfls_cli.playback.spread import Spread, drawn, require_sure
 from cpfls_cli.result import about as described
@@ -196,7 +196,7 @@ class Samples:
 
 def _columns(nominal: VehicleModel, models: tuple[VehicleModel, ...]) -> Iterator[tuple[str, str, Array]]:
     """Give names, units and values."""
-    vehicles, responses = [each.vehicle for each in models], [each.response for each in models]
+    vehicles, responses = [each.vehicle for each in models], [commanded_anew(each).response for each in models]
     rotors = [each.rotors for each in vehicles]
     yield "mass_kg", "kg, as stated", np.array([each.mass_kg for each in vehicles])
     inertia = np.array([symmetric(each.inertia_kg_m2) for each in vehicles])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,7 +23,7 @@ from cpfls_cli.config.study import Study
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.parameter_files import parameter_file
 from cpfls_cli.flightlog.results import Flight, Imported
-from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_model
+from cpfls_cli.flights.models import found_vehicle, is_found, is_model, read_anew
 from cpfls_cli.flights.recordings import read_whole
 from cpfls_cli.flights.training import numbered_roles
 from cpfls_cli.logs.formats import about_flight, log_contents, read_log
@@ -52,10 +53,10 @@ from cpfls_cli.stage import Run, stage
 from cpfls_cli.stages._numbers import missing_flight, with_numbers
 from cpfls_cli.tuning.gains import PROPOSED, AskedMargins, Gains, ParameterRow, gains_for_vehicle
 from cpfls_cli.tuning.plant import LEAST, Noise, Spread, noise_of, spread_of
-from cpfls_cli.validation.trust import Trust
+from cpfls_cli.validation.trust import GOOD, Trust
 from cpfls_cli.words import few, joined
 
-_ASSUMED_LAG = (0.7, 1.3)
+_ASSUMED_LAG, _ASSUMED_DELAYED = (0.7, 1.3), 0.5
 _ASSUMED_GAIN = (0.8, 1.25)
 _WRITTEN = "written, for the ground station"
 _PROPOSED: dict[str, Any] = {**style_of(0), "linewidth": 1.8, "zorder": 3}
@@ -226,7 +227,7 @@ def _of_vehicle(
     run.take({"model": model} | numbered_roles("flight", flights))
     record = _trusted(run, model)
     with_numbers(run, "tune", model, whole=True)
-    vehicle = read_model(model, run.study)
+    vehicle = read_anew(model, run.study)
     logs = [_read(each, run.study) for each in flights]
     known, refused = _todays(autopilot, logs)
     if run.dry_run:
@@ -235,6 +236,13 @@ def _of_vehicle(
     noise = _noise_of(autopilot, autopilot.of_log(today) if today else autopilot.defaults(), logs)
     rotor_lag = run.study.simulation.closed_loop.rotor_time_constant_s
     spreads, assumed = _spreads(record, vehicle, rotor_lag)
+    use = run.study.simulation.closed_loop.battery_use
+    drained = _drained(vehicle, 1 - use)
+    if drained < 1:
+        assumed.append(
+            f"battery: margins hold from the fullest one of the flights to one at {100 * (1 - use):.3g} % of its "
+            "voltage (simulation.closed_loop.battery_use)"
+        )
     gains = gains_for_vehicle(
         autopilot,
         vehicle,
@@ -242,6 +250,7 @@ def _of_vehicle(
         vehicle=model.name,
         rotor_lag=rotor_lag,
         signals=run.study.import_.rotor_command_is == "speed",
+        drained=drained,
         today=today,
         system="" if known is None else known.system,
         noise=noise,
@@ -374,18 +383,19 @@ def _noise_of(autopilot: Autopilot, values: Mapping[str, float], logs: Sequence[
 
 
 def _trusted(run: Run, model: Path) -> Vehicle:
-    """Read a vehicle that is good for simulation and control, and refuse others with the flight that is missing."""
+    """Read a vehicle that is good for control at least, and refuse others with the flight that is missing."""
     if not is_found(model):
         what = "an identified model" if is_model(model) else "no model"
         raise InputError(f"{model}: is {what}; gains need a vehicle that `cpfls vehicle` found")
     record = found_vehicle(model)
-    if record.verdict is not Trust.SIMULATION:
-        good = trust_words(Trust.SIMULATION).short
+    if record.verdict not in GOOD:
+        good = trust_words(Trust.CONTROL).short
         open_ = [name_of(name) for name in record.not_determined]
         weak = f"; not identified: {few(open_)}" if open_ else ""
         raise InputError(
-            f"{model}: {trust_words(record.verdict).short}{weak}. Gains need a vehicle that is {good}: a body "
-            f"that is too heavy gives gains that are too high. {_missing(run, record)}"
+            f"{model}: {trust_words(record.verdict).short}{weak}. Gains need a vehicle that is {good} at least: a "
+            f"body that is too heavy gives gains that are too high. {_missing(run, record)}; or `cpfls tune LOG`, from "
+            "a log of the autopilot alone"
         )
     return record
 
@@ -428,9 +438,20 @@ def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tu
     if not model.commanded:
         assumed.append(
             "speeds were measured, so no flight shows how the rotors follow their commands: "
-            f"{1e3 * rotor_lag:.3g} ms of simulation.closed_loop.rotor_time_constant_s, 30 % either way"
+            f"{1e3 * rotor_lag:.3g} ms of simulation.closed_loop.rotor_time_constant_s are assumed, 30 % either way, "
+            "up to half of it a delay; margins hold where that does: log commands to know it"
         )
         intervals[LAG] = _ASSUMED_LAG
     named = {"lag": intervals.get(LAG, (1.0, 1.0)), "delay": intervals.get(DELAY, (1.0, 1.0))} | intervals
-    axes = tuple(spread_of(named, INERTIA[axis], DRAG if axis == 2 else THRUST) for axis in range(3))
-    return axes, assumed
+    delayed = 0.0 if model.commanded else _ASSUMED_DELAYED
+    axes = [spread_of(named, INERTIA[axis], DRAG if axis == 2 else THRUST) for axis in range(3)]
+    names = [each.name for each in record.numbers]
+    late = [names.index(FOUND_AS[key]) for key in (LAG, DELAY) if FOUND_AS[key] in names]
+    trade = float(record.correlation[late[0], late[1]]) if len(late) > 1 else 0.0
+    return tuple(replace(each, delayed=delayed, trade=trade) for each in axes), assumed
+
+
+def _drained(model: VehicleModel, voltage: float) -> float:
+    """Give the speed of a rotor by its command at a share of the full voltage, over that at the full one."""
+    acting = [(one.effect.actuation, one.values) for one in model.filters]
+    return prod(float(known.supply(values, voltage)) for known, values in acting if known and known.supply)

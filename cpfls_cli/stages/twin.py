@@ -16,7 +16,7 @@ from cpfls_cli.config.load import stored_study
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.errors import ComputationError, InputError, about
 from cpfls_cli.flightlog.results import Imported
-from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_model
+from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_anew
 from cpfls_cli.flights.playback import flights_to_play, model_notes
 from cpfls_cli.flights.recordings import read_whole
 from cpfls_cli.flights.training import known_by
@@ -281,7 +281,7 @@ def _vehicles(study: Study, model: Path | None) -> dict[str, VehicleModel | None
     stated: dict[str, VehicleModel | None] = {VEHICLE: None}
     if model is None:
         return stated
-    given: dict[str, VehicleModel | None] = {model.name: read_model(model, study)}
+    given: dict[str, VehicleModel | None] = {model.name: read_anew(model, study)}
     return given if study.vehicle.unknown else stated | given
 
 

@@ -40,6 +40,7 @@ from cpfls_cli.artifacts.vehicle_model import (
     excess,
     is_learned,
     mismatches,
+    name_of,
     too_heavy,
     vehicle_section,
 )
@@ -368,8 +369,13 @@ def _config_copy(run: Run, copy: Path | None, made: Vehicle) -> dict[Path, str]:
     """Write the config again with the numbers that were found in the place of its section `vehicle`."""
     if copy is None:
         return {}
+    section = vehicle_section(made)
+    held = dict(zip(INERTIA, section["inertia_kg_m2"], strict=False))
+    held |= {key: section["rotors"][0][key.partition(".")[2]] for key in (THRUST, DRAG)}
+    open_ = [name_of(FOUND_AS[key]) for key, value in held.items() if value is None]
     run.last_words = f"{copy}: written, the config with these constants"
-    data = run.data() | {"vehicle": vehicle_section(made)}
+    run.last_words += f", null for what no flight determines: {joined(open_)}" if open_ else ""
+    data = run.data() | {"vehicle": section}
     return {copy: f"# {run.config.name}, with the vehicle that `cpfls vehicle` found\n{to_yaml(data)}"}
 
 
@@ -444,7 +450,11 @@ def _judged(
     behind = any(flight.parts[0].commanded for flight in training)
     shares = any(flight.shares for flight in training)
     own = {each.name: getattr(found, each.name) for each in fields(found)}
-    known = {"commanded": behind, "full_voltage": max(flight.parts[0].full_voltage for flight in flights)}
+    known = {
+        "commanded": behind,
+        "held_s": held_s(training),
+        "full_voltage": max(flight.parts[0].full_voltage for flight in flights),
+    }
     own |= {name: replace(own[name], **known) for name in ("model", "forecast") if own[name] is not None}
     responses = mismatches(_responses(found, training), instrumented=found.instruments is not None)
     return Vehicle(
@@ -459,6 +469,12 @@ def _judged(
         contradictions=contradictions_of(flights),
         learned=tuple(learned),
     )
+
+
+def held_s(flights: Sequence[LoggedFlight]) -> float:
+    """Give for how long flights, as they are logged, hold a command, on average, s."""
+    held = (1 / flight.logged_hz for flight in flights if flight.parts[0].commanded and flight.hold == "previous")
+    return sum(held) / len(flights)
 
 
 def _held_out(vehicle: VehicleFit, flights: Sequence[LoggedFlight], run: Run, fading_s: float) -> AlongFlights:

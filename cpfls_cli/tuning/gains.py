@@ -20,7 +20,7 @@ from cpfls_cli.autopilots.parameters import Autopilot, Parameter
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
 from cpfls_cli.tuning.margins import Evaluation, axis_loops, disk_of, evaluate, frequencies, is_stable, moved_by
-from cpfls_cli.tuning.plant import AxisPlant, HoverPlant, Line, Noise, Spread, hover_plant
+from cpfls_cli.tuning.plant import AxisPlant, HoverPlant, Line, Noise, Spread, hover_plant, on_less
 from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import joined
 
@@ -440,6 +440,7 @@ def gains_for_vehicle(
     vehicle: str,
     rotor_lag: float,
     signals: bool,
+    drained: float = 1.0,
     today: Mapping[str, float] | None = None,
     system: str = "",
     noise: Noise | None = None,
@@ -457,6 +458,8 @@ def gains_for_vehicle(
         Of speeds behind commands, where the model does not say.
     signals : bool
         Whether its commands are signals of motors, not speeds.
+    drained : float
+        Speed of a rotor by its command on the emptiest battery, over that on the fullest, which the model is of.
     today : mapping of str to float, or None
         Parameters of a log; None for the defaults.
     system : str
@@ -466,7 +469,9 @@ def gains_for_vehicle(
     values = autopilot.of_log(today) if today else autopilot.defaults()
 
     def hover_of(whole: Mapping[str, float]) -> HoverPlant:
-        return replace(hover_plant(autopilot.law(whole), model.vehicle, model, rotor_lag), spreads=spreads)
+        law = autopilot.law(whole)
+        hover = replace(hover_plant(law, model.vehicle, model, rotor_lag), spreads=spreads)
+        return hover if drained == 1 else on_less(hover, drained, law, model, rotor_lag)
 
     others = [*_curve(autopilot, model)] if signals else []
     follows = noise is not None and bool(noise.lines) and _notch_follows(autopilot, today)

@@ -93,6 +93,9 @@ def margins(frequency: Array, loop: Numbers) -> Margins:
     P. Seiler, A. Packard, P. Gahinet, An Introduction to Disk Margins, IEEE Control Systems 40(5), 2020.
     """
     stable = bool(is_stable(frequency, loop))
+    if not loop.any():
+        # Gains of 0 hold nothing.
+        return Margins(gain_db=nan, phase_deg=nan, disk_deg=0.0, crossover_hz=nan)
     gain, phase, crossover = (float(each) for each in crossing_margins(frequency, loop))
     return Margins(
         gain_db=min(gain, _MOST_DB) if stable else nan,
@@ -151,7 +154,8 @@ def is_stable(frequency: Array, loop: Numbers) -> BoolArray:
     loop : array, shape (..., frequency)
     """
     turned = np.unwrap(np.angle(1 + loop[..., ::-1]), axis=-1)
-    steep = np.log(np.abs(loop[..., 1] / loop[..., 0])) / np.log(frequency[1] / frequency[0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steep = np.log(np.abs(loop[..., 1] / loop[..., 0])) / np.log(frequency[1] / frequency[0])
     back = np.abs(turned[..., -1] - turned[..., 0] - 0.5 * np.pi * steep) < 0.75 * np.pi
     return np.asarray(back & (np.abs(turned[..., 0]) < 0.5 * np.pi))
 

@@ -64,25 +64,47 @@ class Spread:
     ----------
     gain, lag, delay : tuple of float
         Lowest and highest factor on gain (with the other parts of torque), lag and delay.
+    delayed : float
+        Largest part of the lag that may be a delay instead, which no derivative of a law makes up for.
+    trade : float
+        Correlation of lag and delay; where it is below 0 their sum is known better than either, and the ends are those
+        of both, of either and of the sum on the ellipse of 95 %.
     """
 
     gain: tuple[float, float] = (1.0, 1.0)
     lag: tuple[float, float] = (1.0, 1.0)
     delay: tuple[float, float] = (1.0, 1.0)
+    delayed: float = 0.0
+    trade: float = 0.0
 
     def corners(self, plant: AxisPlant) -> Iterator[AxisPlant]:
         """Give the plant as it was found, then with each choice of ends."""
         yield plant
-        for gain, lag, delay in product(*(dict.fromkeys(each) for each in (self.gain, self.lag, self.delay))):
-            if (gain, lag, delay) != (1.0, 1.0, 1.0):
+        for gain, (lag, delay), delayed in product(
+            dict.fromkeys(self.gain), self._late(plant), dict.fromkeys((0.0, self.delayed))
+        ):
+            if (gain, lag, delay, delayed) != (1.0, plant.lag, plant.delay, 0.0):
                 yield replace(
                     plant,
                     gain=gain * plant.gain,
                     by_acceleration=gain * plant.by_acceleration,
                     slow=gain * plant.slow,
-                    lag=lag * plant.lag,
-                    delay=delay * plant.delay,
+                    lag=(1 - delayed) * lag,
+                    delay=delay + delayed * lag,
                 )
+
+    def _late(self, plant: AxisPlant) -> list[tuple[float, float]]:
+        """Give lags with delays at their ends, s."""
+        (short, long), (soon, late) = self.lag, self.delay
+        wide, deep = 0.5 * (long - short) * plant.lag, 0.5 * (late - soon) * plant.delay
+        if not (self.trade < 0 < min(wide, deep)):
+            ends = product(dict.fromkeys(self.lag), dict.fromkeys(self.delay))
+            return [(lag * plant.lag, delay * plant.delay) for lag, delay in ends]
+        shared = self.trade * wide * deep
+        both = max(wide**2 + deep**2 + 2 * shared, 1e-12) ** 0.5
+        steps = ((wide, shared / wide), (shared / deep, deep), ((wide**2 + shared) / both, (deep**2 + shared) / both))
+        signed = [(sign * lag, sign * delay) for lag, delay in steps for sign in (-1, 1)]
+        return [(max(plant.lag + lag, 0.0), max(plant.delay + delay, 0.0)) for lag, delay in signed]
 
 
 @dataclass(frozen=True)
@@ -146,6 +168,26 @@ def hover_plant(law: Law, vehicle: VehicleSettings, model: VehicleModel | None, 
         for axis in range(3)
     )
     return HoverPlant((axes[0], axes[1], axes[2]), share, motors.speed_at(share) / motors.speed_max)
+
+
+def on_less(hover: HoverPlant, drained: float, law: Law, model: VehicleModel, rotor_lag: float) -> HoverPlant:
+    """Let the gains of a vehicle in hover reach down to those on an empty battery, on which rotors turn slower.
+
+    `drained`: speed by command on it, over that on the full one. `ComputationError` where it does not carry the weight.
+    """
+    slower = replace(model.vehicle, rotor_speed_max_rad_s=drained * model.vehicle.rotor_speed_max_rad_s)
+    try:
+        empty = hover_plant(law, slower, replace(model, vehicle=slower), rotor_lag)
+    except ComputationError:
+        raise ComputationError(
+            "full thrust does not carry the weight on a battery that has lost as much of its voltage as "
+            "simulation.closed_loop.battery_use says; make that smaller"
+        ) from None
+    left = [min(low.gain / full.gain, 1.0) for low, full in zip(empty.axes, hover.axes, strict=True)]
+    spreads = [
+        replace(each, gain=(part * each.gain[0], each.gain[1])) for part, each in zip(left, hover.spreads, strict=True)
+    ]
+    return replace(hover, spreads=(spreads[0], spreads[1], spreads[2]))
 
 
 def _hover_share(flown: Vehicle, held: VehicleModel | None, motors: Motors) -> float:

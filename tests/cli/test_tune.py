@@ -11,11 +11,14 @@ import yaml
 from cpfls_cli import page, store
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.look.vibration import Change
+from cpfls_cli.playback.model import ModelEffect
 from cpfls_cli.playback.vehicle import Trade
 from cpfls_cli.stage import loaded
 from cpfls_cli.stages.tune import _spreads
 from cpfls_cli.tuning.gains import Gains
-from tests.builders.autopilots import STUDY, found_vehicle
+from cpfls_cli.tuning.margins import evaluate
+from cpfls_cli.tuning.plant import hover_plant
+from tests.builders.autopilots import CROSS, STUDY, found_vehicle
 from tests.builders.changed_flights import save
 from tests.builders.dataflash_logs import dataflash
 from tests.builders.looked import PLANTS, looked_flight, looked_plant
@@ -172,6 +175,49 @@ def test_a_vehicle_that_flights_do_not_tell_is_refused_with_the_flight_that_is_m
         message = refuse("tune", folder / "study.yaml", path, "--autopilot", "px4", "-o", tmp_path / "g.h5")
         assert words in " ".join(message)
         assert f"The flight that is missing: {missing}" in " ".join(message)
+
+
+def test_what_is_good_for_control_is_good_enough_for_gains(cpfls, gains, folder, tmp_path):
+    """A log without velocity judges no simulation; gains follow from rotation."""
+    own = replace(found_vehicle(instrumented=False), held_out=held_out(None))
+    assert (own.verdict, gains["px4"].exit_code) == ("good-for-control", 0)
+    path = write_vehicle(tmp_path / "turns.h5", own, STUDY)
+    cpfls.done("tune", folder / "study.yaml", path, "--autopilot", "px4", "-o", tmp_path / "g.h5")
+    found, before = (read(each).sets["proposed"].roll.command for each in (tmp_path / "g.h5", folder / "px4.h5"))
+    assert found.disk_deg == before.disk_deg
+
+
+def test_gains_hold_on_an_emptier_battery_where_it_sags(cpfls, gains, folder, tmp_path):
+    assert gains["px4"].exit_code == 0
+    plain = found_vehicle()
+    sag = ModelEffect("battery_sag", {"exponent": 2.0}, np.zeros(0))
+    path = write_vehicle(tmp_path / "sag.h5", replace(plain, model=replace(plain.model, effects=(sag,))), STUDY)
+    words = ("tune", folder / "study.yaml", path, "--autopilot", "px4", "-o", tmp_path / "g.h5")
+    assert "margins hold from the fullest one of the flights to one at 80 % of its voltage" in cpfls.done(*words).stderr
+    found, before = read(tmp_path / "g.h5"), read(folder / "px4.h5")
+    assert found.hover_thrust == before.hover_thrust
+    # Nothing in PX4's ranges holds yaw on both; roll and pitch are slower for it.
+    assert {*found.falls_short["proposed"]} <= {"yaw"}
+    assert found.sets["proposed"].roll.bandwidth_hz < before.sets["proposed"].roll.bandwidth_hz
+    law = AUTOPILOTS["px4"].law(AUTOPILOTS["px4"].defaults() | {n: row.proposed for n, row in found.parameters.items()})
+    hover = hover_plant(law, CROSS, plain.model, 0.03)
+    for gain in (1.0, 0.8):
+        drained = replace(hover, axes=tuple(replace(each, gain=gain * each.gain) for each in hover.axes))
+        assert all(each.disk_deg > 44.5 for each in evaluate(law, drained).axes[:2])
+
+
+def test_a_lag_that_is_assumed_may_be_a_delay(cpfls, folder, tmp_path):
+    """A derivative makes up for a lag and not for a delay, so gains for a lag alone may not fly."""
+    own = found_vehicle(commanded=False)
+    path = write_vehicle(tmp_path / "speeds.h5", own, STUDY)
+    words = ("tune", folder / "study.yaml", path, "--autopilot", "betaflight", "-o", tmp_path / "g.h5")
+    assert "30 % either way, up to half of it a delay" in cpfls.done(*words).stderr
+    autopilot, found = AUTOPILOTS["betaflight"], read(tmp_path / "g.h5")
+    law = autopilot.law(autopilot.defaults() | {name: row.proposed for name, row in found.parameters.items()})
+    hover = hover_plant(law, CROSS, own.model, 0.05)
+    late = [replace(each, lag=0.5 * each.lag, delay=0.5 * each.lag) for each in hover.axes]
+    done = evaluate(law, replace(hover, axes=(late[0], late[1], late[2])))
+    assert {"roll", "pitch"} & {*found.falls_short["proposed"]} or min(done.roll.disk_deg, done.pitch.disk_deg) > 44.5
 
 
 def test_a_model_that_is_no_vehicle_is_refused(refuse, folder, tmp_path):

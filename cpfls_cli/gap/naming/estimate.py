@@ -300,13 +300,14 @@ def earned(
 ) -> tuple[NamedFit, list[Refusal]]:
     """Fit chosen effects, and refit without those that have not earned a name on the flights that they were found in.
 
-    These are effects whose size does not differ from zero, which are not named, and effects that sit on a bound.
+    These are effects whose size does not differ from zero, which are not named, effects that sit on a bound, and those
+    that may as well be another one.
     """
     found, refusals = fitted(flights, chosen, floor, settings), []
     while found.hypothesis.chosen:
         out = nothing_by_size(found)
         if not out:
-            refusal = on_bound(found)
+            refusal = on_bound(found) or may_be_another(found)
             if refusal is None:
                 break
             refusals.append(refusal)
@@ -339,6 +340,18 @@ def on_bound(found: NamedFit) -> Refusal | None:
         says = "would surely be beyond" if beyond else "sits on the bound of"
         name = next(iter(beyond or bounds))
         return Refusal(effect.name, f"its {spoken(name)} {says} what is possible, {bounds[name]}", True)
+    return None
+
+
+def may_be_another(found: NamedFit) -> Refusal | None:
+    """Find an effect of which nothing differs from 0 that another one, which it holds, has not: a wind of no speed."""
+    for (effect, _), numbers in zip(found.hypothesis.chosen, found.estimates.effects, strict=True):
+        for other in (CATALOGUE[name] for name in sorted(effect.holds)):
+            theirs = {each.name for each in other.coefficients} | {each.name for each in other.shapes}
+            more = [number for number in numbers if number.name not in theirs]
+            if more and all(number.low <= 0.0 <= number.high for number in more):
+                own = " and ".join(spoken(number.name) for number in more)
+                return Refusal(effect.name, f"{own} may all be 0, where it is {other.title}", True)
     return None
 
 

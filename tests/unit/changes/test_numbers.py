@@ -48,6 +48,24 @@ def test_names_and_noise(usual):
     assert np.isnan(usual.voltage)
 
 
+def test_who_turns_to_one_side_against_the_air_has_no_weak_rotors(usual):
+    """What the rotors of one spin turn more against a damping about yaw goes with the rate, and leaves with it."""
+    given = recorded()
+    time = given.time - given.time[0]
+    rate = 0.2 + 0.5 * np.sin(2 * np.pi * time / 6.0)
+    spins = np.array([rotor.spin for rotor in VEHICLE.rotors])
+    # A damping slows those that turn one way and lets the others turn faster.
+    turning = replace(
+        given,
+        body_rate=given.body_rate + rate[:, None] * [0.0, 0.0, 1.0],
+        rotor_speed=given.speed * np.sqrt(1 - 0.1 * rate[:, None] * spins),
+    )
+    found = flight_numbers(turning)
+    for index in range(1, 5):
+        name = f"thrust M{index}"
+        assert found.values[name] == pytest.approx(usual.values[name], abs=0.005)
+
+
 def test_a_weak_rotor_is_asked_for_more(usual):
     """Of a cross each rotor carries its share alone, but for what its drag turns about z."""
     rotors = list(VEHICLE.rotors)

@@ -1,5 +1,7 @@
 """Estimates of effects: least squares with noisy columns, bounds, how explanations are compared, and what is said."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import permutation_test, wilcoxon
@@ -9,7 +11,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import Equations, least_squares
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.causes import judge_effects
-from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of, fitted
+from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of, fitted, may_be_another
 from cpfls_cli.gap.naming.ranking import chance_of_ranks, likely, off_by, within_bounds
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
@@ -82,6 +84,20 @@ def test_what_may_be_0_is_not_surely_on_its_bound(low, listed):
     """Also where its interval ends at 0, below which it cannot be."""
     number = Estimate("k_d", "1", 0.05, low, 0.06, (0.0, 0.05))
     assert _on_bounds([number]) == ({number: 0.05} if listed else {})
+
+
+@pytest.mark.parametrize(("east", "north", "refused"), [(0.05, -0.1, True), (0.05, 0.4, False)])
+def test_a_wind_that_may_not_blow_is_rotor_drag(east, north, refused):
+    numbers = {"k_d": (1e-4, 1e-5), "W_x": (east, 0.2), "W_y": (north, 0.2)}
+    of_wind = tuple(Estimate(name, "1", v, v - e, v + e, (-15.0, 15.0)) for name, (v, e) in numbers.items())
+    damping = (Estimate("d_x", "1", 0.0, -1.0, 1.0, (0.0, 2.0)),)
+    chosen, effects = ((DAMPING, {}), (WIND, {})), (damping, of_wind)
+    found = SimpleNamespace(hypothesis=SimpleNamespace(chosen=chosen), estimates=SimpleNamespace(effects=effects))
+    refusal = may_be_another(found)
+    assert (refusal is not None) == refused
+    if refusal is not None:
+        assert (refusal.name, refusal.in_the_way) == ("wind", True)
+        assert refusal.sentence.endswith("not named: W_x and W_y may all be 0, where it is rotor drag (H-force)")
 
 
 @pytest.mark.parametrize("blocks", [1, 2, 7, 40])

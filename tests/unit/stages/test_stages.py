@@ -22,10 +22,20 @@ from cpfls_cli.stages.extend import named_effects
 from cpfls_cli.stages.init import _unused
 from cpfls_cli.stages.look import FIGURES
 from cpfls_cli.stages.reduce import _naming
-from cpfls_cli.stages.vehicle import next_commands
+from cpfls_cli.stages.vehicle import held_s, next_commands
 from cpfls_cli.validation.trust import Trust
 from tests.builders import gap_artifacts as made
 from tests.builders.vehicle_search import CONFIG
+
+
+def test_a_command_is_held_for_as_long_as_its_log_says_nothing_new():
+    """Not where speeds are measured, nor where lines join commands that are logged rarely."""
+
+    def flight(commanded, hold, hz):
+        return SimpleNamespace(parts=[SimpleNamespace(commanded=commanded)], hold=hold, logged_hz=hz)
+
+    assert held_s([flight(True, "previous", 50.0), flight(True, "previous", 100.0)]) == pytest.approx(0.015)
+    assert held_s([flight(True, "linear", 20.0), flight(False, "previous", 100.0)]) == 0.0
 
 
 @pytest.mark.parametrize("verdict", [GapVerdict.UNEXPLAINED, GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED])

@@ -9,7 +9,7 @@ import pytest
 from cpfls_cli.autopilots.motors import Motors
 from cpfls_cli.autopilots.registry import AUTOPILOTS
 from cpfls_cli.errors import ComputationError
-from cpfls_cli.playback.model import ModelEffect, VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel, commanded_anew
 from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.tuning.gains import AskedMargins, proposal_of, with_filters
 from cpfls_cli.tuning.margins import (
@@ -22,7 +22,7 @@ from cpfls_cli.tuning.margins import (
     moved_by,
     step_answer,
 )
-from cpfls_cli.tuning.plant import AxisPlant, Spread, hover_plant, noise_of, spread_of
+from cpfls_cli.tuning.plant import AxisPlant, Spread, hover_plant, noise_of, on_less, spread_of
 from cpfls_cli.vehicle.rotors import allocation_matrix
 from tests.builders.autopilots import CROSS
 
@@ -188,6 +188,45 @@ def test_intervals_become_the_corners_of_the_plant():
     assert (corners[0], len(corners)) == (plant, 5)
     assert sorted({each.gain for each in corners}) == pytest.approx([95 / 1.2, 100.0, 105 / 0.9])
     assert list(Spread().corners(plant)) == [plant]
+    *_, late = Spread(lag=(0.5, 1.5), delayed=0.5).corners(plant)
+    assert (late.lag, late.delay) == pytest.approx((0.03, 0.03))
+
+
+def test_a_lag_and_a_delay_of_which_the_sum_is_known_are_not_both_at_their_longest():
+    plant = AxisPlant(100.0, 0.0, 0.0, 1.0, 0.0, 0.03, 0.02)
+    apart = Spread(lag=(0.5, 1.5), delay=(0.5, 1.5))
+    assert max(each.lag + each.delay for each in apart.corners(plant)) == pytest.approx(0.075)
+    trade = list(replace(apart, trade=-0.96).corners(plant))
+    assert {round(1e3 * each.lag) for each in trade} >= {15, 45}
+    assert {round(1e3 * each.delay) for each in trade} >= {10, 30}
+    # Half widths of 15 and 10 ms, correlated by -0.96.
+    assert max(each.lag + each.delay for each in trade) == pytest.approx(0.05 + 1e-3 * 37**0.5)
+
+
+@pytest.mark.parametrize("name", ["px4", "betaflight", "crazyflie"])
+def test_gains_reach_down_to_those_on_an_emptier_battery(name):
+    """On it the same command turns rotors slower, which hover at the speed that they always hover at."""
+    law, model = AUTOPILOTS[name].law(), VehicleModel(vehicle=CROSS, response=RotorResponse(lag_s=0.03))
+    hover = replace(hover_plant(law, CROSS, model, 0.03), spreads=(WIDE,) * 3)
+    wider = on_less(hover, 0.9, law, model, 0.03)
+    motors = Motors.of(law.mixer, law.curve, CROSS)
+    share, less = hover.share, motors.share_of(motors.speed_at(hover.share) / 0.9)
+    expected = 0.9 * motors.speed_slope(less) / motors.speed_slope(share)
+    assert [each.gain for each in wider.spreads] == [pytest.approx((0.85 * expected, 1.2))] * 3
+    assert (wider.axes, wider.share) == (hover.axes, hover.share)
+    with pytest.raises(ComputationError, match="battery_use says; make that smaller"):
+        on_less(hover, 0.5, law, model, 0.03)
+
+
+def test_commands_of_an_autopilot_are_met_half_a_sample_of_the_log_later():
+    """A log at 100 Hz holds commands for 10 ms, which on average makes them 5 ms late in it, not in flight."""
+    law, response = AUTOPILOTS["px4"].law(), RotorResponse(lag_s=0.05, delay_s=0.01)
+    model = VehicleModel(vehicle=CROSS, response=response, commanded=True, held_s=0.01)
+    for anew in (commanded_anew(model), commanded_anew(commanded_anew(model))):
+        axis = hover_plant(law, CROSS, anew, 0.03).axes[0]
+        assert (axis.lag, axis.delay) == pytest.approx((0.05, 0.015))
+    measured = replace(model, held_s=0.0)
+    assert commanded_anew(measured) is measured
 
 
 @pytest.mark.parametrize("name", ["px4", "ardupilot", "crazyflie"])
@@ -212,3 +251,8 @@ def test_what_is_unstable_has_no_margins():
     assert found.roll.command.disk_deg == 0.0
     assert found.yaw.command.stable
     assert frequencies(law)[-1] < 200.0
+
+
+def test_no_gain_holds_nothing():
+    found = margins(FREQUENCY, 0.0 * S)
+    assert (found.stable, found.disk_deg) == (False, 0.0)
