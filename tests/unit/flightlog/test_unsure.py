@@ -335,9 +335,9 @@ def test_angles_that_jump_by_a_full_turn_are_in_rad():
     (angles,) = (own for own in named_signals(column_groups(("roll", "pitch", "yaw"))) if own.signal == "attitude")
     time = np.linspace(0, 10, 1001)
     rolls = np.column_stack([np.angle(np.exp(1j * 3 * time)), 0.2 * np.sin(time), 0.1 * time])
-    assert angle_unit(angles, rolls)[0] == "rad"
-    assert angle_unit(angles, np.degrees(rolls))[0] == "deg"
-    assert angle_unit(angles, np.column_stack([3.0 * np.sin(time), np.sin(time), time]))[0] == "deg"
+    assert angle_unit(angles, rolls, time)[0] == "rad"
+    assert angle_unit(angles, np.degrees(rolls), time)[0] == "deg"
+    assert angle_unit(angles, np.column_stack([3.0 * np.sin(time), np.sin(time), time]), time)[0] == "deg"
 
 
 @pytest.mark.parametrize(("name", "factor", "unit"), [("Tiempo", 1.0, "s"), ("currentT", 1e6, "us")])
