@@ -114,7 +114,9 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
         # Attitudes are filtered by more than what these two are apart.
         counts = Rival(f"unit: deg/s, scale: {1 / _COUNTS:.4g}", "if it is counts of 16 bits, which are 6 % more")
         others = [Rival(f"unit: {row.unit}, scale: {row.scale:.4g}", f"{row.size:.4g} is near too") for row in near[1:]]
-        rivals = (*([counts] if size == _THOUSANDTHS else ()), *others) if agrees and scale < 1.0 and stated is None else ()
+        rivals = (
+            (*([counts] if size == _THOUSANDTHS else ()), *others) if agrees and scale < 1.0 and stated is None else ()
+        )
         sure: Sure = "data" if agrees and not rivals else "guess"
         words = _rates_in_words(named, fit, unit, scale)
         seen.take(named, unit, words, sure, scale, fit.order, fit.sign, rivals)

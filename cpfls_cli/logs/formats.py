@@ -358,7 +358,8 @@ _TEXTS: Final = (
 # A line of three numbers or more, or its beginning, also as Python prints a tuple; or two lines of two numbers. No
 # match is tried again in parts, which took seconds where text goes on otherwise.
 _NUMBERS: Final = re.compile(
-    rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.eij \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n[ \t]*){2}" % ((_NUMBER,) * 3)
+    rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.eij \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n[ \t]*){2}"
+    % ((_NUMBER,) * 3)
 )
 _NUMBERS_FIRST: Final = re.compile(rb"[ \t]*(%b[ \t]*[,;\t][ \t]*){2}[-+]?\d" % _NUMBER)
 # A line that says before each of its numbers, or of some in brackets, what it is: `Yaw= 261.9 Roll= 2.2 Place: (1, 2)`.

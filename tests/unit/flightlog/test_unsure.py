@@ -340,6 +340,15 @@ def test_angles_that_jump_by_a_full_turn_are_in_rad():
     assert angle_unit(angles, np.column_stack([3.0 * np.sin(time), np.sin(time), time]), time)[0] == "deg"
 
 
+def test_who_turns_thrice_a_second_turns_in_degrees():
+    (angles,) = (own for own in named_signals(column_groups(("roll", "pitch", "yaw"))) if own.signal == "attitude")
+    time = np.linspace(0, 10, 1001)
+    level = np.zeros((1001, 2))
+    assert angle_unit(angles, np.column_stack([level, 18.0 * np.clip(time - 5, 0, 5)]), time)[0] == "deg"
+    unit, _, _, rivals = angle_unit(angles, np.column_stack([level, 2.0 * time]), time)
+    assert (unit, len(rivals)) == ("rad", 1)
+
+
 @pytest.mark.parametrize(("name", "factor", "unit"), [("Tiempo", 1.0, "s"), ("currentT", 1e6, "us")])
 def test_what_alone_rises_evenly_is_the_clock_and_said_to_be(name, factor, unit):
     proposal = proposed(t={name: factor * OWN.time, "step": np.arange(len(OWN.time), dtype=float)})
