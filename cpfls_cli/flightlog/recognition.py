@@ -72,8 +72,10 @@ _SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}  # 
 # specific force of a lean of 30 degrees is 15 % above gravity.
 _STEADY: Final = 0.15
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
-# Names of one axis, of angles or in space.
-_AXES: Final = {axis for kind, axes in FAMILIES if kind == "angles" or axes[0] == "x" for axis in axes}
+# Names of one axis, of angles or in space; a P or Q may be a power or a torque.
+_AXES: Final = {
+    axis for kind, axes in FAMILIES for axis in axes if axis in "xyz" or (len(axis) > 1 and kind == "angles")
+}
 _BATTERY_V = (2.5, 80.0)  # From one cell that is empty to more than a large vehicle has.
 _ON_EARTH: Final = (("lat", "latitude"), ("lon", "lng", "long", "longitude"))
 _SHOWN = 4  # Groups of columns that are named where others are taken for the same.

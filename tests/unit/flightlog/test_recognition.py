@@ -686,9 +686,12 @@ def test_a_place_whose_name_does_not_say_so_is_a_guess_where_nothing_shows_it(ow
 
 
 def test_single_axes_are_said_to_be_no_signal():
-    log = {"": {"t": np.arange(100.0), "Roll": np.arange(100.0) ** 2, "p": np.arange(100.0) ** 3}}
-    with pytest.raises(InputError, match=r"Roll, p: single axes, and a signal takes all three; use common names"):
+    log = {"": {"t": np.arange(100.0), "Roll": np.arange(100.0) ** 2, "z": np.arange(100.0) ** 3}}
+    with pytest.raises(InputError, match=r"Roll, z: single axes, and a signal takes all three; use common names"):
         recognise(log, {}, {}, "")
+    # Of a rotor on a stand, power and torque.
+    with pytest.raises(InputError, match=r"P, Q\): use common names"):
+        recognise({"": {"t": np.arange(100.0), "P": np.arange(100.0) ** 2, "Q": np.arange(100.0) ** 3}}, {}, {}, "")
 
 
 def test_a_track_of_positions_is_no_log_of_a_flight():
