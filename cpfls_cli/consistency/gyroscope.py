@@ -177,7 +177,7 @@ def scan(flights: Sequence[Kinematics]) -> DelayScan:
     whole = np.zeros(len(seen), dtype=np.int64)
     delay = float(fit_delay(np.linspace(-half, half, 2 * half + 1) * step, moved, whole).delay)
     read = _read(flights, delay)
-    variance = np.maximum((seen - read).var(axis=0), np.finfo(float).tiny)
+    variance = np.maximum((seen - read).var(axis=0), np.finfo(float).eps ** 2)
     # The variance of each rate that the other two do not share.
     alone = 1.0 / np.diag(_precision(read))
     return DelayScan(delay, variance, alone > _EXCITED * variance, seen, read)
@@ -258,7 +258,7 @@ def _regressed(
         normal = folds(design / np.sqrt(variance)[:, None], right / np.sqrt(variance), block)
         solution = _padded(normal.fit(columns)[0][None, :, 0], columns)[0]
         rest = right - design @ solution
-        base, variance = delay, np.maximum(rest.var(axis=0), np.finfo(float).tiny)
+        base, variance = delay, np.maximum(rest.var(axis=0), np.finfo(float).eps ** 2)
         matrix = np.eye(3) + solution[:9].reshape(3, 3)
         delay = float(np.clip(base + solution[12], -LONGEST_DELAY_S, LONGEST_DELAY_S))
     left_out = _padded(normal.solve(columns)[0][..., 0], columns)

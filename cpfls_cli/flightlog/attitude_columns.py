@@ -35,8 +35,9 @@ _AS_GOOD_RATES, _AS_GOOD_LEAN, _AS_LEVEL = 0.02, 0.1, 0.2
 _ODD_ENOUGH = 2  # Price from which the columns of a quaternion are tried in every order and with every sign.
 _DEGREES = 180 / np.pi
 _ANGLES, SENSED = sizes("attitude"), sizes("sensed")
-# Angles in rad beyond which numbers are degrees: somewhat more than a full turn, and than a lean of a quarter turn.
-_LARGEST_ANGLE, _LARGEST_TILT = 6.6, 1.7
+# Angles in rad beyond which numbers are degrees: somewhat more than a full turn, and than a lean of a quarter turn; and
+# the turn of a second.
+_LARGEST_ANGLE, _LARGEST_TILT, _FASTEST_TURN = 6.6, 1.7, 4 * np.pi
 _NEAR: Final = 0.2  # Part of a turn, rad, that an angle moves between two samples where it jumps by a full turn.
 BODY_OF: Final = {"FLU": "FLU", "ENU": "FLU", "FRD": "FRD", "NED": "FRD"}  # Body axes of logs with these other axes.
 _SIGNALS_OF: Final[Mapping[str, tuple[SignalName, ...]]] = {
@@ -317,7 +318,8 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
     time, values = seen.log.values(named.group.columns)
     witnesses = _witnesses(seen, time, bool(named.known))
     flown = (time >= witnesses.grid[0]) & (time <= witnesses.grid[-1])
-    unit, reason, sure, rivals = angle_unit(named, named.scale * values[flown if flown.any() else slice(None)])
+    flown = flown if flown.any() else np.ones(len(time), dtype=bool)
+    unit, reason, sure, rivals = angle_unit(named, named.scale * values[flown], time[flown])
     if named.unit not in (None, unit):
         seen.disagree(named, unit)
     for _ in range(2):
@@ -355,7 +357,7 @@ def _read_euler(seen: Seen, named: Named) -> TakenReading:
     return verdict
 
 
-def angle_unit(named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple[Rival, ...]]:
+def angle_unit(named: Named, values: Array, time: Array) -> tuple[UnitName, str, Sure, tuple[Rival, ...]]:
     """Give the unit of roll, pitch and yaw, shape (time, 3), with the reason, how sure it is, and its rivals."""
     largest = np.quantile(np.abs(values), 0.999, axis=0)
     tilt, turn = float(largest[:2].max()), float(largest[2])
@@ -366,7 +368,9 @@ def angle_unit(named: Named, values: Array) -> tuple[UnitName, str, Sure, tuple[
     jumps = np.abs(np.diff(values, axis=0))
     if largest.max() < _LARGEST_ANGLE and (np.abs(jumps - 2 * np.pi) < _NEAR).any():
         return "rad", f"{called(named)}; jumps by a full turn in rad", "data", ()
-    if tilt > _LARGEST_TILT or turn > 20 * _LARGEST_ANGLE:
+    turned = np.abs(np.interp(time + 1.0, time, values[:, 2]) - values[:, 2])
+    spins = turn > _LARGEST_ANGLE and float(np.quantile(turned, 0.95)) > _FASTEST_TURN
+    if tilt > _LARGEST_TILT or turn > 20 * _LARGEST_ANGLE or spins:
         return "deg", f"{called(named)}; reaches {max(tilt, turn):.3g}, so these are degrees", "data", ()
     rival = Rival("unit: deg", f"a flight that never leans more than {tilt:.2g} degrees would look the same")
     rivals = () if turn > 1.0 and turn <= _LARGEST_ANGLE and tilt > 0.1 else (rival,)

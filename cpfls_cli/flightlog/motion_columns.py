@@ -29,7 +29,7 @@ from cpfls_cli.units import STANDARD_GRAVITY, UnitName, known_unit
 _TOLERANCE, _TEN = 1.4, 10.0
 _FASTEST_M_S = 100.0  # Speed over a second that no multirotor flies.
 # Rate beyond which no gyroscope reads, deg/s, and the counts that one deg/s is to those of 16 bits for 2000 deg/s.
-_FASTEST_DEG_S, _COUNTS = 4100.0, 16.4
+_FASTEST_DEG_S, _COUNTS, _THOUSANDTHS = 4100.0, 16.4, 1000.0
 _USUAL = 0.999  # Share of a flight in which no sample is damaged.
 # Ratios to gravity of columns that are known to hold it, also where the sensor reads wrong; and of what is no more.
 _BY_NAME, _WEIGHT = 2.0, 1.15
@@ -97,8 +97,10 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
         return
     fit, stated = None if reading is None else reading.rates, named.unit
     if fit is not None and fit.explained > CLEAR:
-        size, unit, scale = nearest(fit.gain, sizes("body_rate"))
-        agrees = bool(abs(np.log(fit.gain / size)) < np.log(_TOLERANCE))
+        near = sorted(sizes("body_rate"), key=lambda row: abs(np.log(fit.gain / row.size)))
+        size, unit, scale = near[0]
+        near = [row for row in near if abs(np.log(fit.gain / row.size)) < np.log(_TOLERANCE)]
+        agrees = bool(near)
         if stated is not None and known_unit(stated).factor != known_unit(unit).factor * scale:
             if agrees:
                 seen.disagree(named, unit)
@@ -111,7 +113,10 @@ def take_body_rate(seen: Seen, reading: Reading | None) -> None:
             )
         # Attitudes are filtered by more than what these two are apart.
         counts = Rival(f"unit: deg/s, scale: {1 / _COUNTS:.4g}", "if it is counts of 16 bits, which are 6 % more")
-        rivals = (counts,) if agrees and scale < 1.0 and stated is None else ()
+        others = [Rival(f"unit: {row.unit}, scale: {row.scale:.4g}", f"{row.size:.4g} is near too") for row in near[1:]]
+        rivals = (
+            (*([counts] if size == _THOUSANDTHS else ()), *others) if agrees and scale < 1.0 and stated is None else ()
+        )
         sure: Sure = "data" if agrees and not rivals else "guess"
         words = _rates_in_words(named, fit, unit, scale)
         seen.take(named, unit, words, sure, scale, fit.order, fit.sign, rivals)
@@ -153,7 +158,7 @@ def _rates_in_words(named: Named, fit: AxisFit, unit: str, scale: float) -> str:
     axes = "" if fit.is_as_named else ", with its axes in this order and with these signs"
     better = f"{fit.times_better:.1f} times better than in any other order or with other signs"
     large = "as large" if f"{fit.gain:.3g}" == "1" else f"{fit.gain:.3g} times as large"
-    size = f" and is {large}, so it is in {unit}" if scale == 1.0 else f", in thousandths of {unit}"
+    size = f" and is {large}, so it is in {unit}" if scale == 1.0 else f", in parts of {scale:.4g} {unit}"
     return f"{called(named)}; follows the attitude's derivative{axes} ({100 * fit.explained:.0f} %, {better}){size}"
 
 
@@ -201,7 +206,7 @@ def without_euler_rates(log: LogTable, candidates: Mapping[SignalName, list[Name
 def _turns_as_body(log: LogTable, angles: Named, rates: Named) -> bool:
     rate_hz = 1 / float(log.grid[1] - log.grid[0])
     time, values = log.values(angles.group.columns)
-    unit = known_unit(angle_unit(angles, angles.scale * values)[0])
+    unit = known_unit(angle_unit(angles, angles.scale * values, time)[0])
     # Between two samples on either side of a full turn lies no angle.
     turned = np.unwrap(unit.factor * angles.scale * values, axis=0)
     attitude = np.column_stack([np.interp(log.grid, time, column) for column in turned.T])
@@ -313,6 +318,8 @@ def _take_place(
         reason += f"; ranges over {spread:.3g}"
         other = units[unit == units[0]]
         rivals = () if sure == "data" else (Rival(f"unit: {other}", "no leaning attitude speaks against it"),)
+        if relative is None and named.is_of_unknown_place:
+            sure, rivals = "guess", (*rivals, Rival("leave position out", "its name does not say that it is a place"))
     else:
         reason += f", which is in {stated}"
         # The lean was held against the velocity only where there is no position.

@@ -140,6 +140,13 @@ class Named:
         """Whether nothing but axes in their names makes the columns a place."""
         return self.rank >= _BY_AXES
 
+    @property
+    def is_of_unknown_place(self) -> bool:
+        """Whether no word says that the columns are a place, and some may say what else."""
+        return bool(self.signal == "position" and not self.known and self.group.words) and not any(
+            words & {*self.group.words} for words in _PLACE_WORDS
+        )
+
 
 _ON_A_WING = 0.4  # Rad.
 # What to do where names do not tell what columns hold.

@@ -44,7 +44,7 @@ from cpfls_cli.flightlog.stated_vehicle import (
 )
 from cpfls_cli.flightlog.stretches import live_rows
 from cpfls_cli.flightlog.topics import STAMP, Topics
-from cpfls_cli.flightlog.vocabulary import KNOWN, OF_TRACKS
+from cpfls_cli.flightlog.vocabulary import FAMILIES, KNOWN, OF_TRACKS
 from cpfls_cli.rounding import largest
 from cpfls_cli.units import STANDARD_GRAVITY, known_unit
 from cpfls_cli.words import joined, some
@@ -72,6 +72,10 @@ _SIGNS = {"position", "body_rate", "acceleration", "attitude", "quaternion"}  # 
 # specific force of a lean of 30 degrees is 15 % above gravity.
 _STEADY: Final = 0.15
 _WITH_BODY = {"body_rate", "acceleration", "attitude", "quaternion"}
+# Names of one axis, of angles or in space; a P or Q may be a power or a torque.
+_AXES: Final = {
+    axis for kind, axes in FAMILIES for axis in axes if axis in "xyz" or (len(axis) > 1 and kind == "angles")
+}
 _BATTERY_V = (2.5, 80.0)  # From one cell that is empty to more than a large vehicle has.
 _ON_EARTH: Final = (("lat", "latitude"), ("lon", "lng", "long", "longitude"))
 _SHOWN = 4  # Groups of columns that are named where others are taken for the same.
@@ -171,8 +175,10 @@ def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
         return (
             f"a track of positions ({some([*log.names], _SHOWN)}) holds no motion of the body: give the autopilot's log"
         )
+    lone = [name for name in log.names if name.lower() in _AXES]
+    parts = f"{some(lone, _SHOWN)}: single axes, and a signal takes all three; " if lone else ""
     shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
-    return f"no column is recognised as a signal of a flight (columns: {shown}): {BY_HAND}"
+    return f"no column is recognised as a signal of a flight (columns: {shown}): {parts}{BY_HAND}"
 
 
 def _live_part(

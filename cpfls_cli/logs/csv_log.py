@@ -83,7 +83,7 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
                 if len(row) < len(names) and count > 1 and not any(own for _, own in table.rows):
                     break
                 way = "each row needs one field for each column name; a field that holds a separator needs quotes"
-                way = f"line {number - 1} has to name each column" if len(names) == 1 else way
+                way = "line 1 has to name each column, with nothing above it" if len(names) == 1 else way
                 raise InputError(f"{path}:{number}: {len(row)} fields, but {len(names)} column names: {way}")
             try:
                 numbers.extend(_plain_numbers([row[index] for index in kept]))

@@ -319,7 +319,7 @@ _FOREIGN: Final = (
     (b"ustar", 257, "a tar archive", _UNPACK),
     (b"\x93NUMPY", 0, "an array of NumPy", "write it as .npz or CSV, with a name for each column"),
     (
-        (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05"),
+        (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05", b"(lp", b"(dp", b"ccopy_reg\n", b"cnumpy"),
         0,
         "a pickle of Python",
         "reading it could run any code; save its numbers as .npz or CSV, with a name for each column",
@@ -333,6 +333,7 @@ _FOREIGN: Final = (
 _TRACK: Final = "a track of positions holds no motion of the body; give the log of the autopilot"
 _AS_CSV: Final = "write its numbers as CSV, with a line of column names"
 _AS_BAG: Final = "record a bag (`ros2 bag record`), which has the stamps of its messages"
+_NUMBER: Final = rb"[-+]?\d[\d.]*+(e[-+]?\d+)?+([-+]\d[\d.]*+(e[-+]?\d+)?+[ij])?+"
 _TEXTS: Final = (
     # What the first letters of a text hold, of markup anywhere.
     (rb"(?s:<.*)?<gpx\b", "a GPX track", _TRACK),
@@ -348,16 +349,17 @@ _TEXTS: Final = (
     (rb"[{\[]", "JSON", _AS_CSV),
     (rb"\d+\.\d+ \d+ [a-z_0-9]+ ", "a log of Paparazzi", _AS_CSV),
     (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*^[\w/]+:)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),
-    (rb"([ -{}~]+ \|){3}", "text whose columns are parted by |", _AS_CSV),
+    # At its beginning words suffice; later, a line of three numbers.
+    (rb"([ -{}~]+ \|){3}|(?ms:.*?^)\|?([ \t]*%b[ \t]*\|){3}" % _NUMBER, "text whose columns are parted by |", _AS_CSV),
     (rb"time \(s\),esc ", "a log of a thrust stand", "a rotor alone flies nothing; give the log of a flight with it"),
     (rb"date,time,.*\b(1rss|rssi|rqly|trss)\b", "telemetry that a radio logs", _SLOW),
     (rb"#dronedeploy\b", "a log of an app that plans flights", "give the log that the autopilot writes itself"),
 )
 # A line of three numbers or more, or its beginning, also as Python prints a tuple; or two lines of two numbers. No
 # match is tried again in parts, which took seconds where text goes on otherwise.
-_NUMBER: Final = rb"[-+]?\d[\d.]*+(e[-+]?\d+)?+([-+]\d[\d.]*+(e[-+]?\d+)?+[ij])?+"
 _NUMBERS: Final = re.compile(
-    rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.eij \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n){2}" % ((_NUMBER,) * 3)
+    rb"\(?(%b[ \t,;]++){2}[-+]?\d[-+\d.eij \t,;]*+\)?[ \t]*(\r?\n|\Z)|(%b[ \t,;]++%b[ \t]*\r?\n[ \t]*){2}"
+    % ((_NUMBER,) * 3)
 )
 _NUMBERS_FIRST: Final = re.compile(rb"[ \t]*(%b[ \t]*[,;\t][ \t]*){2}[-+]?\d" % _NUMBER)
 # A line that says before each of its numbers, or of some in brackets, what it is: `Yaw= 261.9 Roll= 2.2 Place: (1, 2)`.
@@ -381,14 +383,17 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
     if frame and frame in _MAVLINK:
         return "telemetry of MAVLink", _CONVERT_TLOG
     text = first.lstrip(b"\xef\xbb\xbf \t\r\n").lower()
-    if suffix != ".csv" and _NUMBERS.match(text):
+    *remarks, numbers = re.findall(rb"[#%][^\n]*\n\s*|.+", text, re.DOTALL) or [b""]
+    if suffix != ".csv" and _NUMBERS.match(numbers):
+        if remarks and len(remarks[-1].lstrip(b"#% ").split()) == len(numbers.partition(b"\n")[0].split()) > 2:
+            return "a table whose names stand in a remark", "let its name end in .csv"
         # Where some numbers are whole, rows have fewer commas.
-        if b"." not in text and len({line.count(b",") for line in text.rpartition(b"\n")[0].splitlines()}) > 1:
+        if b"." not in numbers and len({line.count(b",") for line in numbers.rpartition(b"\n")[0].splitlines()}) > 1:
             return (
                 "a table whose rows have different numbers of commas, as with commas for decimal points",
                 f"write points in numbers, {NAME_COLUMNS}",
             )
-        bare = "take the brackets around each line away, " if text.startswith(b"(") else ""
+        bare = "take the brackets around each line away, " if numbers.startswith(b"(") else ""
         return "a table of numbers without names", f"{bare}{NAME_COLUMNS}, and let its name end in .csv"
     if suffix != ".csv" and _NAMED_NUMBERS.match(text):
         return "text that names each number in each line", _AS_CSV

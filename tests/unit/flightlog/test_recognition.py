@@ -657,6 +657,43 @@ def test_counts_of_a_gyroscope_and_thousandths_of_its_rates_are_too_alike_to_cho
     assert seen(flat_log(own, rate=named(np.degrees(own.rate), *GYRO))).signal("body_rate").sure == "data"
 
 
+@pytest.mark.parametrize(
+    ("per_rad", "unit", "scale"),
+    [
+        (65.5 * 180 / np.pi, "deg/s", 1 / 65.5),
+        (4096.0, "rad/s", 1 / 4096),
+        (131 * 180 / np.pi, "deg/s", 1 / 131),
+        (32.8 * 180 / np.pi, "deg/s", 1 / 32.8),
+    ],
+)
+def test_counts_of_other_ranges_are_said_by_the_attitude(own, per_rad, unit, scale):
+    guess = seen(flat_log(own, rate=named(np.round(per_rad * own.rate), *GYRO))).signal("body_rate")
+    assert guess.columns.unit == unit
+    assert guess.columns.scale == pytest.approx(scale, rel=1e-6)
+    # Two of them are nearer to each other than an attitude can tell.
+    near = per_rad in (65.5 * 180 / np.pi, 4096.0)
+    assert (guess.sure, len(guess.rivals)) == (("guess", 1) if near else ("data", 0))
+
+
+def test_a_place_whose_name_does_not_say_so_is_a_guess_where_nothing_shows_it(own):
+    place = named(own.position, *(f"bptte.{axis}" for axis in "xyz"))
+    others = dict.fromkeys(("velocity", "attitude", "rate", "force", "speed"))
+    guess = seen(flat_log(own, position=place, **others)).signal("position")
+    assert guess.sure == "guess"
+    assert [rival.text for rival in guess.rivals] == ["leave position out"]
+    assert seen(flat_log(own, position=place, velocity=None)).signal("position").sure == "data"
+    assert not seen(flat_log(own, **others)).signal("position").rivals
+
+
+def test_single_axes_are_said_to_be_no_signal():
+    log = {"": {"t": np.arange(100.0), "Roll": np.arange(100.0) ** 2, "z": np.arange(100.0) ** 3}}
+    with pytest.raises(InputError, match=r"Roll, z: single axes, and a signal takes all three; use common names"):
+        recognise(log, {}, {}, "")
+    # Of a rotor on a stand, power and torque.
+    with pytest.raises(InputError, match=r"P, Q\): use common names"):
+        recognise({"": {"t": np.arange(100.0), "P": np.arange(100.0) ** 2, "Q": np.arange(100.0) ** 3}}, {}, {}, "")
+
+
 def test_a_track_of_positions_is_no_log_of_a_flight():
     log = {"": {name: np.arange(100.0) ** 2 for name in ("millis", "latitude", "Longitude", "altitude", "speed")}}
     log[""]["millis"] = np.arange(100.0)

@@ -335,9 +335,18 @@ def test_angles_that_jump_by_a_full_turn_are_in_rad():
     (angles,) = (own for own in named_signals(column_groups(("roll", "pitch", "yaw"))) if own.signal == "attitude")
     time = np.linspace(0, 10, 1001)
     rolls = np.column_stack([np.angle(np.exp(1j * 3 * time)), 0.2 * np.sin(time), 0.1 * time])
-    assert angle_unit(angles, rolls)[0] == "rad"
-    assert angle_unit(angles, np.degrees(rolls))[0] == "deg"
-    assert angle_unit(angles, np.column_stack([3.0 * np.sin(time), np.sin(time), time]))[0] == "deg"
+    assert angle_unit(angles, rolls, time)[0] == "rad"
+    assert angle_unit(angles, np.degrees(rolls), time)[0] == "deg"
+    assert angle_unit(angles, np.column_stack([3.0 * np.sin(time), np.sin(time), time]), time)[0] == "deg"
+
+
+def test_who_turns_thrice_a_second_turns_in_degrees():
+    (angles,) = (own for own in named_signals(column_groups(("roll", "pitch", "yaw"))) if own.signal == "attitude")
+    time = np.linspace(0, 10, 1001)
+    level = np.zeros((1001, 2))
+    assert angle_unit(angles, np.column_stack([level, 18.0 * np.clip(time - 5, 0, 5)]), time)[0] == "deg"
+    unit, _, _, rivals = angle_unit(angles, np.column_stack([level, 2.0 * time]), time)
+    assert (unit, len(rivals)) == ("rad", 1)
 
 
 @pytest.mark.parametrize(("name", "factor", "unit"), [("Tiempo", 1.0, "s"), ("currentT", 1e6, "us")])
