@@ -265,8 +265,7 @@ class VehicleModel:
 
     @property
     def needs(self) -> frozenset[str]:
-        """What a flight has to have for all of its parts, as `Signals.available` names it."""
-        # To be found an effect may need the command and the measured force, to act it does not.
+        """What a flight has to have for all parts to act, which takes neither the command nor the measured force."""
         of_effects = (one.effect.needs - {"command", "force"} for one in self.effects)
         learned = {"rotor_speed", "velocity"} if self.remainder else {"rotor_speed"} if self.thrust_linear else set()
         needs = frozenset(learned).union(*of_effects)
