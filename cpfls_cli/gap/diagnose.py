@@ -118,7 +118,7 @@ def diagnose(
         without = replace(settings, ignore=(*settings.ignore, *ignored))
         return _diagnosed(training, held, without, rng, whole, model, progress)
 
-    first = run(can)
+    first = run(last)
     if not can or not _left_open(first.diagnosis):
         return first
     second = run(())

@@ -47,3 +47,11 @@ def test_a_wrong_inertia_is_no_curve_of_the_commands():
 
 def test_a_square_is_named_nothing():
     assert named().verdict == "NO_GAP"
+
+
+def test_flights_of_which_one_has_measured_speeds_have_no_curve():
+    """Where it cannot be judged it is not tried: it ended with an error of the flights held out."""
+    flights = [commanded(seed, share=0.5) for seed in (1, 2, 3)]
+    held = [replace(flights[2], commanded=False)]
+    found = diagnose(flights[:2], held, FEW, np.random.default_rng(1)).diagnosis
+    assert "thrust_slope" not in {each.name for each in (*found.effects, *found.closest)}
