@@ -247,13 +247,13 @@ def model_at(model: VehicleModel, numbers: Sequence[FoundNumber], row: Array) ->
     xx, yy, zz, xy, xz, yz = _inertia(model, values).tolist()
     response = model.response
     slow = {name: values.get(own, getattr(response, name)) for own, name in _SLOW_NAMES}
+    # For commands that are not a log's the model's delay is longer than the number, see `commanded_anew`.
+    later = values[DELAY] - begun[DELAY] if DELAY in begun else 0.0
     return replace(
         model,
         vehicle=replace(with_factors(model.vehicle, thrust, drag), inertia_kg_m2=(xx, yy, zz, xy, xz, yz)),
         thrust_linear=_thrust_linear(model, numbers, values),
-        response=replace(
-            response, lag_s=values.get(LAG, response.lag_s), delay_s=values.get(DELAY, response.delay_s), **slow
-        ),
+        response=replace(response, lag_s=values.get(LAG, response.lag_s), delay_s=response.delay_s + later, **slow),
         effects=tuple(_effect_at(each, values) for each in model.effects),
         remainder=None if model.remainder is None else _remainder_at(model.remainder, values),
     )

@@ -425,8 +425,12 @@ def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tu
         # A lag or a delay that flights leave open is open here too: nothing else is known of it.
         used = each.determined or key in (LAG, DELAY)
         if used and each.value and each.low is not None and each.high is not None:
-            # An end at or below zero says no more than that the number is small.
-            intervals[key] = (max(each.low / each.value, 0.1), max(each.high / each.value, 0.1))
+            # Of commands that are not a log's the delay is longer, by what is known. An end at or below zero says no
+            # more than that the number is small.
+            longer = model.response.delay_s - each.value if key == DELAY else 0.0
+            ends = ((end + longer) / (each.value + longer) for end in (each.low, each.high))
+            low, high = (max(end, 0.1) for end in ends)
+            intervals[key] = low, high
         elif key == INERTIA[2] and of_yaw:
             # About yaw the bounds are those of the ratio that control meets.
             intervals[key] = of_yaw

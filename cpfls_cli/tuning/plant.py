@@ -68,7 +68,7 @@ class Spread:
         Largest part of the lag that may be a delay instead, which no derivative of a law makes up for.
     trade : float
         Correlation of lag and delay; where it is below 0 their sum is known better than either, and the ends are those
-        of both, of either and of the sum on the ellipse of 95 %.
+        of both, of either and of the sum on the ellipse of their 95 % intervals.
     """
 
     gain: tuple[float, float] = (1.0, 1.0)

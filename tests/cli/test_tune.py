@@ -139,6 +139,14 @@ def test_bounds_about_yaw_count_once_for_a_drag_factor_that_has_them(determined)
     assert yaw.gain == pytest.approx((0.8, 1.25))
 
 
+def test_the_delay_of_new_commands_is_open_by_as_much_as_the_number_and_not_by_its_share():
+    """From 8 to 16 ms of 12 it is from 18 to 26 of 22, where a log holds a command for 20 ms."""
+    plain = found_vehicle(instrumented=False)
+    model = replace(plain.model, commanded=True, response=replace(plain.model.response, delay_s=0.022))
+    own = replace(plain, model=model, numbers=(number_of("delay.delay_s", 0.012, 0.008, 0.016),), correlation=np.eye(1))
+    assert _spreads(own, model, 0.03)[0][0].delay == pytest.approx((18 / 22, 26 / 22))
+
+
 @pytest.mark.usefixtures("sketched")
 def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
     assert gains["px4"].exit_code == 0

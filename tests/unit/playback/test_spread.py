@@ -8,7 +8,7 @@ import pytest
 from cpfls_cli.errors import ComputationError, InputError
 from cpfls_cli.inertia import symmetric
 from cpfls_cli.playback.evaluation import ParameterPoint
-from cpfls_cli.playback.model import ModelEffect
+from cpfls_cli.playback.model import ModelEffect, commanded_anew
 from cpfls_cli.playback.parameters import FoundNumber, FreeNumbers
 from cpfls_cli.playback.spread import POSITIVE, drawn, model_at
 from tests.builders.playback_flights import STATED, pushed, truth
@@ -55,6 +55,16 @@ def test_models_have_the_numbers_that_were_drawn():
         # The speed that hovers falls with the root of the thrust factor, and the linear part is counted in it.
         ratio = values["thrust_factor"] / model.vehicle.rotors[0].thrust_factor_n_s2
         assert own.thrust_linear == pytest.approx(0.1 * np.sqrt(ratio))
+
+
+def test_vehicles_for_new_commands_are_as_much_later_as_the_one_that_they_are_drawn_about():
+    """Half of the 20 ms for which a log holds a command, which is in the model and in no number."""
+    model = truth()
+    model = replace(model, commanded=True, held_s=0.02, response=replace(model.response, delay_s=0.012))
+    record, anew = found_record(model), commanded_anew(model)
+    fitted, drawn_anew = (drawn(each, record, 50, np.random.default_rng(1)).models for each in (model, anew))
+    for one, other in zip(fitted, drawn_anew, strict=True):
+        assert other.response.delay_s == pytest.approx(one.response.delay_s + 0.01)
 
 
 def test_the_model_of_a_fit_is_made_again_from_what_people_know_of_its_numbers():
