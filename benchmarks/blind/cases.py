@@ -15,7 +15,7 @@ from .vehicles import STUDIED, VEHICLES
 VELOCITY_COLUMNS = ("x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az")
 FORCE_COLUMNS = ("ax", "ay", "az")
 LAGGED = frozenset({"motor_lag", "lag_second_order", "lag_uneven"})
-COMMAND_ONLY = LAGGED | {"notch_filter", "command_delay", "battery_sag"}
+COMMAND_ONLY = LAGGED | {"notch_filter", "command_delay", "battery_sag", "thrust_curve"}
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def make(name, group, vehicle, effects, rng, level=None, **options):
     if options.get("only"):
         truth = []
     left_out = list(options.pop("left_out", ()))
-    if COMMAND_ONLY & set(effects) and not options.get("esc_speed"):
+    if group == "commands" or (COMMAND_ONLY & set(effects) and not options.get("esc_speed")):
         left_out += rotor_columns(VEHICLES[vehicle].count)
         # Rotors always lag by 50 ms behind their command, so a log of commands hides that too.
         if not LAGGED & set(effects):
@@ -109,6 +109,7 @@ NAMES = {
     "flexible_arm": "flexible_mount",
     "notch_filter": "notch_filter",
     "rotor_interference": "own_wake",
+    "thrust_curve": "thrust_slope",
     "wake_on_body": "own_wake",
 }
 """Names that the catalogue has for what is hidden under another; what it takes in of ``OUTSIDE`` gets a line here."""
@@ -243,6 +244,16 @@ def _drag_factor(draws):
         yield f"drag_factor-{vehicle}-rotor_drag-{draw}", "drag_factor", vehicle, effects, {}
 
 
+def _commanded(draws):
+    """Hide a thrust curve, wrong numbers, both and neither in logs of commands alone."""
+    sets = ((), ("parameter_error",), ("thrust_curve",), ("thrust_curve", "parameter_error"),
+            ("thrust_curve", "rotor_drag"))  # fmt: skip
+    for effects in sets:
+        for vehicle in STUDIED:
+            for draw in range(draws):
+                yield f"commands-{vehicle}-{'+'.join(effects) or 'none'}-{draw}", "commands", vehicle, effects, {}
+
+
 def _attacked(draws):
     for attack in ATTACKS:
         for effect in ("", "rotor_drag", "inflow", "com_offset", "linear_damping"):
@@ -272,7 +283,7 @@ def cases(study_seed, draws=3):
     """List the whole study; single effects on the 6 kg craft are drawn so often, other groups follow."""
     kinds = (
         _singles, _none, _strange, _several, _background, _limited,
-        _lacking, _drag_factor, _attacked, _one_sided, _pybullet,
+        _lacking, _drag_factor, _attacked, _one_sided, _pybullet, _commanded,
     )  # fmt: skip
     out = []
     for name, group, vehicle, effects, options in chain.from_iterable(kind(draws) for kind in kinds):

@@ -50,6 +50,7 @@ class Drive:
         self.behind = collect("delay") / dt
         self.exponent, self.depth = collect("sag_exponent"), collect("sag_depth")
         self.start, self.load = collect("sag_start"), collect("sag_load")
+        self.curve, self.carrying = collect("curve"), collect("carrying")
         self.second = np.array([i for i, p in enumerate(plants) if p.resonance], dtype=int)
         self.natural = np.array([p.resonance[0] for p in plants if p.resonance])
         self.ratio = np.array([p.resonance[1] for p in plants if p.resonance])
@@ -71,7 +72,9 @@ class Drive:
         newer = self.past[(step - whole) % length, :, flights].T
         older = self.past[(step - whole - 1) % length, :, flights].T
         arrived = (1 - share) * newer + share * older
-        return np.where(self.exponent > 0, arrived * self.volt**self.exponent, arrived)
+        arrived = np.where(self.exponent > 0, arrived * self.volt**self.exponent, arrived)
+        squares = (1 - self.curve) * arrived**2 + self.curve * self.carrying * arrived
+        return np.where(self.curve == 0, arrived, np.sqrt(np.maximum(squares, 0.0)))
 
     def rate(self, target):
         """Rotor acceleration, rad/s^2."""

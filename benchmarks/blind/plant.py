@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .vehicles import GRAVITY
+
 USUAL_LAG = 0.05
 
 
@@ -29,7 +31,13 @@ class Plant:
     sag_start: float = 0.0
     sag_load: float = 0.01
     notch: tuple[float, float] | None = None
+    curve: float = 0.0
     euler_axis: bool = False
+
+    @property
+    def carrying(self):
+        """Rotor speed that carries the weight, rad/s."""
+        return float(np.sqrt(self.mass * GRAVITY / self.thrust_factor.sum()))
 
 
 def nominal(vehicle):
@@ -111,6 +119,11 @@ def battery_sag(plant, depth, exponent, start, load):
     plant.sag_depth, plant.sag_exponent, plant.sag_start, plant.sag_load = depth, exponent, start, load
 
 
+def thrust_curve(plant, share):
+    """Let a share of the thrust that hovers go with the command, and the rest with its square."""
+    plant.curve = share
+
+
 def euler_axis_torque(plant):
     """Let the rotor torque act along the axes of the Euler angles."""
     plant.euler_axis = True
@@ -118,6 +131,6 @@ def euler_axis_torque(plant):
 
 _ALL = (
     com_offset, products_of_inertia, rotor_mismatch, parameter_error, drag_factor, quick_rotors, notch_filter,
-    motor_lag, lag_uneven, lag_second_order, command_delay, battery_sag, euler_axis_torque,
+    motor_lag, lag_uneven, lag_second_order, command_delay, battery_sag, thrust_curve, euler_axis_torque,
 )  # fmt: skip
 ALTERATIONS = {alter.__name__: alter for alter in _ALL}

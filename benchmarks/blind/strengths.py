@@ -259,6 +259,7 @@ def _bullet_downwash(rng, _scale, _level):
 
 OTHERS = {
     "drag_factor": lambda rng, _, level: {"error": rng.choice([-1, 1]) * between(rng, 0.15, 0.3, level)},
+    "thrust_curve": lambda rng, _, level: {"share": rng.choice([-0.4, 1, 1, 1]) * between(rng, 0.2, 0.9, level)},
     "quick_rotors": _none,
     "bullet_damping": lambda *_: {"damping": 0.04},
     # Per rad/s: the simulator turns revolutions into radians before it multiplies.
@@ -266,7 +267,7 @@ OTHERS = {
     "bullet_ground": lambda *_: {"gain": 11.36859},
     "bullet_downwash": _bullet_downwash,
 }
-"""The least known number of a vehicle, and the physics of another simulator."""
+"""The least known number of a vehicle, thrust that is no square, and the physics of another simulator."""
 
 _DRAWS = CATALOGUE | OUTSIDE | OTHERS | {name: draw for name, (draw, _) in FORMS.items()}
 

@@ -113,6 +113,7 @@ _OF = {
     "com_offset": lambda h, _: _axes("c", h["offset"][:2]),
     "products_of_inertia": lambda h, _: {f"I{pair}": h[pair] for pair in ("xy", "xz", "yz")},
     "rotor_mismatch": _mismatch,
+    "thrust_curve": lambda h, _: {"linear": h["share"]},
     "torque_bias": lambda h, _: _axes("M", h["torque"]),
     "payload": _payload,
     "flexible_arm": _spring,

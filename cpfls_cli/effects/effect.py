@@ -67,7 +67,7 @@ class Shape:
     meaning: str
     first: float | None = None  # Where a search stays until the effect is chosen; None: it tries the whole grid.
     valley: float | None = None  # Where the residual has many valleys over it: their width, as a share of the value.
-    follows: Callable[[Mapping[str, float]], float] | None = None  # What the coefficients say of it; None: nothing.
+    follows: Callable[[Mapping[str, float]], float] | None = None  # What coefficients, the vehicle's too, say of it.
 
     def bounds(self, _vehicle: VehicleSettings) -> tuple[float, float]:
         """Bound the shape, on any vehicle, in `unit`."""

@@ -1,16 +1,26 @@
 """Slope of the thrust: thrust that does not go with the square of the command."""
 
+from collections.abc import Mapping
+
 from cpfls_cli.effects import scales
-from cpfls_cli.effects.effect import Coefficient, Effect
+from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
+
+
+def _hover(numbers: Mapping[str, float]) -> float:
+    """Compute the command that hovers over that of the config, where thrust over weight is not as stated."""
+    return float(max(1 + numbers["thrust_scale"], 1e-3) ** -0.5)
 
 
 def _acts(see: Instant, p: Numbers) -> Wrench:
     # As it is in hover, so that neither the mass nor the thrust factor is another one.
-    hover = see.functions.sqrt(scales.weight(see.vehicle) / see.functions.total(see.thrust_factors))
+    hover = p["hover"] * see.functions.sqrt(scales.weight(see.vehicle) / see.functions.total(see.thrust_factors))
     apart = p["linear"] * (see.rotor_speed * (hover - see.rotor_speed))
     yaw = -see.functions.total(see.spins * see.drag_factors * apart)
-    return Wrench((0, 0, yaw), at_hubs=(0, 0, see.thrust_factors * apart))
+    thrust = see.thrust_factors * apart
+    # What thrust over weight is off by scales the force; of torques it scales the inertia.
+    more = (p["hover"] ** -2 - 1) * see.functions.total(thrust)
+    return Wrench((0, 0, yaw), (0, 0, more), at_hubs=(0, 0, thrust))
 
 
 EFFECT = Effect(
@@ -23,6 +33,16 @@ EFFECT = Effect(
     "the vehicle is then less, or more, than the config says, as if its inertia were another one.",
     coefficients=(
         Coefficient("linear", "1", -1.0, 1.0, "share of the hover thrust that goes with the command, not its square"),
+    ),
+    shapes=(
+        Shape(
+            "hover",
+            "1",
+            (0.5, 1.0, 3.0),
+            "command that hovers over that of the config: a wrong mass or thrust factor moves it",
+            first=1.0,
+            follows=_hover,
+        ),
     ),
     # Measured speeds have the square of blades; torque alone shows the slope in hover, that of a wrong inertia.
     needs=frozenset({"rotor_speed", "command", "force"}),

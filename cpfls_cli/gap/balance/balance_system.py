@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Columns, Shape
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.noise_floor import negligible, noise_floor
 from cpfls_cli.gap.balance.weak_flight import Candidate, CandidateKey, WeakFlight, actuated, columns_of, nuisance
@@ -129,15 +130,27 @@ class System:
         )
 
     def following(self, linear: Array) -> Array:
-        """Give what coefficients, shape (column,), say of the shapes, within their bounds; NaN for nothing."""
-        places, values = {each.effect.name: place for each, place in self.places}, list[float]()
+        """Give what coefficients, shape (column,), say of the shapes, within their bounds; NaN for nothing.
+
+        An effect knows its own and those of the vehicle.
+        """
+        named = {
+            each.effect.name: dict(zip((n.name for n in each.effect.coefficients), linear[place], strict=False))
+            for each, place in self.places
+        }
+        values = list[float]()
         for each in self.chosen:
-            own = linear[places[each.effect.name]] if is_free(each) else ()
-            known = dict(zip((number.name for number in each.effect.coefficients), own, strict=False))
+            known = named[VEHICLE_NUMBERS.name] | named.get(each.effect.name, {})
             said = (np.nan if shape.follows is None else shape.follows(known) for shape in each.effect.shapes)
             bounds = (shape.bounds(self.vehicle) for shape in each.effect.shapes)
             values += [float(np.clip(value, *ends)) for value, ends in zip(said, bounds, strict=True)]
         return np.array(values)
+
+    def followed(self, numbers: Array) -> Array:
+        """Let shapes follow the coefficients, in rows of both, shape (row, number)."""
+        columns = self.base.shape[2]
+        said = np.array([self.following(row[:columns]) for row in numbers]).reshape(len(numbers), -1)
+        return np.hstack([numbers[:, :columns], np.where(np.isnan(said), numbers[:, columns:], said)])
 
     @property
     def closely(self) -> System:

@@ -13,7 +13,7 @@ from cpfls_cli.effects.catalogue.parameter_error import NUMBERS, shown
 from cpfls_cli.effects.effect import Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.estimation.estimate import Normal, Prior, conditional_strength, one_step
-from cpfls_cli.gap.balance.refine import fit_within_bounds, shape_columns
+from cpfls_cli.gap.balance.refine import fit_within_bounds, number_columns
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, estimates_of, nothing_by_size, places_of
 from cpfls_cli.gap.naming.ranking import known_before
@@ -161,10 +161,8 @@ def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array | Non
         apart = _apart(sources, values, prior, fit_error)
     without = change + apart
     shapes = [_ends(each.effect, shape) for each in found.hypothesis.chosen for shape in each.effect.shapes]
-    ends, linear = np.array([(-np.inf, np.inf)] * len(found.estimates.linear) + shapes), len(found.estimates.linear)
-    rows = np.clip(values + np.vstack([change, without]), *ends.T)
-    said = np.array([found.hypothesis.following(row[:linear]) for row in rows])
-    rows[:, linear:] = np.where(np.isnan(said), rows[:, linear:], said)
+    ends = np.array([(-np.inf, np.inf)] * len(found.estimates.linear) + shapes)
+    rows = found.hypothesis.followed(np.clip(values + np.vstack([change, without]), *ends.T))
     return rows[0], rows[1:]
 
 
@@ -401,8 +399,9 @@ def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows
     hypothesis, linear = found.hypothesis, found.estimates.linear
     there = hypothesis.closely
     windows = there.flights[0].windows
-    columns = [there.base, shape_columns(there, linear), there.residual_at(linear)[..., None]]
-    rows = np.concatenate(columns, axis=2) / found.floor[:, None]
+    columns = number_columns(there, linear)
+    columns[..., : len(linear)] += there.base
+    rows = np.concatenate([columns, there.residual_at(linear)[..., None]], axis=2) / found.floor[:, None]
     own, middles, of_path, of_run = [], [], [], []
     length = found.settings.block_s / windows.period
     # Blocks of a run have consecutive numbers in time, as errors by neighbouring blocks take it.

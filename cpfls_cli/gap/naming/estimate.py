@@ -18,7 +18,7 @@ from cpfls_cli.effects.catalogue.parameter_error import NUMBERS
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.balance.balance_system import System, system, window_noise
-from cpfls_cli.gap.balance.refine import equations, fit, fit_within_bounds, refitted, shape_columns
+from cpfls_cli.gap.balance.refine import equations, fit, fit_within_bounds, number_columns, refitted
 from cpfls_cli.gap.balance.weak_flight import Candidate, WeakFlight
 from cpfls_cli.gap.naming.ranking import block_index
 from cpfls_cli.gap.naming.results import Estimate
@@ -176,9 +176,8 @@ def _on_bounds(numbers: Sequence[Estimate]) -> dict[Estimate, float]:
 
 def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array, held: BoolArray) -> Estimates:
     """Add confidence intervals to a fit: without each block all numbers change by one Gauss-Newton step."""
-    shapes = hypothesis.shape_values
-    moving_shapes = shape_columns(hypothesis, linear, system(hypothesis.flights).rotor_wrench)
-    rows = equations(hypothesis, weight).around(linear, ~held, moving_shapes / weight[..., None])
+    moving = number_columns(hypothesis, linear, system(hypothesis.flights).rotor_wrench)
+    rows = equations(hypothesis, weight).around(linear, ~held, moving / weight[..., None])
     length = np.linalg.norm(rows.columns, axis=0)
     scale = np.where(length > 0, length, 1.0)
     scaled, noise = rows.columns / scale, rows.noise[:, :-1] / scale
@@ -189,11 +188,11 @@ def _estimated(hypothesis: System, weight: Array, block: IntArray, linear: Array
         gram.append(x @ x.T - rows.trusted * (n @ n.T))
         moment.append(x @ rows.right[own] - rows.trusted * (n @ rows.noise[own, -1]))
     others = np.sum(gram, axis=0) - np.array(gram) + 1e-9 * np.eye(len(scale))
-    values = np.concatenate([linear, shapes])
+    values = np.concatenate([linear, hypothesis.shape_values])
     left_out = np.tile(values, (len(gram), 1))
-    moving = np.concatenate([~held, np.ones(len(shapes), dtype=bool)])
-    left_out[:, moving] -= np.linalg.solve(others, np.array(moment)[..., None])[..., 0] / scale
-    return estimates_of(hypothesis, values, left_out)
+    free = np.append(~held, np.ones(len(values) - len(linear), dtype=bool))
+    left_out[:, free] -= np.linalg.solve(others, np.array(moment)[..., None])[..., 0] / scale
+    return estimates_of(hypothesis, values, hypothesis.followed(left_out))
 
 
 def places_of(hypothesis: System) -> list[tuple[slice, slice]]:

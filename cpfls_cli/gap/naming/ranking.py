@@ -14,7 +14,7 @@ import numpy as np
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
-from cpfls_cli.gap.balance.refine import fit, shape_columns, torque_loss_ratio
+from cpfls_cli.gap.balance.refine import fit, number_columns, torque_loss_ratio
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
 from cpfls_cli.gap.settings import COUNTS, ERRORS, NOISE, OFF, RARE, VISIBLE, GapSettings
 from cpfls_cli.rounding import ascending, tied
@@ -152,10 +152,11 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
     The shapes of the chosen effects are in the base by their derivatives, so that a candidate is judged by what it
     adds after they have moved.
     """
-    parts = [hypothesis.base, shape_columns(hypothesis, fit(hypothesis, floor))]
+    base = hypothesis.base
+    parts = [base, number_columns(hypothesis, fit(hypothesis, floor))[..., base.shape[2] :]]
     priors, placed = [known_before(hypothesis)], list[tuple[Candidate, IntArray, Array]]()
-    own_wrench, base = hypothesis.rotor_wrench, np.arange(parts[0].shape[2] + parts[1].shape[2])
-    first = len(base)
+    own_wrench, places = hypothesis.rotor_wrench, np.arange(base.shape[2] + parts[1].shape[2])
+    first = len(places)
     for candidate in candidates:
         columns = hypothesis.columns(candidate)
         actuator = candidate.effect.kind == "actuator"
@@ -163,7 +164,7 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
         placed.append((candidate, np.arange(first, first := first + columns.shape[2]), weight))
         parts.append(columns)
         priors.append(_information(candidate.effect, columns.shape[2], hypothesis.vehicle))
-    return ScoringMatrix(np.concatenate(parts, axis=2) / floor[:, None], base, placed, np.concatenate(priors))
+    return ScoringMatrix(np.concatenate(parts, axis=2) / floor[:, None], places, placed, np.concatenate(priors))
 
 
 def score(
