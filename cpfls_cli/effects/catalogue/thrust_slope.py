@@ -1,26 +1,19 @@
 """Slope of the thrust: thrust that does not go with the square of the command."""
 
-from collections.abc import Mapping
-
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
 from cpfls_cli.vehicle.motion import Instant, Numbers, Wrench
 
 
-def _hover(numbers: Mapping[str, float]) -> float:
-    """Compute the command that hovers over that of the config, where thrust over weight is not as stated."""
-    return float(max(1 + numbers["thrust_scale"], 1e-3) ** -0.5)
-
-
 def _acts(see: Instant, p: Numbers) -> Wrench:
     # As it is in hover, so that neither the mass nor the thrust factor is another one.
-    hover = p["hover"] * see.functions.sqrt(scales.weight(see.vehicle) / see.functions.total(see.thrust_factors))
-    apart = p["linear"] * (see.rotor_speed * (hover - see.rotor_speed))
-    yaw = -see.functions.total(see.spins * see.drag_factors * apart)
-    thrust = see.thrust_factors * apart
+    carrying = (1 + p["thrust_scale"]) * see.functions.total(see.thrust_factors)
+    apart = p["linear"] * (
+        see.rotor_speed * (see.functions.sqrt(scales.weight(see.vehicle) / carrying) - see.rotor_speed)
+    )
+    thrust, yaw = see.thrust_factors * apart, -see.functions.total(see.spins * see.drag_factors * apart)
     # What thrust over weight is off by scales the force; of torques it scales the inertia.
-    more = (p["hover"] ** -2 - 1) * see.functions.total(thrust)
-    return Wrench((0, 0, yaw), (0, 0, more), at_hubs=(0, 0, thrust))
+    return Wrench((0, 0, yaw), (0, 0, p["thrust_scale"] * see.functions.total(thrust)), at_hubs=(0, 0, thrust))
 
 
 EFFECT = Effect(
@@ -36,12 +29,12 @@ EFFECT = Effect(
     ),
     shapes=(
         Shape(
-            "hover",
+            "thrust_scale",
             "1",
-            (0.5, 1.0, 3.0),
-            "command that hovers over that of the config: a wrong mass or thrust factor moves it",
-            first=1.0,
-            follows=_hover,
+            (-0.9, 0.0, 3.0),
+            "true thrust over that of the model, less 1, by which it hovers at another command",
+            first=0.0,
+            follows=lambda known: known["thrust_scale"],
         ),
     ),
     # Measured speeds have the square of blades; torque alone shows the slope in hover, that of a wrong inertia.

@@ -22,9 +22,6 @@ from cpfls_cli.rounding import ROUNDING, at_most, levelled, smallest
 _MOST_NOISE = 0.5
 """Share of the squares of any combination of columns that is believed to be noise at most: beyond it, the rest is
 uncertain."""
-_FOLLOWED = 3  # Times that shapes follow coefficients, and these them, before all are moved.
-_DIFFERENCE = float(np.finfo(float).eps ** (1 / 3))
-"""Of central differences, relative: they are off by its square, and by rounding over it."""
 _SETTLED = 1e-2
 """Change of the sum of squares, in variances, below which a fit has converged: a tenth of a standard error; and share
 of a step, or of what it takes off, below which it is none."""
@@ -108,7 +105,7 @@ class Equations:
     def around(self, linear: Array, kept: BoolArray, moving: Array) -> Equations:
         """Subtract what coefficients explain, keep the columns of some, and add weighted columns without noise.
 
-        `linear`: shape (column,); `kept`: shape (column,); `moving`: shape (..., column + shape), see `number_columns`.
+        `linear`: shape (column,); `kept`: shape (column,); `moving`: shape (..., column + shape), as `number_columns`.
         """
         more, added = np.split(moving.reshape(len(self.right), -1), [len(linear)], axis=1)
         left = self.noise[:, -1] - self.noise[:, :-1] @ linear
@@ -255,19 +252,17 @@ def refitted(hypothesis: System, weight: Array) -> System:
         return float(((there.residual_at(linear) / own) ** 2).sum()), (own, linear, held)
 
     error, (own, linear, held) = fitted(hypothesis)
-    free = np.isnan(hypothesis.following(linear))
-    for _ in range(_FOLLOWED):
-        if not free.all():
-            said = hypothesis.following(linear)
-            hypothesis = hypothesis.with_shapes(np.where(np.isnan(said), hypothesis.shape_values, said))
-            error, (own, linear, held) = fitted(hypothesis)
+    said = hypothesis.following(linear)
+    if not (free := np.isnan(said)).all():
+        hypothesis = hypothesis.with_shapes(np.where(free, hypothesis.shape_values, said))
+        error, (own, linear, held) = fitted(hypothesis)
     while True:
         # The change of the shapes jointly with the coefficients that no bound holds, and what it takes off the squares
         # where the residual is linear in them.
         moving = number_columns(hypothesis, linear, rotor_wrench)
         rows = equations(hypothesis, own).around(linear, ~held, moving / own[..., None])
         solved, (columns, right) = rows.solve(), rows.root
-        step, gain = solved[len(solved) - len(free) :], float(right @ columns @ solved)
+        step, gain = np.where(free, solved[len(solved) - len(free) :], 0.0), float(right @ columns @ solved)
         # Half of a step that goes too far. Where a hundredth of what the linear system asks for is too far yet, it
         # holds for no step: a filter and a lag that nothing separates would creep along with no end in sight.
         least = max(_SETTLED, _SETTLED * gain)
@@ -362,16 +357,17 @@ def _bracket(grid: Sequence[float], value: float) -> tuple[float, float]:
     return float(grid[max(0, nearest - 1)]), float(grid[min(len(grid) - 1, nearest + 1)])
 
 
-def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None = None) -> Array:
-    """Differentiate what the hypothesis explains by each of its shapes, by central differences.
+def number_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None = None) -> Array:
+    """Differentiate what the hypothesis explains by its shapes, by central differences.
 
-    `linear`, shape (column,): coefficients of the base, held.
+    `linear`, shape (column,): coefficients of the base.
     `rotor_wrench`, shape (window, 6), N m and N: of the rotors without effects on the actuation, for which a change of
     the rotor torque is compensated.
-    Result: shape (window, 6, shape).
+    Result: shape (window, 6, column + shape): what the base lacks of derivatives by coefficients, which some shapes
+    follow; then those by the other shapes.
     """
     values = hypothesis.shape_values
-    columns = np.zeros((*hypothesis.residual.shape, len(values)))
+    columns, slopes = np.zeros((*hypothesis.residual.shape, len(values))), np.zeros((len(values), len(linear)))
 
     def residual_at(shapes: Array) -> Array:
         there = hypothesis.with_shapes(shapes)
@@ -381,25 +377,19 @@ def shape_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None 
         before, after = (torque_loss_ratio(rotor_wrench, each.rotor_wrench) for each in (hypothesis, there))
         return left * after / before
 
-    for number, unit in enumerate(np.eye(len(values))):
-        step = _DIFFERENCE * (abs(values[number]) or 1.0)
-        ahead, behind = (residual_at(values + change * unit) for change in (step, -step))
-        columns[..., number] = (behind - ahead) / (2 * step)
-    return columns
-
-
-def number_columns(hypothesis: System, linear: Array, rotor_wrench: Array | None = None) -> Array:
-    """Differentiate what the hypothesis explains by shapes: by coefficients that they follow, and by those that move.
-
-    Parameters as those of `shape_columns`.
-    Result: shape (window, 6, column + shape): what is added to the columns of the base; then 0 for shapes that follow.
-    """
-    columns, slopes = shape_columns(hypothesis, linear, rotor_wrench), np.zeros((len(hypothesis.shapes), len(linear)))
-    if (follow := ~np.isnan(hypothesis.following(linear))).any():
-        for number, step in enumerate(np.diag(_DIFFERENCE * np.where(linear == 0, 1.0, np.abs(linear)))):
-            ahead, behind = (hypothesis.following(linear + change) for change in (step, -step))
-            slopes[:, number] = np.nan_to_num((ahead - behind) / (2 * step[number]))
+    for number, step in enumerate(_steps_about(values)):
+        ahead, behind = (residual_at(values + change) for change in (step, -step))
+        columns[..., number] = (behind - ahead) / (2 * step[number])
+    follow = ~np.isnan(hypothesis.following(linear))
+    for number, step in enumerate(_steps_about(linear)) if follow.any() else ():
+        ahead, behind = (hypothesis.following(linear + change) for change in (step, -step))
+        slopes[:, number] = np.nan_to_num((ahead - behind) / (2 * step[number]))
     return np.concatenate([columns @ slopes, np.where(follow, 0.0, columns)], axis=2)
+
+
+def _steps_about(values: Array) -> Array:
+    """Give steps, a row for each value: central differences are off by their square, and by rounding over them."""
+    return np.diag(np.finfo(float).eps ** (1 / 3) * np.where(values == 0, 1.0, np.abs(values)))
 
 
 def torque_loss_ratio(before: Array, after: Array) -> Array:

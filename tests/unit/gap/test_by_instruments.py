@@ -181,7 +181,7 @@ def by_each(numbers, rng, blocks=(BLOCKS, BLOCKS)):
 
 def test_the_error_of_a_number_holds_that_of_another_one_that_another_source_identifies(monkeypatch):
     monkeypatch.setattr(by_instruments, "known_before", lambda _: np.zeros(2))
-    hypothesis = SimpleNamespace(chosen=[], following=lambda _: np.zeros(0))
+    hypothesis = SimpleNamespace(chosen=[], followed=lambda rows: rows)
 
     def stepped(sources, at, fits):
         """Step from values; the products hold the residual of values 0."""

@@ -229,7 +229,7 @@ def test_no_more_than_half_of_any_combination_is_taken_for_noise():
 
 def test_about_a_solution_nothing_is_left_to_do():
     rows = drawn(0.6, right=0.4)
-    there = rows.around(rows.solve(), np.array([True, True, True, False]), np.zeros((ROWS, 0)))
+    there = rows.around(rows.solve(), np.array([True, True, True, False]), np.zeros((ROWS, 4)))
     assert there.solve() == pytest.approx(np.zeros(3), abs=1e-9)
 
 

@@ -160,7 +160,7 @@ def test_a_step_that_has_to_be_a_thousandth_is_none(monkeypatch):
     monkeypatch.setattr(refine, "system", lambda _flights: SimpleNamespace(rotor_wrench=None))
     monkeypatch.setattr(refine, "torque_loss_ratio", lambda _before, _after: 1.0)
     monkeypatch.setattr(refine, "fit_within_bounds", lambda *_: (np.zeros(0), np.zeros(0, dtype=bool)))
-    monkeypatch.setattr(refine, "shape_columns", lambda *_: np.ones((1, 1, 1)))
+    monkeypatch.setattr(refine, "number_columns", lambda *_: np.ones((1, 1, 1)))
     monkeypatch.setattr(refine, "equations", lambda *_: SimpleNamespace(around=lambda *_: asked))
     start = Ridge(0.0, 1e4, [])
     assert refine.refitted(start, np.ones((1, 1))) is start
