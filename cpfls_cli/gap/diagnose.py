@@ -114,15 +114,16 @@ def diagnose(
     last = [name for name, each in CATALOGUE.items() if each.tried_last and name not in settings.ignore]
     can = [name for name in last if not any(CATALOGUE[name].missing(own) for own in (*training, *held))]
 
-    def run(ignored: Sequence[str]) -> DiagnosisRun:
-        without = replace(settings, ignore=(*settings.ignore, *ignored))
-        return _diagnosed(training, held, without, rng, whole, model, progress)
+    def run(ignored: Sequence[str], begun: float) -> DiagnosisRun:
+        without, part = replace(settings, ignore=(*settings.ignore, *ignored)), 0.5 if can else 1.0
+        return _diagnosed(training, held, without, rng, whole, model, lambda d, note: progress(begun + part * d, note))
 
-    first = run(last)
+    first = run(last, 0.0)
     if not can or not _left_open(first.diagnosis):
         return first
-    second = run(())
-    return second if {*can} & _causes(second.diagnosis) else first
+    second = run((), 0.5)
+    before, after = (float(np.nanmax(each.diagnosis.gap.after_floors)) for each in (first, second))
+    return second if {*can} & _causes(second.diagnosis) and after <= max(before, CLEAR) else first
 
 
 def _left_open(found: Conclusion) -> bool:

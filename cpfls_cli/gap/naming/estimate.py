@@ -310,6 +310,9 @@ def earned(
             if refusal is None:
                 break
             refusals.append(refusal)
+            if refusal.in_the_way:
+                # The others are sought again, and may be another way without it.
+                break
             out = [refusal.name]
         found = found.without(out)
     return found, refusals

@@ -11,7 +11,8 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.effects.catalogue.parameter_error import shown
+from cpfls_cli.effects.catalogue.parameter_error import NUMBERS, shown
+from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import (
     System,
@@ -41,6 +42,9 @@ class HeldOut:
     # Shape (window, 6): of the model with its own numbers refitted on the training flights, its inertia in gusts with
     # the effects.
     parameters: Array
+    # Shape (window, 6): of the model with effects and numbers as given, all else refitted; None in gusts, where a fit
+    # takes the numbers of the loop.
+    stated: Array | None
     after: Array  # Shape (window, 6): of the model with effects.
     floor: Array  # Shape (6,).
     known: BoolArray  # Shape (window, 6).
@@ -96,7 +100,14 @@ class HeldOut:
 
         0 below visibility, and where no gap is: a mean square of `least` squared floors.
         """
-        before, after = self.before / self.noise, self.parameters / self.noise
+        removed = [self._removed(self.before, self.parameters, least)]
+        if self.stated is not None:
+            # What effects do may hide what numbers do.
+            removed.append(self._removed(self.stated, self.after, least))
+        return np.asarray(np.max(removed, axis=0))
+
+    def _removed(self, before: Array, after: Array, least: float) -> Array:
+        before, after = before / self.noise, after / self.noise
         rows = np.maximum(self.known.sum(axis=0), 1)
         gone = ((before**2 - after**2) * self.known).sum(axis=0) / rows
         each = [self.share_removed(before, after, slice(c, c + 1)) for c in range(before.shape[1])]
@@ -136,6 +147,7 @@ def held_out(
     return HeldOut(
         raw.residual,
         plain.residual_at(numbers),
+        None if full.gusty.any() else full.residual_at(_with_stated(fitted, floor)),
         full.residual_at(linear),
         here,
         known,
@@ -143,6 +155,15 @@ def held_out(
         full.most_noise,
         {name: share for name, there in beyond.items() if (share := float(there.any(axis=1).mean()))},
     )
+
+
+def _with_stated(fitted: System, floor: Array) -> Array:
+    """Refit all but the vehicle's numbers of the config, which are as it states them, shape (column,)."""
+    numbers, own = np.zeros(fitted.base.shape[2]), [each.name for each in VEHICLE_NUMBERS.coefficients]
+    free = np.append(~np.isin(own, list(NUMBERS)), np.ones(len(numbers) - len(own), dtype=bool))
+    matrix = (fitted.base[..., free] / floor[:, None]).reshape(fitted.residual.size, -1)
+    numbers[free] = least_squares(matrix, (fitted.residual / floor).reshape(-1))
+    return numbers
 
 
 def _own_numbers(own: System, with_effects: Array) -> Array:
