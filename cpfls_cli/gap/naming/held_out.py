@@ -42,9 +42,6 @@ class HeldOut:
     # Shape (window, 6): of the model with its own numbers refitted on the training flights, its inertia in gusts with
     # the effects.
     parameters: Array
-    # Shape (window, 6): of the model with effects and numbers as given, all else refitted; None in gusts, where a fit
-    # takes the numbers of the loop.
-    stated: Array | None
     after: Array  # Shape (window, 6): of the model with effects.
     floor: Array  # Shape (6,).
     known: BoolArray  # Shape (window, 6).
@@ -53,6 +50,9 @@ class HeldOut:
     # Effects of which these flights ask for a number that no flight learned from shows, such as that of a faster
     # descent, with the share of the windows that do; nothing is judged there.
     unlearned: Mapping[str, float]
+    # Shape (window, 6): of the model with effects and numbers as given, all else refitted; None in gusts, where a fit
+    # takes the numbers of the loop.
+    stated: Array | None = None
 
     def size(self, residual: Array) -> GapSize:
         """Compute the root mean square of a residual, shape (window, 6), by channel."""
@@ -147,13 +147,13 @@ def held_out(
     return HeldOut(
         raw.residual,
         plain.residual_at(numbers),
-        None if full.gusty.any() else full.residual_at(_with_stated(fitted, floor)),
         full.residual_at(linear),
         here,
         known,
         np.sqrt(here**2 + scatter * scatter_variance(full)),
         full.most_noise,
         {name: share for name, there in beyond.items() if (share := float(there.any(axis=1).mean()))},
+        None if full.gusty.any() else full.residual_at(_with_stated(fitted, floor)),
     )
 
 

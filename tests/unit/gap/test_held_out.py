@@ -62,6 +62,11 @@ def test_numbers_remove_a_gap_only_where_one_stands_above_the_noise(before, take
     assert found.removed_by_numbers(0.0)[0] > 0.9
 
 
+def test_numbers_that_effects_make_up_for_count_by_what_is_left_without_them():
+    found = replace(judged((1, 1, 1), (1, 1, 1)), stated=noise(1, 4, 1))
+    assert np.array_equal(found.removed_by_numbers(NOISE) > 0.9, [False, True, False, False, False, False])
+
+
 @pytest.mark.parametrize(("before", "own", "closed"), [(8, 0.7, True), (8, 2, False), (1.2, 0.7, False)])
 def test_numbers_close_a_gap_that_was_clear(before, own, closed):
     """Names next to them then take their share of the gap as given, for of the other there is none."""
