@@ -252,10 +252,12 @@ def refitted(hypothesis: System, weight: Array) -> System:
         return float(((there.residual_at(linear) / own) ** 2).sum()), (own, linear, held)
 
     error, (own, linear, held) = fitted(hypothesis)
-    said = hypothesis.following(linear)
-    if not (free := np.isnan(said)).all():
-        hypothesis = hypothesis.with_shapes(np.where(free, hypothesis.shape_values, said))
+    free = np.isnan(said := hypothesis.following(linear))
+    # Coefficients move as the shapes do that follow them, by less than half as far.
+    for _ in range(0 if free.all() else 4):
+        hypothesis = hypothesis.with_shapes(np.where(np.isnan(said), hypothesis.shape_values, said))
         error, (own, linear, held) = fitted(hypothesis)
+        said = hypothesis.following(linear)
     while True:
         # The change of the shapes jointly with the coefficients that no bound holds, and what it takes off the squares
         # where the residual is linear in them.

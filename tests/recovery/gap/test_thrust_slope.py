@@ -38,6 +38,28 @@ def test_a_curve_of_the_commands_is_no_wrong_inertia(share):
     assert number.value == pytest.approx(share, abs=0.02)
 
 
+@pytest.mark.parametrize("heavier", [0.1, 0.4])
+def test_next_to_a_wrong_mass_the_curve_leaves_the_inertia_as_it_is(heavier):
+    """A vehicle that weighs less than stated hovers at another command, about which the curve has its share."""
+    found = named(share=0.5, mass_kg=(1 + heavier) * VEHICLE.mass_kg)
+    curve, wrong = found.effects
+    assert (found.verdict, curve.name, wrong.name) == ("NAMED", "thrust_slope", "parameter_error")
+    assert curve.coefficients["linear"].low < 0.5 < curve.coefficients["linear"].high
+    assert [number.name for number in wrong.numbers] == ["thrust_scale"]
+    assert wrong.numbers[0].low < heavier < wrong.numbers[0].high
+
+
+def test_a_wrong_inertia_that_a_curve_makes_up_for_is_named():
+    """Less steep thrust turns the vehicle less, and a smaller inertia more: neither shows as long as both are there."""
+    moments = (*(0.75**-1 * each for each in VEHICLE.inertia_kg_m2[:2]), VEHICLE.inertia_kg_m2[2])
+    found = named(share=0.5, inertia_kg_m2=moments)
+    assert {each.name for each in found.effects} == {"thrust_slope", "parameter_error"}
+    wrong = next(each for each in found.effects if each.name == "parameter_error")
+    assert {number.name for number in wrong.numbers} == {"inertia_x", "inertia_y"}
+    for number in wrong.numbers:
+        assert number.value == pytest.approx(-0.25, abs=0.02)
+
+
 def test_a_wrong_inertia_is_no_curve_of_the_commands():
     moments = tuple(1.25 * each for each in VEHICLE.inertia_kg_m2[:3])
     found = named(inertia_kg_m2=moments)
