@@ -106,7 +106,13 @@ def above_thrust(refit: Refit, first: Refit, vehicle: VehicleSettings) -> tuple[
         else each
         for each in refit.estimates.parameters
     )
-    model, estimates = replace(refit.model, parameters=parameters), replace(refit.estimates, parameters=numbers)
+    known = dict(zip(names, parameters.tolist(), strict=True))
+    effects = tuple(
+        each._replace(candidate=each.candidate.at(each.candidate.following(each.linear, known)))
+        for each in refit.model.effects
+    )
+    model = replace(refit.model, parameters=parameters, effects=effects)
+    estimates = replace(refit.estimates, parameters=numbers)
     return replace(refit, model=model, estimates=estimates), with_factors(vehicle, rest, rest if yaw else 1.0)
 
 

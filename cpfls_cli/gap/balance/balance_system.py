@@ -11,7 +11,6 @@ from scipy.optimize import minimize_scalar
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Columns, Shape
-from cpfls_cli.effects.registry import VEHICLE_NUMBERS
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.gap.balance.noise_floor import negligible, noise_floor
 from cpfls_cli.gap.balance.weak_flight import Candidate, CandidateKey, WeakFlight, actuated, columns_of, nuisance
@@ -134,16 +133,12 @@ class System:
 
         An effect knows its own and those of the vehicle.
         """
-        named = {
-            each.effect.name: dict(zip((n.name for n in each.effect.coefficients), linear[place], strict=False))
-            for each, place in self.places
-        }
-        values = list[float]()
+        (vehicle, own), *_ = self.places
+        of_vehicle = dict(zip((each.name for each in vehicle.effect.coefficients), linear[own], strict=True))
+        places, values = {each.effect.name: place for each, place in self.places}, list[float]()
         for each in self.chosen:
-            known = named[VEHICLE_NUMBERS.name] | named.get(each.effect.name, {})
-            said = (np.nan if shape.follows is None else shape.follows(known) for shape in each.effect.shapes)
-            bounds = (shape.bounds(self.vehicle) for shape in each.effect.shapes)
-            values += [float(np.clip(value, *ends)) for value, ends in zip(said, bounds, strict=True)]
+            said = each.following(linear[places.get(each.effect.name, slice(0))], of_vehicle)
+            values += [said.get(shape.name, np.nan) for shape in each.effect.shapes]
         return np.array(values)
 
     def followed(self, numbers: Array) -> Array:
