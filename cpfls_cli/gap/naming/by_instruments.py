@@ -400,9 +400,9 @@ def _windows_of_runs(found: NamedFit, given: Instruments) -> tuple[list[_Windows
     hypothesis, linear = found.hypothesis, found.estimates.linear
     there = hypothesis.closely
     windows = there.flights[0].windows
-    columns = number_columns(there, linear)
-    columns[..., : len(linear)] += there.base
-    rows = np.concatenate([columns, there.residual_at(linear)[..., None]], axis=2) / found.floor[:, None]
+    # What shapes follow moves them after a step: a ratio of numbers that are hardly known bends too much within one.
+    moving = number_columns(there, linear)[..., len(linear) :]
+    rows = np.concatenate([there.base, moving, there.residual_at(linear)[..., None]], axis=2) / found.floor[:, None]
     own, middles, of_path, of_run = [], [], [], []
     length = found.settings.block_s / windows.period
     # Blocks of a run have consecutive numbers in time, as errors by neighbouring blocks take it.
