@@ -157,7 +157,9 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     numbered = len(set(numbers)) == len(numbers) < len(names) and all(map(str.isdecimal, numbers))
     if 2 * len(numbers) > len(names) and not numbered:
         many = f"{len(numbers)} number{'s' * (len(numbers) > 1)}"
-        raise InputError(f"{path}: has no line of column names, line {line} holds {many}: {NAME_COLUMNS}")
+        along = 1 + sum(bool(own.strip()) for own in lines) < len(numbers)
+        turned = "write a line for each sample, not for each signal, and " * along
+        raise InputError(f"{path}: has no line of column names, line {line} holds {many}: {turned}{NAME_COLUMNS}")
     begun, quotes = [], 0
     for text in lines:
         begun.append(text)
