@@ -29,8 +29,8 @@ class _Listed(NamedTuple):
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read lists of numbers by their path, ``group/name``; keys of records are columns.
 
-    Lists with stamps of their own, as a Crazyflie's client writes them, are laid on those of the longest: a value is
-    interpolated to the stamp that is nearest to its own, and NaN is where none is near.
+    Lists with stamps of their own, as a Crazyflie's client writes them, are laid on the longest that meet most others:
+    a value is interpolated to the stamp that is nearest to its own, and NaN is where none is near.
     """
     del wanted  # A text is parsed as a whole.
     try:
@@ -43,7 +43,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     if len({own.stamps.tobytes() for own in timed if own.stamps is not None}) < 2:
         return LogContents({"": {own.name: own.values for own in listed}})
     rising = [own.stamps for own in timed if own.stamps is not None and np.all(np.diff(own.stamps) > 0)]
-    clock = max(rising, key=len, default=np.empty(0))
+    clock = max(rising, key=lambda own: (sum(_meet(own, other) for other in rising), len(own)), default=np.empty(0))
     columns = {"time": clock}
     for own in timed:
         laid = np.empty(0) if own.values is own.stamps else _laid(own, clock)
@@ -107,6 +107,10 @@ def _numbers(value: Any) -> Array | None:
     if not isinstance(value, list) or len(value) < 2 or not all(isinstance(own, int | float | None) for own in value):
         return None
     return np.array([np.nan if own is None else own for own in value], dtype=float)
+
+
+def _meet(one: Array, two: Array) -> bool:
+    return bool(one[0] <= two[-1] and two[0] <= one[-1])
 
 
 def _laid(own: _Listed, clock: Array) -> Array:

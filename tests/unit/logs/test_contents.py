@@ -344,7 +344,7 @@ def test_lists_of_json_with_stamps_each_are_laid_on_those_of_the_longest(read):
         "imu.w_z": {"time": late.tolist(), "data": (0.5 * late).tolist()},
         "motor.m1": {"time": slow.tolist(), "data": slow.tolist()},
     }
-    cameras = {"time": [9e6, 9e6 + 1, 9e6 + 2], "x": [1, 2, 3], "yaw": [1, 2, 3]}
+    cameras = {"time": list(range(9000, 9150)), "x": list(range(150)), "yaw": list(range(150))}
     contents = read(json.dumps({"drone": signals, "mocap": cameras, "end_time": 7}), "log.json")
     clock, *own = contents.topics[""].values()
     assert names(contents) == ["time", "drone/imu.w_x", "drone/imu.w_z", "drone/motor.m1"]
