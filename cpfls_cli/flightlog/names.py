@@ -408,7 +408,8 @@ def _means_rotors(signal: SignalName, group: ColumnGroup, own: set[str], ends_in
     turning = last - AIMED - ASKED == {"w"} and (asked or len(own) == 1)
     counted = last - AIMED - ASKED == {"n"} and asked
     fast = bool(own & vocabulary.FAST) or (many and (turning or counted or ends_in_speed))
-    motors = last - AIMED == {"m"} or bool(vocabulary.MOTORS & own and not vocabulary.TELEMETRY & own)
+    field = {*words_of(group.pattern.rpartition(".")[2])}
+    motors = {"m"} in (last - AIMED, field - AIMED) or bool(vocabulary.MOTORS & own and not vocabulary.TELEMETRY & own)
     if signal == "rotor_speed":
         return fast and not asked
     return bool(last & ASKED) or "pwm" in own or (asked if fast else motors)

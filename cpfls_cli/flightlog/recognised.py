@@ -30,7 +30,7 @@ _TIME_NAMES: Final = re.compile(
     r"(ts?|time(_?stamp)?)([_ ]?[\[(]?([mun]?s|[mun]?sec|utc)[\])]?)?|tout|stamp|ticks?|sec(onds)?|millis?|mills|micros"
 )
 _TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-# Columns of stamps that a message names, and the share of falls below which one that is only called like them counts.
+# Columns of stamps that a message names, and the share of falls below which one that is called like them counts.
 _REFUSED, _SELDOM = 3, 0.1
 _STEPS_S = (2e-4, 0.5)  # Steps between stamps of logs of flights, s: 5 kHz to 2 Hz.
 _SEVERAL = 3.0  # Times as often that other columns have to come to be preferred.
@@ -166,7 +166,7 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
         changes = len(known) > max(2, 0.5 * len(values)) and np.ptp(known) > 0
         named = usual or "time" in lower or "stamp" in lower
         back = _steps_back(name, values)
-        if changes and back and (usual or (named and float(np.mean(np.diff(known) < 0)) < _SELDOM)):
+        if changes and back and named and float(np.mean(np.diff(known) < 0)) < _SELDOM:
             refused += [f"{back}: keep the rows of one flight, and leave out rows whose stamps are wrong"]
         if changes and not back and (named or units.get(name) == "s"):
             ranks[name] = 0 if lower in ("t", "time") else 1 if usual else 2 if named else 3

@@ -1,5 +1,6 @@
 """What the columns of an unknown log are: signals, units, axes and frames, each with the reason for the guess."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -18,6 +19,7 @@ from cpfls_cli.flightlog.crash import Signs, upright_of
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, find_flown, rotor_shares
 from cpfls_cli.flightlog.names import (
     BY_HAND,
+    ColumnGroup,
     Named,
     column_groups,
     height_columns,
@@ -175,7 +177,8 @@ def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
         return (
             f"a track of positions ({some([*log.names], _SHOWN)}) holds no motion of the body: give the autopilot's log"
         )
-    lone = [name for name in log.names if name.lower() in _AXES]
+    alone = {name: ColumnGroup(name, "one", (name,)).words for name in log.names}
+    lone = [name for name, own in alone.items() if own and {*own} <= _AXES and not re.search(r"\d", name)]
     parts = f"{some(lone, _SHOWN)}: single axes, and a signal takes all three; " if lone else ""
     shown = ", ".join(log.names[:12]) + (", ..." if len(log.names) > 12 else "")
     return f"no column is recognised as a signal of a flight (columns: {shown}): {parts}{BY_HAND}"

@@ -156,8 +156,7 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     # Columns may be numbered, and a row of data may hold words.
     numbered = len(set(numbers)) == len(numbers) < len(names) and all(map(str.isdecimal, numbers))
     if 2 * len(numbers) > len(names) and not numbered:
-        many = f"{len(numbers)} number{'s' * (len(numbers) > 1)}"
-        raise InputError(f"{path}: has no line of column names, line {line} holds {many}: {NAME_COLUMNS}")
+        raise InputError(f"{path}: has no line of column names, line {line} holds {_ways(numbers, lines)}")
     begun, quotes = [], 0
     for text in lines:
         begun.append(text)
@@ -192,6 +191,12 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         names = [own for name, size in parts for own in ([f"{name}[{at}]" for at in range(size)] or [name])]
         first = _spread(first, sizes)
     return _Table(names, first, rows, stated, repeated)
+
+
+def _ways(numbers: Sequence[str], lines: Iterator[str]) -> str:
+    """Say how many numbers stand where names should, and what to write: of fewer lines, a line holds one signal."""
+    turned = "write a line for each sample, not for each signal, and " * (1 + sum(map(bool, lines)) < len(numbers))
+    return f"{len(numbers)} number{'s' * (len(numbers) > 1)}: {turned}{NAME_COLUMNS}"
 
 
 def _numbered(names: Sequence[str], repeated: frozenset[str]) -> list[str]:

@@ -123,6 +123,8 @@ LOG_FORMATS = (
     LogFormat(".hdf5", "HDF5", "HDF5", HDF5_MAGIC, f"{_READERS}matrices", shared=True),
     LogFormat(".mat", "MATLAB", "MATLAB", b"MATLAB ", f"{_READERS}matrices"),
     LogFormat(".npz", "NumPy", "arrays of NumPy", b"", f"{_READERS}matrices"),
+    LogFormat(".json", "JSON", "JSON", b"", f"{_READERS}json_log"),
+    LogFormat(".jsonl", "JSON", "JSON", b"", f"{_READERS}json_log"),
 )
 """The formats in the order in which messages list them."""
 
@@ -346,7 +348,7 @@ _TEXTS: Final = (
         "text with a stamp before each line",
         _AS_CSV,
     ),
-    (rb"[{\[]", "JSON", _AS_CSV),
+    (rb"[{\[]\s*[\"{\[\d-]", "JSON", "let its name end in .json"),
     (rb"\d+\.\d+ \d+ [a-z_0-9]+ ", "a log of Paparazzi", _AS_CSV),
     (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*^[\w/]+:)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),
     # At its beginning words suffice; later, a line of three numbers.
@@ -395,6 +397,6 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
             )
         bare = "take the brackets around each line away, " if numbers.startswith(b"(") else ""
         return "a table of numbers without names", f"{bare}{NAME_COLUMNS}, and let its name end in .csv"
-    if suffix != ".csv" and _NAMED_NUMBERS.match(text):
+    if suffix != ".csv" and _NAMED_NUMBERS.search(text.partition(b"\n")[0]):
         return "text that names each number in each line", _AS_CSV
     return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)

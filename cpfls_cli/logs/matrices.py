@@ -97,7 +97,7 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         way = (
             f" (of something else: {some(others, MOST_LISTED)}): save each signal as an array of numbers"
             if others
-            else ""
+            else ": nothing was logged, or what was is empty"
         )
         raise InputError(f"{path}: holds no vectors or matrices of numbers{way}")
     lost = f"arrays that are no columns of numbers are left out: {some(others, MOST_LISTED)}"

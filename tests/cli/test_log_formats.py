@@ -74,12 +74,12 @@ def test_messages_name_a_new_format(refuse, log_study, tmp_path):
     other.write_text("t\n")
     assert refuse("import", log_study, other, *words) == [
         f"{other}: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl,"
-        " .bfl, .db3, .mcap, .h5, .hdf5, .mat, .npz, .fake, or it must hold one of Parquet, ULog,"
+        " .bfl, .db3, .mcap, .h5, .hdf5, .mat, .npz, .json, .jsonl, .fake, or it must hold one of Parquet, ULog,"
         " ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag, HDF5, MATLAB, Fake,"
         " or a line of column names above numbers"
     ]
-    assert formats.suffixes_in_words().endswith(", .mat, .npz or .fake")
-    assert formats.formats_in_words().endswith(", MATLAB, NumPy, Fake")
+    assert formats.suffixes_in_words().endswith(", .json, .jsonl or .fake")
+    assert formats.formats_in_words().endswith(", NumPy, JSON, Fake")
 
 
 @pytest.mark.usefixtures("fake_format")
@@ -149,6 +149,13 @@ def arrays(save):
     return lambda path: save(path, {"t": TIME, **SIGNALS})
 
 
+def listed(path):
+    """Write the signals as lists, or as a record a line."""
+    columns = {"t": TIME.tolist(), **{name: values.tolist() for name, values in SIGNALS.items()}}
+    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+    path.write_text(json.dumps(columns) if path.suffix == ".json" else "\n".join(map(json.dumps, rows)))
+
+
 def hdf5(path, data):
     with h5py.File(path, "w") as file:
         for name, values in data.items():
@@ -209,6 +216,8 @@ WRITERS = {
     "log.hdf5": (arrays(hdf5), "t", INDEXED),
     "log.mat": (arrays(scipy.io.savemat), "t", INDEXED),
     "log.npz": (arrays(lambda path, data: np.savez(path, **data)), "t", INDEXED),
+    "log.json": (listed, "t", INDEXED),
+    "log.jsonl": (listed, "t", INDEXED),
 }
 BEGINS = {
     "log.ulg": 1e-6 * ulogs.BEGIN,

@@ -59,6 +59,7 @@ def first(names, signal, system=""):
         ("om1 om2 om3 om4 omcmd1 omcmd2 omcmd3 omcmd4", "rotor_command", "omcmd1 omcmd2 omcmd3 omcmd4"),
         ("pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm", "rotor_command", "pwm.m1_pwm pwm.m2_pwm pwm.m3_pwm pwm.m4_pwm"),
         ("u1 u2 u3 u4", "rotor_command", "u1 u2 u3 u4"),
+        ("a/lab.m_1 a/lab.m_2 a/lab.m_3 a/lab.m_4", "rotor_command", "a/lab.m_1 a/lab.m_2 a/lab.m_3 a/lab.m_4"),
         ("w_des1 w_des2 w_des3 w_des4", "rotor_command", "w_des1 w_des2 w_des3 w_des4"),
         ("m1_ref m2_ref m3_ref m4_ref", "rotor_command", "m1_ref m2_ref m3_ref m4_ref"),
         ("own/r/cmd1 own/r/cmd2 own/r/cmd3", "rotor_command", "own/r/cmd1 own/r/cmd2 own/r/cmd3"),

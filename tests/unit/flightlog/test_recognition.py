@@ -522,6 +522,9 @@ def test_what_is_called_like_stamps_and_seldom_falls_is_said_where_there_is_no_c
     flights = {"times of flight": np.arange(2000) % 700 * 0.015, "step time": np.tile([0.02, 0.01], 1000)}
     with pytest.raises(InputError, match=r"^times of flight falls 2 times, first at row 701 of 2000[^;]*; rename"):
         seen(flat_log(own, t=flights))
+    # A time constant that an estimator changes.
+    with pytest.raises(InputError, match=r"^no column of time stamps is recognised"):
+        seen(flat_log(own, t={"T": 0.6 + 0.1 * np.sin(np.arange(2000.0))}, attitude=None))
 
 
 @pytest.mark.parametrize("clock", ["tout", "log/t"])
@@ -688,6 +691,9 @@ def test_a_place_whose_name_does_not_say_so_is_a_guess_where_nothing_shows_it(ow
 def test_single_axes_are_said_to_be_no_signal():
     log = {"": {"t": np.arange(100.0), "Roll": np.arange(100.0) ** 2, "z": np.arange(100.0) ** 3}}
     with pytest.raises(InputError, match=r"Roll, z: single axes, and a signal takes all three; use common names"):
+        recognise(log, {}, {}, "")
+    log = {"": {"t": np.arange(100.0), "pitch_deg": np.arange(100.0) ** 2, "x1": np.arange(100.0) ** 3}}
+    with pytest.raises(InputError, match=r"x1\): pitch_deg: single axes, "):
         recognise(log, {}, {}, "")
     # Of a rotor on a stand, power and torque.
     with pytest.raises(InputError, match=r"P, Q\): use common names"):

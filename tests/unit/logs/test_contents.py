@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import json
 import struct
 import subprocess
 import sys
@@ -314,11 +315,59 @@ def test_the_page_on_import_describes_every_format():
 
 def test_words():
     suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl, .bfl, Crazyflie uSD"
-    suffixes += ", .db3, .mcap, .h5, .hdf5, .mat or .npz"
+    suffixes += ", .db3, .mcap, .h5, .hdf5, .mat, .npz, .json or .jsonl"
     assert suffixes_in_words() == suffixes
     formats = "CSV, Parquet, ULog, ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag"
-    formats += ", HDF5, MATLAB, NumPy"
+    formats += ", HDF5, MATLAB, NumPy, JSON"
     assert formats_in_words() == formats
+
+
+def test_json_holds_columns_or_records_also_one_a_line(read):
+    columns = {"": {"t": [0, 1], "imu/gyro_x": [1, np.nan], "imu/q[0]": [1, 3], "imu/q[1]": [2, 4]}}
+    table = '{"t": [0, 1], "mode": "a", "imu": {"gyro_x": [1, null], "q": [[1, 2], [3, 4]]}}'
+    records = ['{"t": 0, "mode": "a", "imu": {"gyro_x": 1, "q": [1, 2]}}', '{"t": 1, "imu": {"q": [3, 4]}}']
+    for content, name in (
+        (table, "log.json"),
+        (f"[{','.join(records)}]", "log.json"),
+        ("\n".join(records), "log.jsonl"),
+        # A last line that was cut.
+        ("\n".join([*records, '{"t": 2, "im']), "log.jsonl"),
+    ):
+        np.testing.assert_equal(listed(read(content, name)), columns)
+
+
+def test_lists_of_json_with_stamps_each_are_laid_on_those_of_the_longest(read):
+    """As a Crazyflie's client writes what comes in several packets, next to cameras of another clock."""
+    late, slow = 1000 + 10 * np.arange(100) + 4, 1000 + 50 * np.arange(20)
+    signals = {
+        "imu.w_x": {"time": (late - 4).tolist(), "data": list(range(100))},
+        "imu.w_z": {"time": late.tolist(), "data": (0.5 * late).tolist()},
+        "motor.m1": {"time": slow.tolist(), "data": slow.tolist()},
+    }
+    cameras = {"time": list(range(9000, 9150)), "x": list(range(150)), "yaw": list(range(150))}
+    contents = read(json.dumps({"drone": signals, "mocap": cameras, "end_time": 7}), "log.json")
+    clock, *own = contents.topics[""].values()
+    assert names(contents) == ["time", "drone/imu.w_x", "drone/imu.w_z", "drone/motor.m1"]
+    np.testing.assert_array_equal(clock, late - 4)
+    np.testing.assert_array_equal(own[0], range(100))
+    # By the stamps, not by the rows.
+    np.testing.assert_allclose(own[1][1:], 0.5 * clock[1:])
+    assert np.flatnonzero(np.isfinite(own[2])).tolist() == list(range(0, 100, 5))
+    assert contents.warnings == ("of other stamps than most, and left out: mocap/x, mocap/yaw",)
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        ('{"mass": 0.8, "name": "a"}', r"holds no lists of numbers and no records of them"),
+        ('{"t": [0, 1', r"cannot be read as JSON: "),
+        ('{"t": [0, 1e999], "x": [1' + 400 * "0" + ", 2]}", r"cannot be read as JSON: "),
+        (5000 * "[", r"cannot be read as JSON: "),
+    ],
+)
+def test_json_that_holds_no_log_is_refused(read, content, why):
+    with pytest.raises(InputError, match=rf"log\.json: {why}"):
+        read(content, "log.json")
 
 
 def test_a_reader_and_its_package_are_loaded_only_when_used(tmp_path):
@@ -409,6 +458,8 @@ def test_a_log_without_names_says_where_they_go(read):
         read(_rows(","))
     with pytest.raises(InputError, match="line 1 holds 3 numbers"):
         read("1008.24,10901,acc.z,0.01\n1008.25,10902,acc.z,0.02\n")
+    with pytest.raises(InputError, match=r"line 1 holds 9 numbers: write a line for each sample, not for each signal"):
+        read(f"{','.join(map(str, range(9)))}\n" * 4)
     with pytest.raises(InputError, match="line 1 holds 1 number: put"):
         read("0.5\n0.6\n")
     with pytest.raises(InputError, match=r"log\.csv:2: 3 fields, but 1 column names: line 1 has to name each column"):
@@ -765,7 +816,7 @@ def test_what_keeps_hdf5_busy_for_ever(tmp_path, monkeypatch):
 def test_a_file_without_columns(tmp_path):
     with h5py.File(tmp_path / "log.h5", "w") as file:
         file["name"] = "nothing"
-    with pytest.raises(InputError, match=r"log\.h5: holds no vectors or matrices of numbers"):
+    with pytest.raises(InputError, match=r"log\.h5: holds no vectors or matrices of numbers: .* or what was is empty$"):
         log_contents(tmp_path / "log.h5")
 
 
@@ -884,7 +935,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ("a.gpx", b'<?xml version="1.0"?>\n<gpx version="1.1">', "a GPX track", "log of the autopilot"),
         ("a.kml", b"<kml>", "a KML track", "log of the autopilot"),
         ("a.csv", b"<!DOCTYPE html>\n<html>a,b", "a web page", "save the log itself"),
-        ("a.csv", b'{"t": 1,\n', "JSON", "write its numbers as CSV"),
+        ("a.csv", b'{"t": 1,\n', "JSON", "let its name end in .json"),
         ("a.log", b"[2024-06-13 11:56:33.1] [0x7f] Time [s], x [m]\n", "text with a stamp before each line", "as CSV"),
         ("a.log", b"2025-08-14 15:48:34,661 - INFO - Position: x=2, y=0\n", "text with a stamp before each", "as CSV"),
         ("a.csv", b"2025-08-14 15:48:34.661 DEBUG: x=2,y=0\n", "text with a stamp before each line", "as CSV"),
@@ -895,7 +946,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
             "log that the flight controller",
         ),
         ("a.log", b"#DroneDeploy\t2.7\n", "a log of an app", "the log that the autopilot writes"),
-        ("a.txt", b'[{"t": 1}]', "JSON", "write its numbers as CSV"),
+        ("a.txt", b'[{"t": 1}]', "JSON", "let its name end in .json"),
         (
             "a.csv",
             b"layout:\n  dim: []\ndata:\n- 0.5\n- 0.25\n---\nlayout:\n",
@@ -938,6 +989,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
             "write its numbers as CSV",
         ),
         ("a.log", b"t:0.1, x:2e-3, y: 3\n", "text that names each number in each line", "write its numbers as CSV"),
+        ("a.txt", b"1357298 [info] link: ok batt: 0.94 yaw:89.5 z:0.2\n", "text that names each number", "as CSV"),
         ("a.txt", b"Stamp: 9.5, Place: (9.5, -8, 1e3), Angles: (1, -2, 3)\n", "text that names each number", "as CSV"),
         ("a.pkl", b"\x80\x04\x95\xb6\0", "a pickle of Python", "as .npz or CSV, with a name for each column"),
         ("a.bin", b"", "an empty file", "the copy failed"),
