@@ -76,11 +76,11 @@ _ALONE = {
     "drift": (0.05, "rad/s"),
     "scale": (0.1, "1"),
     "battery": (0.05, "1"),
-    "mounting": (0.1, "rad"),
+    "axes": (0.1, "rad"),
 }
 """Of kinds of which each number is a cause: how much it changes where it does, and its unit."""
 
-_FELT = {"mounting x": {"felt y": STANDARD_GRAVITY}, "mounting y": {"felt x": -STANDARD_GRAVITY}}
+_FELT = {"axes x": {"felt y": STANDARD_GRAVITY}, "axes y": {"felt x": -STANDARD_GRAVITY}}
 """What the accelerometer that turns with the gyroscope feels of gravity, m/s^2 for 1 rad."""
 
 _ALIKE = {"delay": 0.3, "lag": 0.5, "gusts": 0.5, "unbalance": 0.5}
@@ -92,7 +92,7 @@ _BY_LOOP = ("gain", "delay")
 _ONE_TOO = ("unbalance",)
 """Of these the kinds of which one number can change as well: rotors that turn alike are hardly separated."""
 
-_AT_ONCE = ("lean", "drift", "mounting")  # Kinds of which all numbers change at once, each by itself.
+_AT_ONCE = ("lean", "drift", "axes")  # Kinds of which all numbers change at once, each by itself.
 
 
 def causes(names: Sequence[str], vehicle: VehicleSettings) -> list[Cause]:

@@ -57,7 +57,7 @@ KINDS: dict[str, Kind] = {
     "turn": Kind("1", 0.02, 0.02, 0.01),  # Squared speed of a rotor over its command, logarithm.
     "unbalance": Kind("1", 0.3, 0.2, 0.2),  # Acceleration that turns with a rotor, amplitude, logarithm.
     "vibration": Kind("1", 0.1, 0.25, 0.3),  # Root mean square above 20 Hz, logarithm.
-    "mounting": Kind("rad", 0.01, 0.0, 0.005),  # Angle of the gyroscope's axes from those of the attitude.
+    "axes": Kind("rad", 0.01, 0.0, 0.005),  # Angle of the gyroscope's axes from those of the attitude.
 }
 """By the first word of a number's name; chance is drawn in this order."""
 
@@ -511,7 +511,7 @@ def _scale(signals: Signals, turns: Array, flies: BoolArray) -> Iterator[_Number
         yield [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:]), whole
     if (whole > 0.5).all():
         angle, left_out = leaving_out(angles, len(x), ENOUGH_BLOCKS)
-        yield [f"mounting {axis}" for axis in _AXES], angle, jackknife_error(left_out)
+        yield [f"axes {axis}" for axis in _AXES], angle, jackknife_error(left_out)
 
 
 def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:

@@ -14,7 +14,7 @@ _BY_CHANCE = (
     "unbalance",
     "swing",
     "drag",
-    "mounting",
+    "axes",
     "battery",
 )  # Kinds of which a good flight can hold too little.
 _OF_THRUST = ("rotor ", "mass", "centre of mass")

@@ -309,16 +309,12 @@ def test_a_lag_that_makes_the_loop_answer_gusts_otherwise_is_no_second_change():
         assert [each.name for each in alone.causes if each.named] == [name]
 
 
-MOUNTED = [*LOADS, "felt x", "felt y", "felt z", "mounting x", "mounting y", "mounting z"]
+MOUNTED = [*LOADS, "felt x", "felt y", "felt z", "axes x", "axes y", "axes z"]
 
 
 @pytest.mark.parametrize(
     ("moved", "cause"),
-    [
-        ({"mounting y": 0.2, "felt x": -0.2 * 9.81}, "mounting"),
-        ({"mounting z": 0.2}, "mounting"),
-        ({"felt x": -0.2 * 9.81}, "felt x"),
-    ],
+    [({"axes y": 0.2, "felt x": -0.2 * 9.81}, "axes"), ({"axes z": 0.2}, "axes"), ({"felt x": -0.2 * 9.81}, "felt x")],
 )
 def test_an_accelerometer_that_is_turned_with_its_gyroscope_is_not_off(moved, cause):
     """It feels gravity along its axes then, and nothing more changed; alone it is off."""

@@ -131,7 +131,7 @@ def test_a_gyroscope_that_is_mounted_turned():
     given, angles = without_velocity(), np.array([0.05, -0.04, 0.08])
     remounted = replace(given, body_rate=given.body_rate @ rotation_matrix(angles[None])[0], name="flight.h5")
     before, today = (flight_numbers(replace(each, name="flight.h5")).values for each in (given, remounted))
-    found = [today[f"mounting {axis}"] - before[f"mounting {axis}"] for axis in "xyz"]
+    found = [today[f"axes {axis}"] - before[f"axes {axis}"] for axis in "xyz"]
     assert found == pytest.approx(angles, abs=0.005)
 
 
