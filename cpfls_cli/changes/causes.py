@@ -11,6 +11,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.changes.reference import thrust_directions
 from cpfls_cli.inertia import symmetric
+from cpfls_cli.units import STANDARD_GRAVITY
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 
@@ -75,8 +76,12 @@ _ALONE = {
     "drift": (0.05, "rad/s"),
     "scale": (0.1, "1"),
     "battery": (0.05, "1"),
+    "axes": (0.1, "rad"),
 }
 """Of kinds of which each number is a cause: how much it changes where it does, and its unit."""
+
+_FELT = {"axes x": {"felt y": STANDARD_GRAVITY}, "axes y": {"felt x": -STANDARD_GRAVITY}}
+"""What the accelerometer that turns with the gyroscope feels of gravity, m/s^2 for 1 rad."""
 
 _ALIKE = {"delay": 0.3, "lag": 0.5, "gusts": 0.5, "unbalance": 0.5}
 """Kinds of which all numbers change at once, and the share of that by which each does so by itself."""
@@ -87,7 +92,7 @@ _BY_LOOP = ("gain", "delay")
 _ONE_TOO = ("unbalance",)
 """Of these the kinds of which one number can change as well: rotors that turn alike are hardly separated."""
 
-_AT_ONCE = ("lean", "drift")  # Kinds of which all numbers change at once, each by itself.
+_AT_ONCE = ("lean", "drift", "axes")  # Kinds of which all numbers change at once, each by itself.
 
 
 def causes(names: Sequence[str], vehicle: VehicleSettings) -> list[Cause]:
@@ -199,7 +204,7 @@ def _shaken_or_not(cause: Cause, numbers: _Numbers) -> Iterator[Cause]:
 def _of_kind(numbers: _Numbers, kind: str) -> Iterator[Cause]:
     """List the causes of single numbers of a kind."""
     usual, unit = _ALONE[kind]
-    each = [usual * numbers.direction({name: 1.0}) for name in numbers.of_kind(kind)]
+    each = [usual * numbers.direction({name: 1.0} | _FELT.get(name, {})) for name in numbers.of_kind(kind)]
     if not each:
         return
     together = np.sum(each, axis=0)

@@ -57,6 +57,7 @@ KINDS: dict[str, Kind] = {
     "turn": Kind("1", 0.02, 0.02, 0.01),  # Squared speed of a rotor over its command, logarithm.
     "unbalance": Kind("1", 0.3, 0.2, 0.2),  # Acceleration that turns with a rotor, amplitude, logarithm.
     "vibration": Kind("1", 0.1, 0.25, 0.3),  # Root mean square above 20 Hz, logarithm.
+    "axes": Kind("rad", 0.01, 0.0, 0.005),  # Angle of the gyroscope's axes from those of the attitude.
 }
 """By the first word of a number's name; chance is drawn in this order."""
 
@@ -66,6 +67,7 @@ _ABOVE_HZ, _ACROSS_HZ = 20.0, 3.0
 what turns with them shows at whatever the log's rate makes of its frequency."""
 
 _TURNING_S = 2.0  # Over which a torque about z is averaged, to see how it goes with the yaw rate.
+_STEADY = 0.1  # Standard deviation of the yaw rate, rad/s, that identifies half of that: below, a flight turns evenly.
 _TURNS_S, _ALIKE = 1.0, 0.03
 """Stretches over which what turns with a rotor adds up: rotors 1 Hz apart are separated. Of those that turn more alike
 each has its share, by the squared size below which a difference of theirs counts as none."""
@@ -121,6 +123,9 @@ class FlightNumbers:
     )
     agility: float = about(
         "acceleration that it is flown with, less its mean, root mean square", unit="m/s^2", gaps=True, default=np.nan
+    )
+    turning: float = about(
+        "mean yaw rate whose torque against the air the shares of thrust hold", unit="rad/s", default=0.0
     )
     period_s: float = about("time from sample to sample", unit="s", gaps=True, default=np.nan)
     flown_at_s: float = about(
@@ -211,6 +216,7 @@ def flight_numbers(signals: Signals, full_voltage: float = 1.0, *, has_gyroscope
         commanded=signals.commanded,
         cable_m=cable,
         agility=agility,
+        turning=_turning(signals, flies),
         period_s=signals.period,
         reversed=tuple(below),
         numbers=numbers_of(values, errors),
@@ -298,9 +304,8 @@ def _thrust_shares(signals: Signals, flies: BoolArray) -> tuple[Array, BoolArray
     """Give what each rotor is asked for over its share of what carries the vehicle, and its logarithm without turning.
 
     A vehicle that turns to one side for most of a flight needs a torque against the air; the share is that at no rate.
+    Where it turns evenly the torque is not separated from the rotors' drag: see `_turning`.
     """
-    from scipy.ndimage import uniform_filter1d
-
     vehicle = signals.vehicle
     factors = np.array([rotor.thrust_factor_n_s2 for rotor in vehicle.rotors])
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
@@ -308,20 +313,40 @@ def _thrust_shares(signals: Signals, flies: BoolArray) -> tuple[Array, BoolArray
     if signals.attitude is not None:
         carried /= np.maximum(signals.rotation[:, 2, 2], 0.2)
     shares = np.asarray(signals.speed**2 * factors * len(factors) / carried[:, None])
-    # Slowly, for the torque that accelerates is nothing then, however late the rotors are logged.
-    slow, rate = (
-        uniform_filter1d(each, max(1, round(_TURNING_S / signals.period)), axis=0, mode="nearest")
-        for each in (shares, signals.body_rate[:, 2:])
-    )
-    values = np.stack(np.broadcast_arrays(shares, slow, slow * rate, rate, rate**2), axis=2)
+    inside, slow, rate = _slowly(signals, flies, shares)
+    columns = (slow, slow * rate, rate, rate**2, np.ones_like(rate))
+    both = shares, signals.body_rate[:, 2:]
+    values = np.stack(np.broadcast_arrays(*both, *(inside[:, None] * each for each in columns)), axis=2)
 
     def straight(means: Array) -> Array:
-        share, slowly, product, turning, square = means.T
-        spread = square - turning**2
-        slope = np.where(spread > 0, (product - turning * slowly) / np.where(spread > 0, spread, 1.0), 0.0)
+        share, turning = means.T[:2]
+        slowly, product, rate, square = means.T[2:6] / np.maximum(means.T[6], 1e-9)
+        slope = (product - rate * slowly) / (square - rate**2 + _STEADY**2)
         return np.asarray(np.log(share - slope * turning))
 
     return values, flies, straight
+
+
+def _slowly(signals: Signals, flies: BoolArray, values: Array) -> tuple[BoolArray, Array, Array]:
+    """Average values and the yaw rate over two seconds, and mark where all of these are flown.
+
+    The torque that accelerates is nothing then, however late the rotors are logged.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    length = max(1, round(_TURNING_S / signals.period))
+    share, slow, rate = (
+        uniform_filter1d(each, length, axis=0, mode="constant")
+        for each in (flies.astype(float), values, signals.body_rate[:, 2:])
+    )
+    return share > 1 - 1e-9, slow, rate
+
+
+def _turning(signals: Signals, flies: BoolArray) -> float:
+    """Give the mean yaw rate, as far as shares of thrust still hold the torque that it takes, rad/s."""
+    inside, _, rate = _slowly(signals, flies, signals.speed)
+    spread = rate[inside].var() if inside.any() else 0.0
+    return float(signals.body_rate[flies, 2].mean() * _STEADY**2 / (spread + _STEADY**2))
 
 
 def _above(values: Array, period: float, hertz: Sequence[float]) -> Array | None:
@@ -414,7 +439,7 @@ def _rotation(signals: Signals, flies: BoolArray) -> Iterator[_Numbers]:
         # Of the gyroscope in the middle of two samples, for the attitude turns from one to the other.
         apart = 0.5 * (signals.body_rate[:-1] + signals.body_rate[1:]) - turns[1:]
         yield _averaged([f"drift {axis}" for axis in _AXES], apart, flies[1:] & flies[:-1], lambda means: means)
-        yield _scale(signals, turns, flies)
+        yield from _scale(signals, turns, flies)
 
 
 def _logarithms(ratios: Array) -> Array:
@@ -459,24 +484,34 @@ def _of_attitude(signals: Signals) -> Array:
     return np.concatenate([vector[:1], vector]) / signals.period
 
 
-def _scale(signals: Signals, turns: Array, flies: BoolArray) -> _Numbers:
-    """Fit the attitude's rate, which is noisier, to the gyroscope's: its scale, a logarithm.
+def _scale(signals: Signals, turns: Array, flies: BoolArray) -> Iterator[_Numbers]:
+    """Fit the attitude's rate, which is noisier, to the gyroscope's: its scale, a logarithm, and how it is turned.
 
     Of windows that no vibration passes, which the attitude does not hold.
     """
     own, inside = _windows(signals, flies, _SWING_S)
     if inside.sum() < FEWEST_WINDOWS:
-        return [], np.zeros(0), np.zeros(0)
+        return
     x, y = (own.average(each)[inside] for each in (signals.body_rate, turns))
     x = x - x.mean(axis=0)
 
     def ratio(kept: BoolArray) -> Array:
         return np.asarray((x[kept] * y[kept]).sum(axis=0) / (x[kept] ** 2).sum(axis=0))
 
+    def angles(kept: BoolArray) -> Array:
+        # Small rotations about each axis, shape (window, axis, rotation), of what the gyroscope's scale leaves.
+        scaled = ratio(kept) * x[kept]
+        turned = np.stack([np.cross(axis, scaled) for axis in np.eye(3)], axis=2)
+        other = y[kept] - y[kept].mean(axis=0) - scaled
+        return np.asarray(np.linalg.lstsq(turned.reshape(-1, 3), other.ravel(), rcond=None)[0])
+
     with np.errstate(invalid="ignore"):
         whole, left_out = leaving_out(ratio, len(x), ENOUGH_BLOCKS)
         scale = -_logarithms(np.vstack([whole, left_out]))
-        return [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:]), whole
+        yield [f"scale {axis}" for axis in _AXES], scale[0], jackknife_error(scale[1:]), whole
+    if (whole > 0.5).all():
+        angle, left_out = leaving_out(angles, len(x), ENOUGH_BLOCKS)
+        yield [f"axes {axis}" for axis in _AXES], angle, jackknife_error(left_out)
 
 
 def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
@@ -492,18 +527,19 @@ def _swing(signals: Signals, flies: BoolArray) -> tuple[float, _Numbers]:
     own, inside = _windows(signals, flies, _SWING_S)
     if signals.attitude is None or signals.velocity is None or inside.sum() < FEWEST_WINDOWS:
         return float("nan"), ([], np.zeros(0), np.zeros(0))
-    assert signals.thrust is not None, "rotor speeds are there"
-    # Over the vehicle's own mass, for a load's is a share of that.
-    drives = signals.rotation[:, :2, 2] * (signals.thrust / vehicle.mass_kg)[:, None]
-    left = own.balance(-drives, signals.velocity[:, :2])[inside]
+    asked = _asked(signals, flies)[:, :2]
+    left = own.balance(-asked, signals.velocity[:, :2])[inside]
     drag = own.average(signals.velocity[:, :2])[inside]
     columns = _LOAD.columns
     assert columns is not None, "the load pulls"
 
     def pull(length: float, damping: float) -> Array:
-        """Give the horizontal pull of a unit mass, shape (window, 2), m/s^2."""
+        """Give the horizontal pull of a unit mass, shape (window, 2), m/s^2.
+
+        With the thrust that carries it, of which nothing is left where it is fixed.
+        """
         along = columns(signals, {"length_m": length, "damping_1_s": damping, "depth_m": 0.0}).direct[:, 3:, _MASS]
-        return own.average(np.einsum("tij,tj->ti", signals.rotation, along)[:, :2])[inside]
+        return own.average(np.einsum("tij,tj->ti", signals.rotation, along)[:, :2] + asked)[inside]
 
     def unexplained(place: Array) -> Array:
         size, y, x = _pulled(left, drag, pull(*np.exp(place)))

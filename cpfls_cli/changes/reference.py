@@ -31,6 +31,8 @@ _BY_VOLTAGE, _VOLTAGE_ERROR = {"thrust": -1.0, "turn": 1.0}, 1.0
 """Power of the voltage that numbers of commands go with, and how far that is off, before any flight: none where
 the autopilot makes up for the battery, the square where it does not."""
 
+_BY_TURNING = 0.05
+"""Torque about z that turning takes against the air: standard deviation, for 1 rad/s, over all rotors' drag."""
 
 _CALM = 1.0  # Acceleration below which flights are flown alike, m/s^2.
 
@@ -53,6 +55,8 @@ class Reference:
     by_agility: Array  # Shape (number,): by how much a number goes with the logarithm of how agile a flight is flown.
     agility_error: Array  # Shape (number,): its standard error; 0 where it does not count.
     agility: float  # That logarithm of the mean; NaN where it does not count.
+    turning: float  # Mean yaw rate whose torque the shares of thrust hold, rad/s.
+    by_turning: Array  # Shape (number,): standard deviation, for 1 rad/s, of what that torque does to each number.
 
     @classmethod
     def of(cls, flights: Sequence[FlightNumbers], names: Sequence[str], vehicle: VehicleSettings) -> Reference:
@@ -78,7 +82,8 @@ class Reference:
         unsure = np.sqrt(noise / (spread + noise / prior)) if np.isfinite(agility) else np.zeros(len(names))
         return cls(
             *(tuple(names), mean, covariance * (1 + 1 / len(flights)), freedom, measured, power, error, voltage),
-            *(slope, unsure, agility),
+            *(slope, unsure, agility, float(np.mean([flight.turning for flight in flights]))),
+            _by_turning(names, vehicle),
         )
 
     def apart(self, flights: Sequence[FlightNumbers]) -> tuple[Array, Array]:
@@ -95,6 +100,8 @@ class Reference:
         unlike = np.abs(more).mean() * self.agility_error
         covariance = self.covariance + np.diag(np.maximum(excess, 0.0))
         covariance += np.outer(unlike, unlike) * 0.5 * (_alike(self.names) + np.eye(len(self.names)))
+        turned = self.turned_more(flights).mean(axis=0)
+        covariance += np.outer(turned, turned)
         voltage = np.array([flight.voltage for flight in flights])
         if np.isfinite(self.voltage) and np.isfinite(voltage).all():
             lower = np.log(voltage / self.voltage)
@@ -107,6 +114,13 @@ class Reference:
         """Compute how much more agile each is flown than the reference, a logarithm, shape (flight,); 0 if unknown."""
         more = _logarithms(flights) - self.agility
         return np.where(np.isfinite(more), more, 0.0)
+
+    def turned_more(self, flights: Sequence[FlightNumbers]) -> Array:
+        """Give what the torque against the air does to numbers of flights that turn unlike the reference.
+
+        A standard deviation that all numbers of a flight have in common, shape (flight, number).
+        """
+        return np.outer([flight.turning - self.turning for flight in flights], self.by_turning)
 
 
 def _logarithms(flights: Sequence[FlightNumbers]) -> Array:
@@ -203,10 +217,8 @@ def usual_covariance(names: Sequence[str], vehicle: VehicleSettings) -> Array:
     sensors = np.array([" ".join(name.split()[:-1]) for name in names])
     apart, together = np.array([kind.apart for kind in kinds]), np.array([kind.together for kind in kinds])
     covariance = np.diag(apart**2) + np.outer(together, together) * (sensors[:, None] == sensors)
-    shares = np.array([name.startswith("thrust ") for name in names])
-    moved = _OFFSET_M * thrust_directions(vehicle).offset
-    covariance[np.ix_(shares, shares)] += moved[:, _placed(names, shares)].T @ moved[:, _placed(names, shares)]
-    return np.asarray(covariance)
+    moved = _OFFSET_M * _of_shares(names, thrust_directions(vehicle).offset)
+    return np.asarray(covariance + moved.T @ moved)
 
 
 @dataclass(frozen=True)
@@ -241,9 +253,15 @@ def thrust_directions(vehicle: VehicleSettings) -> ThrustDirections:
     )
 
 
-def _placed(names: Sequence[str], shares: BoolArray) -> list[int]:
-    """Give the rotor of each share of thrust."""
-    return [int(name.split("M")[-1]) - 1 for name, own in zip(names, shares, strict=True) if own]
+def _by_turning(names: Sequence[str], vehicle: VehicleSettings) -> Array:
+    """Give what the torque against the air usually does to numbers of a vehicle that turns by 1 rad/s."""
+    return _BY_TURNING * _of_shares(names, thrust_directions(vehicle).yaw)
+
+
+def _of_shares(names: Sequence[str], of: Array) -> Array:
+    """Give what shares of thrust do, shape (..., rotor), of numbers by name; 0 of others, shape (..., number)."""
+    own = {f"thrust M{index + 1}": value for index, value in enumerate(np.moveaxis(of, -1, 0))}
+    return np.stack([own.get(name, np.zeros(of.shape[:-1])) for name in names], axis=-1)
 
 
 def kinds_of(names: Sequence[str]) -> list[str]:

@@ -168,6 +168,7 @@ class Row:
     # Shape (flight, number): standard deviation of what is not known for how agile a flight is flown; half of its
     # variance numbers of a kind have in common.
     agility: Array
+    turned: Array  # Shape (flight, number): the same by turning, which all of a flight have in common.
 
     @classmethod
     def of(cls, flights: Sequence[FlightNumbers], reference: Reference, vehicle: VehicleSettings) -> Row:
@@ -184,6 +185,7 @@ class Row:
             voltage=np.outer(known, reference.voltage_error),
             noise=np.sqrt(np.maximum(measured - measured.mean(axis=0), 0.0)),
             agility=np.outer(reference.more_agile(flights), reference.agility_error),
+            turned=reference.turned_more(flights),
         )
 
     def covariance(self, values: Array) -> tuple[Array, Array]:
@@ -214,6 +216,7 @@ class Row:
                 white = np.linalg.solve(lower.T, rng.normal(size=(many, len(self.values))))
                 drawn[own] = np.sqrt(left) * (root[np.ix_(own, own)] @ white)
             noise = rng.normal(size=self.noise.shape) * self.noise
+            noise += rng.normal() * self.turned
             noise += np.sqrt(0.5) * (rng.normal(size=size) + rng.normal(size=size)[kind]) * self.agility
             yield drawn.T + rng.normal(size=size)[kind] * self.voltage + noise
 

@@ -40,9 +40,10 @@ _SCALES: Mapping[str, Callable[[float], float]] = {
     "times": math.exp,
     "ms": lambda size: 1e3 * size,
     "mm": lambda size: 1e3 * size,
+    "°": math.degrees,
 }
 """From the unit of a change to what the table writes: of logarithms of squares the root, or near 0 half of it."""
-_UNITS = {"root": " %", "half": " %", "ln": " %", "times": " times"}
+_UNITS = {"root": " %", "half": " %", "ln": " %", "times": " times", "°": "°"}
 _SHOWN_FIRST = ("rotor M1", "mass", "centre of mass", "vibration", "delay", "gusts")
 """Detection limits, as many as a first screen has room for; of rotors the largest one."""
 
@@ -76,7 +77,8 @@ class _Amount(NamedTuple):
             scale, name = self._scale(unit, least := float(self.sizes[0]))  # type: ignore[arg-type]
             return f"{number(abs(scale(least)) if unit == 'mass' else scale(least), 2)}{name}"
         if self.axes is not None:
-            shown = [f"{number(size.value, 2)} {unit} {ways} {axis}" for size, axis in zip(sizes, self.axes)]  # noqa: B905
+            scale, name = self._scale(unit, 1.0)
+            shown = [f"{number(scale(size.value), 2)}{name} {ways} {axis}" for size, axis in zip(sizes, self.axes)]  # noqa: B905
             return joined([each for each, size in zip(shown, sizes) if _is_clear(size)] or shown)  # noqa: B905
         return joined(self.one(size, unit, ways) for size in sizes)
 

@@ -283,6 +283,14 @@ def flown_unlike(
             f"{_range(then)}; {joined(kinds)} count for less, as they depend on it; take reference flights that are "
             "flown alike"
         )
+    turned = reference.turned_more(today).mean(axis=0)
+    if (np.abs(turned) > _UNLIKE * deviation).any():
+        yaw = np.mean([flight.turning for flight in today])
+        yield (
+            f"turns unlike the reference: evenly, by {yaw:.2f} rad/s about z, where that turns by "
+            f"{reference.turning:.2f} rad/s; a torque about z is uncertain, as turning takes one against the air; take "
+            "flights that turn alike, or both ways"
+        )
 
 
 def _range(values: Sequence[float]) -> str:

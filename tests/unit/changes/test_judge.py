@@ -309,6 +309,21 @@ def test_a_lag_that_makes_the_loop_answer_gusts_otherwise_is_no_second_change():
         assert [each.name for each in alone.causes if each.named] == [name]
 
 
+MOUNTED = [*LOADS, "felt x", "felt y", "felt z", "axes x", "axes y", "axes z"]
+
+
+@pytest.mark.parametrize(
+    ("moved", "cause"),
+    [({"axes y": 0.2, "felt x": -0.2 * 9.81}, "axes"), ({"axes z": 0.2}, "axes"), ({"felt x": -0.2 * 9.81}, "felt x")],
+)
+def test_an_accelerometer_that_is_turned_with_its_gyroscope_is_not_off(moved, cause):
+    """It feels gravity along its axes then, and nothing more changed; alone it is off."""
+    rng = np.random.default_rng(4)
+    change = np.array([moved.get(name, 0.0) for name in MOUNTED])
+    found = changed(flights(1, rng, change, MOUNTED), flights(5, rng, names=MOUNTED), QUAD, rng).causes
+    assert [each.name for each in found if each.named] == [cause]
+
+
 @pytest.mark.parametrize("names", [LOADS, NAMES])
 def test_a_number_beyond_its_limit_is_never_unchanged(names, monkeypatch):
     """In whatever numbers flights are off, alone or with others, and however many flights tell what they differ by."""

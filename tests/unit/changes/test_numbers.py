@@ -10,6 +10,8 @@ from cpfls_cli.changes.numbers import KINDS, flight_numbers, in_flight
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.lag import delayed
+from cpfls_cli.rotations import rotation_matrix
+from cpfls_cli.stages.changed import flown_unlike as said
 from tests.builders.changed_flights import WEAK, flight_table
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
 
@@ -48,22 +50,47 @@ def test_names_and_noise(usual):
     assert np.isnan(usual.voltage)
 
 
-def test_who_turns_to_one_side_against_the_air_has_no_weak_rotors(usual):
+def turning(rate, given):
+    """Turn a hover: a damping about yaw slows the rotors that turn one way, and lets the others turn faster."""
+    spins = np.array([rotor.spin for rotor in VEHICLE.rotors])
+    still = given.speed.mean(axis=0)
+    return replace(
+        given,
+        velocity=None,
+        attitude=PERIOD * np.cumsum(rate)[:, None] * [0.0, 0.0, 1.0],
+        body_rate=rate[:, None] * [0.0, 0.0, 1.0],
+        rotor_speed=still * np.sqrt(1 - 0.1 * rate[:, None] * spins),
+    )
+
+
+def thrusts(signals):
+    values = flight_numbers(replace(signals, name="flight.h5")).values
+    return np.array([values[f"thrust M{index}"] for index in range(1, 5)])
+
+
+def test_who_turns_to_one_side_against_the_air_has_no_weak_rotors():
     """What the rotors of one spin turn more against a damping about yaw goes with the rate, and leaves with it."""
     given = recorded()
-    time = given.time - given.time[0]
-    rate = 0.2 + 0.5 * np.sin(2 * np.pi * time / 6.0)
-    spins = np.array([rotor.spin for rotor in VEHICLE.rotors])
-    # A damping slows those that turn one way and lets the others turn faster.
-    turning = replace(
-        given,
-        body_rate=given.body_rate + rate[:, None] * [0.0, 0.0, 1.0],
-        rotor_speed=given.speed * np.sqrt(1 - 0.1 * rate[:, None] * spins),
-    )
-    found = flight_numbers(turning)
-    for index in range(1, 5):
-        name = f"thrust M{index}"
-        assert found.values[name] == pytest.approx(usual.values[name], abs=0.005)
+    rate = 0.2 + 0.5 * np.sin(2 * np.pi * (given.time - given.time[0]) / 6.0)
+    straight = thrusts(turning(0 * rate, given))
+    assert thrusts(turning(rate, given)) == pytest.approx(straight, abs=0.003)
+
+
+def test_who_turns_evenly_says_nothing_of_a_torque_about_z():
+    """The damping is not separated from the rotors' drag, and shares are as certain as of a flight straight ahead."""
+    given, rng = recorded(), np.random.default_rng(2)
+
+    def numbers(rate, name):
+        return replace(flight_numbers(turning(rate + 0.001 * rng.normal(size=len(given)), given)), name=name)
+
+    before = [numbers(rate, f"{rate}") for rate in (0.0, 0.01, -0.01, 0.02, -0.02)]
+    today = numbers(1.0, "today")
+    assert max(today.errors[f"thrust M{index}"] for index in range(1, 5)) < 0.01
+    assert today.turning == pytest.approx(1.0, abs=0.05)
+    result = changed([today], before, VEHICLE, rng)
+    assert result.p > FALSE_ALARM
+    assert any(note.startswith("turns unlike the reference: ") for note in said(result, [today], before, VEHICLE))
+    assert changed([replace(today, turning=0.0)], before, VEHICLE, rng).p <= FALSE_ALARM
 
 
 def test_a_weak_rotor_is_asked_for_more(usual):
@@ -97,6 +124,22 @@ def test_a_load_on_a_cable():
     assert load.belief > NAMED
     assert load.sizes[0].low < 0.1 < load.sizes[0].high
     assert today.cable_m == pytest.approx(1.0, rel=0.05)
+
+
+def test_a_gyroscope_that_is_mounted_turned():
+    """Against an attitude that is measured by another sensor."""
+    given, angles = without_velocity(), np.array([0.05, -0.04, 0.08])
+    remounted = replace(given, body_rate=given.body_rate @ rotation_matrix(angles[None])[0], name="flight.h5")
+    before, today = (flight_numbers(replace(each, name="flight.h5")).values for each in (given, remounted))
+    found = [today[f"axes {axis}"] - before[f"axes {axis}"] for axis in "xyz"]
+    assert found == pytest.approx(angles, abs=0.005)
+
+
+def test_a_mass_that_is_fixed_does_not_swing(usual):
+    """Whatever it weighs: thrust that is larger than the mass of the config asks for accelerates no load."""
+    heavier = flight_numbers(recorded(replace(VEHICLE, mass_kg=1.2 * VEHICLE.mass_kg)))
+    assert heavier.values["swing"] == pytest.approx(usual.values["swing"], abs=0.01)
+    assert heavier.values["thrust M1"] - usual.values["thrust M1"] == pytest.approx(np.log(1.2), abs=0.05)
 
 
 def test_an_unbalanced_rotor_above_half_of_the_rate():

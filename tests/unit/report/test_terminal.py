@@ -175,7 +175,7 @@ def answer(name, **more):
     ("cause", "sizes", "words", "shows"),
     [
         ("rotor M3", [0.2], "rotor M3 pulls 20 % less (18 to 22 %)", "a rotor that pulls 20 % less"),
-        ("mass", [-0.1], "it is 600 g lighter (540 to 660 g)", "600 g"),
+        ("mass", [-0.1], "it is 600 g lighter (540 to 660 g)", "a mass that differs by 600 g"),
         ("hover", [0.1], "hover needs 10 % more (9.0 to 11 %) thrust: 600 g heavier, or all rotors pull less", None),
         ("load on a cable", [0.1], "600 g (540 to 660 g) hang under it on a cable of 0.70 m", "600 g on a cable"),
         ("centre of mass", [-0.02, 0.01], "the centre of mass lies 20 mm to the back (18 to 22 mm) and 10 mm", None),
@@ -183,11 +183,13 @@ def answer(name, **more):
         ("vibration", [np.log(2)], "it vibrates 2.0 times as strong", "2.0 times the vibration"),
         ("delay", [-0.01], "rotation follows the rotors 10 ms earlier (9.0 to 11 ms)", None),
         ("drift", [0.05, 0.02, 0.01], "the gyroscope is off by 0.050 rad/s about x, 0.020 rad/s about y and", None),
+        ("axes", [0.1, 0.02, 0.01], "the gyroscope is turned by 5.7° about x, 1.1° about y and 0.57° about z", None),
         ("odd thing", [0.5], "odd thing: 0.50", "odd thing: 0.50"),
     ],
 )
 def test_a_change_in_words(cause, sizes, words, shows):
-    assert change_words(found(cause, *sizes, cable_m=0.7), 6.0, ["drift x", "drift y", "drift z"]).startswith(words)
+    names = [f"{kind} {axis}" for kind in ("drift", "axes") for axis in "xyz"]
+    assert change_words(found(cause, *sizes, cable_m=0.7), 6.0, names).startswith(words)
     if shows:
         assert smallest_words(cause, abs(sizes[0]), 6.0) == shows
 
