@@ -201,6 +201,10 @@ def test_a_lag_and_a_delay_of_which_the_sum_is_known_are_not_both_at_their_longe
     assert {round(1e3 * each.delay) for each in trade} >= {10, 30}
     # Half widths of 15 and 10 ms, correlated by -0.96.
     assert max(each.lag + each.delay for each in trade) == pytest.approx(0.05 + 1e-3 * 37**0.5)
+    # Each side of an interval that is skewed is reached.
+    skewed = list(Spread(lag=(0.1, 2.0), delay=(0.5, 1.1), trade=-0.96).corners(plant))
+    assert [min(each.lag for each in skewed), max(each.lag for each in skewed)] == pytest.approx([0.003, 0.06])
+    assert [min(each.delay for each in skewed), max(each.delay for each in skewed)] == pytest.approx([0.01, 0.022])
 
 
 @pytest.mark.parametrize("name", ["px4", "betaflight", "crazyflie"])
