@@ -233,6 +233,16 @@ def test_commands_of_an_autopilot_are_met_half_a_sample_of_the_log_later():
     assert commanded_anew(measured) is measured
 
 
+@pytest.mark.parametrize(("held_s", "lag", "delay"), [(0.01, 0.05, 0.01), (0.02, 0.05, 0.005), (0.05, 0.04, 0.0)])
+def test_commands_of_another_log_are_late_by_half_of_its_own_sample(held_s, lag, delay):
+    model = VehicleModel(vehicle=CROSS, response=RotorResponse(lag_s=0.05, delay_s=0.01), commanded=True, held_s=0.01)
+    other = commanded_anew(model, held_s)
+    assert (other.response.lag_s, other.response.delay_s) == pytest.approx((lag, delay))
+    # Of commands that are of no log they are the same again, as far as a lag is not cut.
+    back = commanded_anew(other).response
+    assert back.lag_s + back.delay_s == pytest.approx(0.065)
+
+
 @pytest.mark.parametrize("name", ["px4", "ardupilot", "crazyflie"])
 def test_the_answer_to_a_step_is_that_of_the_closed_loop(name):
     law = AUTOPILOTS[name].law()
