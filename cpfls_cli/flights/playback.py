@@ -36,7 +36,7 @@ from cpfls_cli.flights.recordings import (
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.playback.errors import MOTION
 from cpfls_cli.playback.flight import LoggedFlight
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import VehicleModel, commanded_anew
 from cpfls_cli.playback.player import made_ready, player_of
 from cpfls_cli.playback.replay import Played
 from cpfls_cli.playback.rotors import Hold
@@ -170,7 +170,8 @@ def _warnings(flight: ReadFlight, stretches: Sequence[slice], signals: Signals) 
 
 def played(model: VehicleModel, flight: LoggedFlight, stated: VehicleSettings) -> Played:
     """Make a flight and a model ready for playback, with the vehicle that the config states to compare with."""
-    along, player = made_ready(model, flight)
+    # A log of another rate holds commands for another time than those that the model was found in.
+    along, player = made_ready(commanded_anew(model, flight.held_s), flight)
     if model.is_rigid_body and model.vehicle == stated and model.fuzzy is None:
         return Played(along, player, player)
     # The stated vehicle has no lag and no filter.

@@ -239,8 +239,10 @@ class Model:
         many = np.broadcast_to(speed, (len(state.rate), speed.shape[1]))
         return one_step(self._whole, state, steady_terms(many), period)
 
-    def fly(self, state: State, rotor_speed: ArrayLike, period: float, hold: Hold = "previous") -> State:
-        """Fly one vehicle along rotor speeds, with the delay and the lag of the model's rotors.
+    def fly(
+        self, state: State, rotor_speed: ArrayLike, period: float, hold: Hold = "previous", *, logged: bool = False
+    ) -> State:
+        """Fly one vehicle along rotor speeds, with the delay and the lag of the model's rotors; raises as `step`.
 
         Parameters
         ----------
@@ -251,28 +253,26 @@ class Model:
         period : float, s
         hold : {"linear", "previous"}
             What a speed is between samples: a straight line, or what it was.
+        logged : bool
+            Whether commands are a log's, which held until the next sample are half a period late already.
 
         Returns
         -------
         State
             At each sample, the first one being what was given; its arrays have time as their first axis.
-
-        Raises
-        ------
-        InputError
-            As `step`.
         """
         import numpy as np
 
         from cpfls_cli.playback.flight import State
+        from cpfls_cli.playback.model import commanded_anew
         from cpfls_cli.playback.player import one_step
 
         speed = np.atleast_2d(np.asarray(rotor_speed, dtype=float))
         self._require_rotors(speed)
         if len(state.rate) != 1:
             raise InputError(f"fly takes one vehicle, the state holds {len(state.rate)}; step takes many")
-        path = [state]
-        for terms in self._whole.response.terms_by_step(speed, period, hold)[:-1]:
+        path, late = [state], period if logged and hold == "previous" else 0.0
+        for terms in commanded_anew(self._whole, late).response.terms_by_step(speed, period, hold)[:-1]:
             path.append(one_step(self._whole, path[-1], terms[None], period))
         return State(*(np.concatenate(parts) for parts in zip(*path, strict=True)))
 
@@ -313,14 +313,14 @@ class Model:
 
     @cached_property
     def _whole(self) -> VehicleModel:
-        """The model with its rotors, as far as a state and rotor speeds alone give its motion."""
+        """The model with its rotors, as far as a state and rotor speeds alone give its motion, as flights show it."""
         from cpfls_cli.flights.models import modelled
-        from cpfls_cli.playback.model import VehicleModel, commanded_anew
+        from cpfls_cli.playback.model import VehicleModel
 
         if self.artifact is None:
             return VehicleModel(vehicle=self._study.vehicle)
         record: Any = self.artifact._record
-        model = commanded_anew(modelled(self._path, record))
+        model = modelled(self._path, record)
         if model.unsimulated:
             parts = ", ".join(model.unsimulated)
             raise InputError(f"{self._path}: holds {parts}, which depends on more than the state; use Model.replay")

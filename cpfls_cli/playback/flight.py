@@ -198,6 +198,11 @@ class LoggedFlight:
         """How often what drives the playback is known, Hz."""
         return self.updated_hz or 1 / self.parts[0].period
 
+    @property
+    def held_s(self) -> float:
+        """For how long it holds a command, s; 0 of measured speeds, and where lines join commands."""
+        return 1 / self.logged_hz if self.parts[0].commanded and self.hold == "previous" else 0.0
+
     @classmethod
     def of(cls, signals: Signals) -> LoggedFlight:
         """Take a flight without pauses; commands stay until the next sample."""

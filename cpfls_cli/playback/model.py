@@ -436,14 +436,19 @@ class VehicleModel:
         return Body.of(self.vehicle, symmetric(self.vehicle.inertia_kg_m2))
 
 
-def commanded_anew(model: VehicleModel) -> VehicleModel:
-    """Make of a model one for commands that are not those of a log.
+def commanded_anew(model: VehicleModel, held_s: float = 0.0) -> VehicleModel:
+    """Make of a model one for commands that are not those of its logs, as those of a log that holds each for a while.
 
     A log shows some of the commands that an autopilot sends. Held from sample to sample they are half a sample late on
-    average, and so much of what is between command and torque the model's lag and delay lack.
+    average, and so much of what is between command and torque the model's lag and delay lack. What a delay is too short
+    for, of a log that holds commands longer, is taken off the lag.
     """
-    behind = replace(model.response, delay_s=model.response.delay_s + 0.5 * model.held_s)
-    return replace(model, response=behind, held_s=0.0) if model.held_s else model
+    if not model.held_s:
+        return model
+    behind, later = model.response, 0.5 * (model.held_s - held_s)
+    lag_s = max(behind.lag_s + min(behind.delay_s + later, 0.0), 0.0)
+    behind = replace(behind, delay_s=max(behind.delay_s + later, 0.0), lag_s=lag_s)
+    return replace(model, response=behind, held_s=held_s)
 
 
 def of_thrust(lever: Acts) -> Acts:

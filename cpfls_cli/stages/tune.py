@@ -422,8 +422,10 @@ def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tu
     of_yaw = _ratio_by_bounds(record)
     for key in (*INERTIA[:3], THRUST, DRAG, LAG, DELAY):
         each = known[key]
-        # A lag or a delay that flights leave open is open here too: nothing else is known of it.
-        used = each.determined or key in (LAG, DELAY)
+        # What else flights leave open is open here too, for nothing else is known of it; but of a drag factor that is
+        # open together with Izz the ratio is.
+        whole = key == DRAG and (of_yaw or FOUND_AS[INERTIA[2]] in record.not_determined)
+        used = each.determined or not (key in INERTIA or whole)
         if used and each.value and each.low is not None and each.high is not None:
             # Of commands that are not a log's the delay is longer, by what is known. An end at or below zero says no
             # more than that the number is small.
@@ -447,10 +449,17 @@ def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tu
         )
         intervals[LAG] = _ASSUMED_LAG
     named = {"lag": intervals.get(LAG, (1.0, 1.0)), "delay": intervals.get(DELAY, (1.0, 1.0))} | intervals
-    delayed = 0.0 if model.commanded else _ASSUMED_DELAYED
     axes = [spread_of(named, INERTIA[axis], DRAG if axis == 2 else THRUST) for axis in range(3)]
     names = [each.name for each in record.numbers]
     late = [names.index(FOUND_AS[key]) for key in (LAG, DELAY) if FOUND_AS[key] in names]
+    delayed = 0.0 if model.commanded else _ASSUMED_DELAYED
+    if model.commanded and LAG in intervals and DELAY not in intervals:
+        # A delay as short as a lag is open acts like it, and no flight tells them apart.
+        delayed = min(max(intervals[LAG][1] - 1, 0.0), _ASSUMED_DELAYED)
+        assumed.append(
+            f"delay: flights show a lag alone; up to {100 * delayed:.2g} % of it, by its interval, may be a delay, and "
+            "margins hold there too"
+        )
     trade = float(record.correlation[late[0], late[1]]) if len(late) > 1 else 0.0
     return tuple(replace(each, delayed=delayed, trade=trade) for each in axes), assumed
 

@@ -472,9 +472,9 @@ def _judged(
 
 
 def held_s(flights: Sequence[LoggedFlight]) -> float:
-    """Give for how long flights, as they are logged, hold a command, on average, s."""
-    held = (1 / flight.logged_hz for flight in flights if flight.parts[0].commanded and flight.hold == "previous")
-    return sum(held) / len(flights)
+    """Give for how long flights of commands, as they are logged, hold one, on average, s."""
+    held = [flight.held_s for flight in flights if flight.parts[0].commanded]
+    return sum(held) / max(len(held), 1)
 
 
 def _held_out(vehicle: VehicleFit, flights: Sequence[LoggedFlight], run: Run, fading_s: float) -> AlongFlights:

@@ -94,17 +94,21 @@ class Spread:
                 )
 
     def _late(self, plant: AxisPlant) -> list[tuple[float, float]]:
-        """Give lags with delays at their ends, s."""
-        (short, long), (soon, late) = self.lag, self.delay
-        wide, deep = 0.5 * (long - short) * plant.lag, 0.5 * (late - soon) * plant.delay
-        if not (self.trade < 0 < min(wide, deep)):
+        """Give lags with delays at their ends, s; of skewed intervals each quarter of the ellipse has its own sides."""
+        found = np.array([plant.lag, plant.delay])
+        # How far down, then up, both reach.
+        reach = np.abs(np.array([self.lag, self.delay]).T - 1) * found
+        if not (self.trade < 0 and reach.any(axis=0).all()):
             ends = product(dict.fromkeys(self.lag), dict.fromkeys(self.delay))
             return [(lag * plant.lag, delay * plant.delay) for lag, delay in ends]
-        shared = self.trade * wide * deep
-        both = max(wide**2 + deep**2 + 2 * shared, 1e-12) ** 0.5
-        steps = ((wide, shared / wide), (shared / deep, deep), ((wide**2 + shared) / both, (deep**2 + shared) / both))
-        signed = [(sign * lag, sign * delay) for lag, delay in steps for sign in (-1, 1)]
-        return [(max(plant.lag + lag, 0.0), max(plant.delay + delay, 0.0)) for lag, delay in signed]
+        late = []
+        for sign, sides in zip((-1, 1), reach, strict=True):
+            both = max((sides**2).sum() + 2 * self.trade * sides.prod(), 1e-12) ** 0.5
+            for share in ((1.0, self.trade), (self.trade, 1.0), (sides + self.trade * sides[::-1]) / both):
+                moved = sign * np.array(share)
+                lag, delay = np.maximum(found + moved * reach[(moved > 0).astype(int), (0, 1)], 0.0).tolist()
+                late.append((lag, delay))
+        return late
 
 
 @dataclass(frozen=True)

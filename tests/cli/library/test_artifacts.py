@@ -3,7 +3,7 @@
 import json
 import shutil
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import pairwise
 
 import matplotlib
@@ -193,6 +193,16 @@ def test_a_vehicle_flies_as_its_export_does(whole, speeds, tmp_path, hold):
     np.testing.assert_allclose(flat(flown)[-1], state, rtol=1e-10, atol=1e-10)
     after = uav["step"](flat(begin)[0], uav["steady"](speeds[0]), PERIOD)
     np.testing.assert_allclose(flat(whole.step(begin, speeds[0], PERIOD))[0], after, rtol=1e-12, atol=1e-12)
+
+
+def test_commands_of_a_log_are_not_late_twice(whole, speeds, tmp_path):
+    """Held from sample to sample they are half a sample late, which those of an autopilot are not."""
+    own = replace(vehicle_models.whole(), commanded=True, held_s=PERIOD, full_voltage=1.0)
+    vehicle_models.write_vehicle(tmp_path / "commands.h5", vehicle_models.vehicle_of(own))
+    model, begin = cpfls_cli.load_model(tmp_path / "commands.h5"), whole.state((0, 0, 1))
+    as_fitted = whole.fly(begin, speeds, PERIOD)
+    np.testing.assert_array_equal(model.fly(begin, speeds, PERIOD, logged=True).rate, as_fitted.rate)
+    assert np.abs(model.fly(begin, speeds, PERIOD).rate - as_fitted.rate).max() > 1e-3
 
 
 def test_many_vehicles_step_side_by_side(whole, speeds):

@@ -8,6 +8,7 @@ import pytest
 
 from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.errors import InputError
+from cpfls_cli.flights.playback import played
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.before_after import errors_by_horizon, played_pairs, worst_stretch
 from cpfls_cli.gap.extended import ExtendedModel, FittedEffect
@@ -17,6 +18,7 @@ from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import made_ready, player_of
 from cpfls_cli.playback.replay import Played, replay
+from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.model import simulated_effects
 from tests.builders.closed_loop_flights import VEHICLE, by_columns, flown, signals_of
 from tests.builders.playback_flights import mean_errors
@@ -190,3 +192,13 @@ def test_the_worst_stretch_is_where_the_model_as_given_is_wrong():
     # The thrust of the front rotor turns the vehicle about y.
     assert found.axis == 1
     np.testing.assert_allclose(found.measured, signals.body_rate[300:500])
+
+
+def test_a_log_is_played_back_with_half_of_its_own_sample():
+    signals = replace(signals_of(flown()), commanded=True)
+    model = VehicleModel(vehicle=VEHICLE, response=RotorResponse(lag_s=0.03, delay_s=0.02), commanded=True)
+    flight = logged(signals)
+    for held_s in (flight.held_s, 0.5 * flight.held_s):
+        own = replace(model, response=replace(model.response, delay_s=0.02 - 0.5 * (flight.held_s - held_s)))
+        pair = played(replace(model, held_s=held_s), flight, VEHICLE)
+        np.testing.assert_allclose(pair.model.rotor, made_ready(own, flight)[1].rotor, rtol=1e-12)

@@ -13,6 +13,7 @@ from cpfls_cli.config.load import parse_config, validate
 from cpfls_cli.errors import ComputationError
 from cpfls_cli.gap.naming.results import GapVerdict
 from cpfls_cli.logs.formats import DATAFLASH_MAGIC
+from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.report.canvas import picture_of
 from cpfls_cli.report.content import command_line
 from cpfls_cli.result import Estimate
@@ -32,10 +33,12 @@ def test_a_command_is_held_for_as_long_as_its_log_says_nothing_new():
     """Not where speeds are measured, nor where lines join commands that are logged rarely."""
 
     def flight(commanded, hold, hz):
-        return SimpleNamespace(parts=[SimpleNamespace(commanded=commanded)], hold=hold, logged_hz=hz)
+        return LoggedFlight((SimpleNamespace(commanded=commanded),), hold, "", (), updated_hz=hz)
 
     assert held_s([flight(True, "previous", 50.0), flight(True, "previous", 100.0)]) == pytest.approx(0.015)
     assert held_s([flight(True, "linear", 20.0), flight(False, "previous", 100.0)]) == 0.0
+    assert held_s([flight(True, "previous", 50.0), flight(False, "linear", 100.0)]) == pytest.approx(0.02)
+    assert held_s([flight(False, "linear", 100.0)]) == 0.0
 
 
 @pytest.mark.parametrize("verdict", [GapVerdict.UNEXPLAINED, GapVerdict.NO_GAP, GapVerdict.NOT_EXCITED])

@@ -201,6 +201,10 @@ def test_a_lag_and_a_delay_of_which_the_sum_is_known_are_not_both_at_their_longe
     assert {round(1e3 * each.delay) for each in trade} >= {10, 30}
     # Half widths of 15 and 10 ms, correlated by -0.96.
     assert max(each.lag + each.delay for each in trade) == pytest.approx(0.05 + 1e-3 * 37**0.5)
+    # Each side of an interval that is skewed is reached.
+    skewed = list(Spread(lag=(0.1, 2.0), delay=(0.5, 1.1), trade=-0.96).corners(plant))
+    assert [min(each.lag for each in skewed), max(each.lag for each in skewed)] == pytest.approx([0.003, 0.06])
+    assert [min(each.delay for each in skewed), max(each.delay for each in skewed)] == pytest.approx([0.01, 0.022])
 
 
 @pytest.mark.parametrize("name", ["px4", "betaflight", "crazyflie"])
@@ -227,6 +231,16 @@ def test_commands_of_an_autopilot_are_met_half_a_sample_of_the_log_later():
         assert (axis.lag, axis.delay) == pytest.approx((0.05, 0.015))
     measured = replace(model, held_s=0.0)
     assert commanded_anew(measured) is measured
+
+
+@pytest.mark.parametrize(("held_s", "lag", "delay"), [(0.01, 0.05, 0.01), (0.02, 0.05, 0.005), (0.05, 0.04, 0.0)])
+def test_commands_of_another_log_are_late_by_half_of_its_own_sample(held_s, lag, delay):
+    model = VehicleModel(vehicle=CROSS, response=RotorResponse(lag_s=0.05, delay_s=0.01), commanded=True, held_s=0.01)
+    other = commanded_anew(model, held_s)
+    assert (other.response.lag_s, other.response.delay_s) == pytest.approx((lag, delay))
+    # Of commands that are of no log they are the same again, as far as a lag is not cut.
+    back = commanded_anew(other).response
+    assert back.lag_s + back.delay_s == pytest.approx(0.065)
 
 
 @pytest.mark.parametrize("name", ["px4", "ardupilot", "crazyflie"])
