@@ -8,15 +8,8 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.result import Estimate, about, part, result
 
 CANNOT_TELL = "CANNOT TELL"  # The verdict where no change could have been detected, or a log is wrong.
-_BY_CHANCE = (
-    "delay",
-    "lag",
-    "unbalance",
-    "swing",
-    "drag",
-    "axes",
-    "battery",
-)  # Kinds of which a good flight can hold too little.
+# Kinds of which a good flight can hold too little.
+_BY_CHANCE = ("delay", "lag", "unbalance", "swing", "axes", "battery")
 _OF_THRUST = ("rotor ", "mass", "centre of mass")
 """Changes one of which has to have a size where shares of thrust are compared, by the beginnings of their names."""
 
