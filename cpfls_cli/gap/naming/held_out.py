@@ -102,8 +102,9 @@ class HeldOut:
         """
         removed = [self._removed(self.before, self.parameters, least)]
         if self.stated is not None:
-            # What effects do may hide what numbers do.
-            removed.append(self._removed(self.stated, self.after, least))
+            # What effects do may hide what numbers do; where they fit to the noise, for else numbers fill in for them.
+            fits = ~(self.size(self.after).floors > CLEAR)
+            removed.append(fits * self._removed(self.stated, self.after, least))
         return np.asarray(np.max(removed, axis=0))
 
     def _removed(self, before: Array, after: Array, least: float) -> Array:
