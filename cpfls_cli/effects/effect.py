@@ -122,7 +122,7 @@ class Effect:
     rivals: Mapping[str, str]  # Effects that look alike, each with the flight that separates them.
     source: str
     coefficients: tuple[Coefficient, ...] = ()  # Physical, as reported; those of `shapes` not among them.
-    optional: int = 0  # How many of the last of these a list or a file may leave out: they are 0.
+    optional: int = 0  # How many of the last of its numbers a list or a file may leave out: they are 0.
     shapes: tuple[Shape, ...] = ()
     # ``columns(signals, shape) -> Columns``, linear in the linear coefficients; of an actuator the change of wrench.
     # Left out, it follows from `acts`; None for what only the audit of the sensors can see.

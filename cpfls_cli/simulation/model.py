@@ -257,7 +257,8 @@ def _by_name(effect: Effect, given: Sequence[float] | Mapping[str, float]) -> di
             raise SettingError(_key(effect.name), f"takes {_wanted(effect)}; {len(given)} given")
         given = dict(zip(names, given, strict=False))
     unknown = [name for name in given if name not in every]
-    unset = [shape.name for shape in effect.shapes if shape.name not in given]
+    needed = names[: len(names) - effect.optional]
+    unset = [shape.name for shape in effect.shapes if shape.name in needed and shape.name not in given]
     if unknown or unset:
         problem = f"has no {', '.join(unknown)}" if unknown else f"needs {', '.join(unset)}"
         raise SettingError(_key(effect.name), f"{problem}; takes {_wanted(effect)}")

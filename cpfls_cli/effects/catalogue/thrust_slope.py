@@ -21,7 +21,8 @@ EFFECT = Effect(
     order=285,
     title="thrust curve of the commands (no square)",
     kind="wrench",
-    formula="dT_i = a k (w_h w_i - w_i^2), drag torque alike,  M = sum r_i x dT_i z,  w_h commanded in hover",
+    formula="dT_i = a k (w_h w_i - w_i^2), drag torque alike;  M = sum r_i x dT_i z,  F_z = (1 + e) sum dT_i,  "
+    "w_h^2 = m g / ((1 + e) sum k)",
     sentence="Thrust rises less steeply with the commands than their square, or more steeply. The torque that turns "
     "the vehicle is then less, or more, than the config says, as if its inertia were another one.",
     coefficients=(
@@ -37,6 +38,7 @@ EFFECT = Effect(
             follows=lambda known: known["thrust_scale"],
         ),
     ),
+    optional=1,
     # Measured speeds have the square of blades; torque alone shows the slope in hover, that of a wrong inertia.
     needs=frozenset({"rotor_speed", "command", "force"}),
     excitation="climbs and drops, with roll and pitch at much and at little thrust",

@@ -105,6 +105,12 @@ def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
     np.testing.assert_array_less(rms(left - expected), between * np.array([2e-5] * 3 + [2e-4] * 3))
 
 
+@pytest.mark.parametrize("given", [[0.4], {"linear": 0.4}, {"linear": 0.4, "thrust_scale": 0.0}])
+def test_a_thrust_curve_needs_its_share_alone(given):
+    (curve,) = simulated_effects({"thrust_slope": given}, VEHICLE).listed
+    assert curve.values == {"linear": 0.4, "thrust_scale": 0.0}
+
+
 def pendulum_wrench(signals, values):
     """Wrench of a load whose hook moves as the flight says, by an adaptive integrator."""
     time, gravity, hook = signals.time, np.array([0.0, 0.0, 9.81]), np.array([0.0, 0.0, -values.get("depth_m", 0.0)])
