@@ -168,8 +168,7 @@ def _stepped(found: NamedFit, sources: Sequence[_Source], fit_error: Array | Non
 
 def _ends(effect: Effect, shape: Shape) -> tuple[float, float]:
     """Bound a shape; the only number of an effect may be 0, where there is no effect."""
-    least = shape.grid[0]
-    return min(least, 0.0) if effect.numbers == (shape,) else least, shape.grid[-1]
+    return 0.0 if effect.numbers == (shape,) else shape.grid[0], shape.grid[-1]
 
 
 def _apart(sources: Sequence[_Source], values: Array, prior: Array, fit_error: Array) -> Array:

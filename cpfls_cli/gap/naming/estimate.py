@@ -241,7 +241,9 @@ def _with_intervals(
     value, *without = np.concatenate([linear, shapes], axis=1)
     half = np.full(len(value), np.inf)
     if len(without) > 1:
-        half = np.hypot(half_width(serial_error(np.array(without)), blocks), _KNOWN_TO * value)
+        # A relative error has the share of the number that it is an error of.
+        whole = value + np.isin([one.name for one in known], list(NUMBERS))
+        half = np.hypot(half_width(serial_error(np.array(without)), blocks), _KNOWN_TO * whole)
     return tuple(
         within(Estimate(one.name, one.unit, float(v), float(v - h), float(v + h), one.bounds(vehicle)))
         for one, v, h in zip(known, value, half, strict=True)
@@ -310,11 +312,11 @@ def earned(
             if refusal is None:
                 break
             refusals.append(refusal)
-            if refusal.in_the_way:
-                # The others are sought again, and may be another way without it.
-                break
             out = [refusal.name]
         found = found.without(out)
+        if refusals and refusals[-1].in_the_way:
+            # The others are sought anew without it.
+            break
     return found, refusals
 
 

@@ -290,7 +290,7 @@ def test_what_follows_from_others_that_did_not_go_far_is_not_asked_for_again_and
 
 
 @pytest.mark.parametrize(
-    ("name", "least"), [("motor_lag", 0.0), ("drag_factor_error", -0.6), ("vertical_descent", 0.4)]
+    ("name", "least"), [("motor_lag", 0.0), ("vertical_descent", 0.4)]
 )
 def test_the_only_number_of_an_effect_may_be_0_and_no_other_shape(name, least):
     effect = CATALOGUE[name]
