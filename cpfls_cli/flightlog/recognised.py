@@ -121,11 +121,16 @@ class LogTable:
             each = [np.interp(time, own, values[:, 0]) if len(time) else time for own, values in clocks]
             return time, np.column_stack(each)
         time = self.clock(topic)
-        rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
-        if len(rows) != len(time):
+        if self.of_other_length(columns):
             return np.empty(0), np.empty((0, len(columns)))
+        rows = np.column_stack([np.asarray(self.topics[topic][self.parts(c)[1]], dtype=float) for c in columns])
         kept, _ = increasing_rows(np.where(np.isfinite(rows).all(axis=1), time, np.nan))
         return time[kept], rows[kept]
+
+    def of_other_length(self, columns: Sequence[str]) -> bool:
+        """Tell whether columns of one topic have more or fewer values than it has stamps."""
+        topic = self.parts(columns[0])[0]
+        return {len(self.topics[topic][self.parts(column)[1]]) for column in columns} != {len(self.clock(topic))}
 
     def without_spikes(self, columns: Sequence[str]) -> Array:
         """Values of columns, each the median of five neighbours: what rotors do takes longer."""

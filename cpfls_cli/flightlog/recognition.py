@@ -96,8 +96,9 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     candidates = recognised.holding_values(log, named)
     if not candidates and log.flat:
         candidates = recognised.holding_values(log, nameless_signals(topics[""], log.clock("")))
+    odd = _of_other_length(log, named)
     if not candidates:
-        raise InputError(_nothing_found(log, named, system))
+        raise InputError(f"{odd}; write as many of each" if odd else _nothing_found(log, named, system))
     dead = [own for own in named if own.signal in ROTORS and len(log.values(own.group.columns[:1])[0])]
     if dead and not candidates.keys() & {*ROTORS}:
         raise InputError(f"no flight in it: the rotors ({dead[0].group.pattern}) never change")
@@ -127,7 +128,7 @@ def recognise(topics: Topics, units: Mapping[str, str], parameters: Parameters, 
     winged, flown = carried.span_s != flown.span_s, carried
     seen = Seen(log, candidates, _part(log, flown), None if shares is None else shares.mean(axis=1))
     seen.warnings += [] if kind is None else [flown.reasons[-1]]
-    seen.warnings += [log.time_doubt] if log.time_doubt else []
+    seen.warnings += [words for words in (log.time_doubt, odd) if words]
     motion_columns.position_by_velocity(seen)
     verdict = read_attitude(seen)
     if verdict is not None and motion_columns.gyroscope_first(seen, verdict.best, rotors.driving):
@@ -160,6 +161,13 @@ def _of_rotors(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) 
         ]
         for name in ROTORS
     }
+
+
+def _of_other_length(log: LogTable, named: Sequence[Named]) -> str:
+    """Name the columns of a flat log that would be signals, had they a value for each stamp."""
+    columns = dict.fromkeys(column for own in named for column in own.group.columns)
+    odd = [name for name in columns if log.flat and log.of_other_length((name,))]
+    return f"more or fewer values than stamps ({log.time_column}), and left out: {some(odd, _SHOWN)}" if odd else ""
 
 
 def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:

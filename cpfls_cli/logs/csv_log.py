@@ -294,13 +294,19 @@ def _seconds(text: str) -> float:
     return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
 
 
-def _number(field: str, path: Path, row: int, column: str) -> float:
+def number_of(field: str) -> float:
+    """Read a number or a time; NaN of nothing."""
     text = field.strip()
     if not text:
         return float("nan")
+    return _seconds(text) if ":" in text else _plain_numbers([text])[0]
+
+
+def _number(field: str, path: Path, row: int, column: str) -> float:
     try:
-        return _seconds(text) if ":" in text else _plain_numbers([text])[0]
+        return number_of(field)
     except ValueError:
+        text = field.strip()
         raise InputError(f"{path}:{row}: column '{column}' = {text[:40]!r}: not a number") from None
 
 

@@ -239,7 +239,7 @@ def foreign_file(path: Path, form: LogFormat | None = None) -> str | None:
     """
     first = _first_line(path)
     known = any(other.magic and other.begins(first) for other in LOG_FORMATS)
-    if form is not None and (known or not (first or form.magic)):
+    if form is not None and (known or not (first or form.magic or form.content == "JSON")):
         return None
     try:
         with path.open("rb") as stream:
@@ -336,6 +336,8 @@ _TRACK: Final = "a track of positions holds no motion of the body; give the log 
 _AS_CSV: Final = "write its numbers as CSV, with a line of column names"
 _AS_BAG: Final = "record a bag (`ros2 bag record`), which has the stamps of its messages"
 _NUMBER: Final = rb"[-+]?\d[\d.]*+(e[-+]?\d+)?+([-+]\d[\d.]*+(e[-+]?\d+)?+[ij])?+"
+# A mapping, or a list of anything; a number alone in brackets is a stamp.
+_JSON: Final = rb"\{\s*\"|\[\s*([\"{\[]|%b\s*,)" % _NUMBER
 _TEXTS: Final = (
     # What the first letters of a text hold, of markup anywhere.
     (rb"(?s:<.*)?<gpx\b", "a GPX track", _TRACK),
@@ -348,7 +350,7 @@ _TEXTS: Final = (
         "text with a stamp before each line",
         _AS_CSV,
     ),
-    (rb"[{\[]\s*[\"{\[\d-]", "JSON", "let its name end in .json"),
+    (_JSON, "JSON", "let its name end in .json"),
     (rb"\d+\.\d+ \d+ [a-z_0-9]+ ", "a log of Paparazzi", _AS_CSV),
     (rb"(?ms:[\w/]+:( [^\n,;]*)?\r?\n.*^---\s*^[\w/]+:)", "YAML, as `ros2 topic echo` prints messages", _AS_BAG),
     # At its beginning words suffice; later, a line of three numbers.
@@ -397,6 +399,6 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
             )
         bare = "take the brackets around each line away, " if numbers.startswith(b"(") else ""
         return "a table of numbers without names", f"{bare}{NAME_COLUMNS}, and let its name end in .csv"
-    if suffix != ".csv" and _NAMED_NUMBERS.search(text.partition(b"\n")[0]):
+    if suffix != ".csv" and not re.match(_JSON, text) and _NAMED_NUMBERS.search(text.partition(b"\n")[0]):
         return "text that names each number in each line", _AS_CSV
     return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)

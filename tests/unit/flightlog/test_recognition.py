@@ -688,6 +688,14 @@ def test_a_place_whose_name_does_not_say_so_is_a_guess_where_nothing_shows_it(ow
     assert not seen(flat_log(own, **others)).signal("position").rivals
 
 
+def test_columns_of_more_or_fewer_values_than_stamps_are_left_out_and_named():
+    own = {"t": np.arange(100.0), **{f"gyro_{axis}": np.arange(100.0 - (axis == "y")) ** 2 for axis in "xyz"}}
+    with pytest.raises(
+        InputError, match=r"^more or fewer values than stamps \(t\), and left out: gyro_y; write as many"
+    ):
+        recognise({"": own}, {}, {}, "")
+
+
 def test_single_axes_are_said_to_be_no_signal():
     log = {"": {"t": np.arange(100.0), "Roll": np.arange(100.0) ** 2, "z": np.arange(100.0) ** 3}}
     with pytest.raises(InputError, match=r"Roll, z: single axes, and a signal takes all three; use common names"):

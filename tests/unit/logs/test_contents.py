@@ -336,6 +336,49 @@ def test_json_holds_columns_or_records_also_one_a_line(read):
         np.testing.assert_equal(listed(read(content, name)), columns)
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        '[["t", "x"], [0, 1], [1, 3]]',
+        # As pandas writes columns, and rows.
+        '{"t": {"0": 0, "1": 1}, "x": {"0": 1, "1": 3}}',
+        '{"0": {"t": 0, "x": 1}, "1": {"t": 1, "x": 3}}',
+        '{"t": ["0", "1"], "x": ["1.0", "3"]}',
+        '{"t": ["1970-01-01T00:00:00Z", "1970-01-01T00:00:01Z"], "x": [1, 3]}',
+        '[{"t": "00:00:00", "x": "1", "mode": "a"}, {"t": "00:00:01", "x": "3", "mode": ""}]',
+        # What parts lines elsewhere is text here.
+        '{"t": 0, "x": 1, "mode": "a\u2028b"}\n{"t": 1, "x": 3}\n',
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_json_of_other_forms(tmp_path, content, encoding):
+    (tmp_path / "log.json").write_text(content, encoding)
+    columns = log_contents(tmp_path / "log.json").topics[""]
+    np.testing.assert_equal({name: columns[name] for name in ("t", "x")}, {"t": [0, 1], "x": [1, 3]})
+
+
+def test_what_is_no_number_in_a_list_of_json_is_missing_and_samples_are_along_the_longer_axis(read):
+    huge = "9" * 5000
+    columns = listed(read(f'{{"t": [0, 1, 2], "w": [1, "off", {huge}], "q": [[1, 2, 3], [4, 5, 6]]}}', "log.json"))[""]
+    np.testing.assert_equal(columns, {"t": [0, 1, 2], "w": [1, np.nan, np.inf], "q[0]": [1, 2, 3], "q[1]": [4, 5, 6]})
+
+
+def test_lists_of_records_in_json_keep_their_stamps(read):
+    """A T next to them is no clock, a stamp that repeats costs its row, and between two turns lies no angle."""
+    stamps = [0.01 * row for row in range(100)]
+    imu = [{"T": 20 + row % 2, "time": stamp, "w": row} for row, stamp in enumerate(stamps)]
+    imu[50]["time"] = imu[49]["time"]
+    pose = [{"time": stamp + 0.005, "yaw": 179 if row < 50 else -179, "mode": "a"} for row, stamp in enumerate(stamps)]
+    late = [{"time": 5 + stamp, "w": 0} for stamp in stamps]
+    contents = read(json.dumps({"imu": imu, "pose": pose, "late": late}), "log.json")
+    columns = contents.topics[""]
+    assert names(contents) == ["time", "imu/T", "imu/w", "pose/yaw"]
+    assert contents.warnings == ("of other stamps than most, or of none that rise, and left out: late/w",)
+    np.testing.assert_allclose(columns["time"], [stamp + 0.005 for stamp in stamps])
+    assert np.isfinite(columns["imu/w"]).sum() >= 98
+    assert set(np.abs(columns["pose/yaw"])) == {179}
+
+
 def test_lists_of_json_with_stamps_each_are_laid_on_those_of_the_longest(read):
     """As a Crazyflie's client writes what comes in several packets, next to cameras of another clock."""
     late, slow = 1000 + 10 * np.arange(100) + 4, 1000 + 50 * np.arange(20)
@@ -353,16 +396,20 @@ def test_lists_of_json_with_stamps_each_are_laid_on_those_of_the_longest(read):
     # By the stamps, not by the rows.
     np.testing.assert_allclose(own[1][1:], 0.5 * clock[1:])
     assert np.flatnonzero(np.isfinite(own[2])).tolist() == list(range(0, 100, 5))
-    assert contents.warnings == ("of other stamps than most, and left out: mocap/x, mocap/yaw",)
+    assert contents.warnings == ("of other stamps than most, or of none that rise, and left out: mocap/x, mocap/yaw",)
 
 
 @pytest.mark.parametrize(
     ("content", "why"),
     [
-        ('{"mass": 0.8, "name": "a"}', r"holds no lists of numbers and no records of them"),
-        ('{"t": [0, 1', r"cannot be read as JSON: "),
-        ('{"t": [0, 1e999], "x": [1' + 400 * "0" + ", 2]}", r"cannot be read as JSON: "),
-        (5000 * "[", r"cannot be read as JSON: "),
+        ('{"mass": 0.8, "name": "a"}', r"holds no numbers over time: write lists of numbers by name"),
+        ("[]", r"holds no numbers over time: "),
+        ('{"t": [0, 1', r"cannot be read as JSON \(.*line 1 column 12.*\): damaged, cut short or not strict"),
+        ('[{"t": 0},\n{"t": 1},\n{"t', r"cannot be read as JSON \(.*line 3 column 2.*\): damaged"),
+        ('{"t": 0}\n{"t": 1}\nnone\n{"t": 3}', r"cannot be read as JSON \(line 3: Expecting value\): damaged"),
+        (5000 * "[", r"is nested too deeply for a log: write lists"),
+        ("t,x\n0,1\n", r"holds no JSON, .*; a table with a line of column names has to end in \.csv"),
+        ("", r"an empty file: nothing was logged"),
     ],
 )
 def test_json_that_holds_no_log_is_refused(read, content, why):
@@ -947,6 +994,7 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
         ),
         ("a.log", b"#DroneDeploy\t2.7\n", "a log of an app", "the log that the autopilot writes"),
         ("a.txt", b'[{"t": 1}]', "JSON", "let its name end in .json"),
+        ("a.txt", b'{"note": "kp: 1, ki: 2, kd: 3", "t": [0, 1]}', "JSON", "let its name end in .json"),
         (
             "a.csv",
             b"layout:\n  dim: []\ndata:\n- 0.5\n- 0.25\n---\nlayout:\n",
