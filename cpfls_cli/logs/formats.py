@@ -399,6 +399,6 @@ def _by_bytes(first: bytes, suffix: str) -> tuple[str, str] | None:
             )
         bare = "take the brackets around each line away, " if numbers.startswith(b"(") else ""
         return "a table of numbers without names", f"{bare}{NAME_COLUMNS}, and let its name end in .csv"
-    if suffix != ".csv" and not re.match(_JSON, text) and _NAMED_NUMBERS.search(text.partition(b"\n")[0]):
+    if suffix != ".csv" and not re.match(_JSON, text) and _NAMED_NUMBERS.search(numbers.partition(b"\n")[0]):
         return "text that names each number in each line", _AS_CSV
     return next(((what, way) for pattern, what, way in _TEXTS if re.match(pattern, text)), None)

@@ -20,6 +20,7 @@ from cpfls_cli.words import some
 _STAMPS = ("time", "timestamp", "t")  # What a list of stamps is called, of the lists next to it, best first.
 _SELDOM = 0.1  # Share of stamps up to which some may repeat or fall; of more there are several flights, or no clock.
 _NEAR = 0.55  # Of the clock's usual step; half of it would lose rows of stamps that lie between two, to rounding.
+_THINNED = 1.5  # Times as often as the clock that a list has to come to be called thinned.
 _JUMP = 0.5  # Share of a signal's range beyond which it jumps, as angles do by a turn: nothing lies between then.
 _FORM = 'lists of numbers by name, `{"t": [...], ...}`, or records of them, `[{...}, {...}]`'
 
@@ -63,8 +64,13 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
         laid = np.empty(0) if own.values is own.stamps else _laid(own, clock)
         columns |= {own.name: laid} if np.isfinite(laid).any() else {}
     left = [own.name for own in listed if own.name not in columns and own.values is not own.stamps]
-    words = f"of other stamps than most, or of none that rise, and left out: {some(left, MOST_LISTED)}"
-    return LogContents({"": columns}, warnings=(words,) if left else ())
+    thinned = [own.name for own in timed if own.name in columns and _rate(own.stamps) > _THINNED * _rate(clock)]
+    said = {
+        "of other stamps than most, or of none that rise, and left out": left,
+        "come more often than the stamps that most meet, and are thinned": thinned,
+    }
+    warnings = tuple(f"{words}: {some(names, MOST_LISTED)}" for words, names in said.items() if names)
+    return LogContents({"": columns}, warnings=warnings)
 
 
 def _parsed(text: str) -> Any:
@@ -158,6 +164,10 @@ def _kept(stamps: Array) -> IntArray:
     kept, dropped = increasing_rows(stamps)
     wrong = dropped["repeated_time"] + dropped["backward_time"]
     return kept if wrong <= _SELDOM * len(stamps) else kept[:0]
+
+
+def _rate(stamps: Array | None) -> float:
+    return 0.0 if stamps is None or len(stamps) < 2 else 1 / float(np.nanmedian(np.diff(stamps)))
 
 
 def _meet(one: Array, two: Array) -> bool:

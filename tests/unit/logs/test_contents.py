@@ -379,6 +379,17 @@ def test_lists_of_records_in_json_keep_their_stamps(read):
     assert set(np.abs(columns["pose/yaw"])) == {179}
 
 
+def test_lists_of_json_that_come_more_often_than_their_clock_are_named(read):
+    groups = {
+        "battery": [0.1 * row for row in range(100)],
+        "imu": [0.01 * row for row in range(500)],
+        "gps": [7 + 0.2 * row for row in range(10)],
+    }
+    contents = read(json.dumps({name: {"t": own, name: own} for name, own in groups.items()}), "log.json")
+    assert len(contents.topics[""]["imu"]) == 100
+    assert contents.warnings == ("come more often than the stamps that most meet, and are thinned: imu",)
+
+
 def test_lists_of_json_with_stamps_each_are_laid_on_those_of_the_longest(read):
     """As a Crazyflie's client writes what comes in several packets, next to cameras of another clock."""
     late, slow = 1000 + 10 * np.arange(100) + 4, 1000 + 50 * np.arange(20)
@@ -1068,3 +1079,7 @@ def test_what_begins_as_numbers_and_goes_on_otherwise_is_said_at_once(tmp_path, 
 @pytest.mark.parametrize("line", ["t,x\n0,1\n", "2025-08-14 15:48:34.1,0.1\n", "2025-08-14 15:48:34 UTC,0.1\n"])
 def test_a_log_is_no_foreign_file(tmp_path, line):
     assert foreign_file(put_file(tmp_path / "a.csv", line)) is None
+
+
+def test_numbers_with_names_in_a_remark_are_none_of_each_line(tmp_path):
+    assert foreign_file(put_file(tmp_path / "a.dat", "# mass: 1, arm: 0.2, cells: 4\nt,x\n0,1\n")) is None
