@@ -253,8 +253,15 @@ def _kind(path: Path) -> Kind | None:
     if _format(path) is not None:
         return "artifact"
     if is_log(path):
-        return "log"
+        # A log may end in .json, and so may a simulator's frame.
+        return None if path.suffix.lower() == ".json" and _is_simulator_file(path) else "log"
     return "config" if path.suffix.lower() in _CONFIGS else None
+
+
+def _is_simulator_file(path: Path) -> bool:
+    from cpfls_cli.simulators.formats import is_simulator_file
+
+    return is_simulator_file(path)
 
 
 def _format(path: Path) -> str | None:
@@ -298,9 +305,7 @@ def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | 
 
 
 def _refuse_simulator_file(path: Path) -> None:
-    from cpfls_cli.simulators.formats import is_simulator_file
-
-    if is_simulator_file(path):
+    if _is_simulator_file(path):
         made = shlex.join(["cpfls", "init", "--from", str(path), "-o", "study.yaml"])
         raise ConfigError(f"{path}: is a simulator's file, not a config (YAML); `{made}` writes one of it")
 

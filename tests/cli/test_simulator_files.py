@@ -129,6 +129,12 @@ def test_the_file_itself_is_no_output(cpfls, folder, tmp_path):
 def test_other_commands_say_how_to_make_a_config(refuse, folder, tmp_path):
     (message,) = refuse("compare", folder / "mine.sdf", folder / "log0.csv", "-o", tmp_path / "gap.h5")
     assert "mine.sdf: is a simulator's file, not a config (YAML); `cpfls init --from " in message
+    # A log may end so, too.
+    frame = put_file(tmp_path / "frame.json", b'{"mass": 2.1, "diagonal_size": 0.4, "hoverThrOut": 0.3}')
+    (message,) = refuse("compare", frame, folder / "log0.csv", "-o", tmp_path / "gap.h5")
+    assert "frame.json: is a simulator's file, not a config (YAML); `cpfls init --from " in message
+    (message,) = refuse("gap", frame, folder / "log0.csv", "-o", tmp_path / "gap")
+    assert "is a log" not in message
 
 
 def test_a_file_that_states_too_little_says_what_to_write(refuse, folder, tmp_path):

@@ -289,9 +289,7 @@ def test_what_follows_from_others_that_did_not_go_far_is_not_asked_for_again_and
     assert by_instruments.by_instruments(found, None).values[-1] == pytest.approx(depth + 0.05)
 
 
-@pytest.mark.parametrize(
-    ("name", "least"), [("motor_lag", 0.0), ("vertical_descent", 0.4)]
-)
+@pytest.mark.parametrize(("name", "least"), [("motor_lag", 0.0), ("vertical_descent", 0.4)])
 def test_the_only_number_of_an_effect_may_be_0_and_no_other_shape(name, least):
     effect = CATALOGUE[name]
     assert _ends(effect, effect.shapes[0]) == (least, effect.shapes[0].grid[-1])
