@@ -310,11 +310,11 @@ def earned(
             if refusal is None:
                 break
             refusals.append(refusal)
-            if refusal.in_the_way:
-                # The others are sought again, and may be another way without it.
-                break
             out = [refusal.name]
         found = found.without(out)
+        if refusals and refusals[-1].in_the_way:
+            # The others are sought again, and may be another way without it.
+            break
     return found, refusals
 
 
