@@ -499,11 +499,12 @@ def _scale(signals: Signals, turns: Array, flies: BoolArray) -> Iterator[_Number
         return np.asarray((x[kept] * y[kept]).sum(axis=0) / (x[kept] ** 2).sum(axis=0))
 
     def angles(kept: BoolArray) -> Array:
-        # Small rotations about each axis, shape (window, axis, rotation), of what the gyroscope's scale leaves.
-        scaled = ratio(kept) * x[kept]
-        turned = np.stack([np.cross(axis, scaled) for axis in np.eye(3)], axis=2)
-        other = y[kept] - y[kept].mean(axis=0) - scaled
-        return np.asarray(np.linalg.lstsq(turned.reshape(-1, 3), other.ravel(), rcond=None)[0])
+        # Small rotations about each axis jointly with scales, shape (window, axis, number): rates about two axes that
+        # go together would be taken for a scale.
+        own, other = (each[kept] - each[kept].mean(axis=0) for each in (x, y))
+        turned = [np.cross(axis, own) for axis in np.eye(3)]
+        columns = np.stack([*turned, *(axis * own for axis in np.eye(3))], axis=2)
+        return np.asarray(np.linalg.lstsq(columns.reshape(-1, 6), other.ravel(), rcond=None)[0][:3])
 
     with np.errstate(invalid="ignore"):
         whole, left_out = leaving_out(ratio, len(x), ENOUGH_BLOCKS)

@@ -101,10 +101,10 @@ class HeldOut:
         0 below visibility, and where no gap is: a mean square of `least` squared floors.
         """
         removed = [self._removed(self.before, self.parameters, least)]
-        if self.stated is not None:
-            # What effects do may hide what numbers do; where they fit to the noise, for else numbers fill in for them.
-            fits = ~(self.size(self.after).floors > CLEAR)
-            removed.append(fits * self._removed(self.stated, self.after, least))
+        if self.stated is not None and not (self.size(self.after).floors > CLEAR).any():
+            # What effects do may hide what numbers do; where no gap is left, for else numbers fill in for formulas:
+            # what is wrong about one axis moves what an effect does about all.
+            removed.append(self._removed(self.stated, self.after, least))
         return np.asarray(np.max(removed, axis=0))
 
     def _removed(self, before: Array, after: Array, least: float) -> Array:

@@ -105,6 +105,17 @@ def test_what_would_have_to_be_impossible_is_no_name(truth, bounded, says):
     assert refusal.in_the_way
 
 
+def test_a_second_one_is_not_refused_before_others_are_sought_without_the_first():
+    known = flights((candidate("com_offset"), [0.004, 0.0]), (candidate("linear_damping"), [0.2, 0.2, 0.1]))
+    narrow, chosen = {"com_offset": 0.001, "linear_damping": 0.05}, []
+    for name, most in narrow.items():
+        bounded = [replace(each, low=-most, high=most) for each in CATALOGUE[name].coefficients]
+        chosen.append(Candidate(replace(CATALOGUE[name], coefficients=bounded, exact=None), {}))
+    found, (refusal,) = earned(known, chosen, best_floor(system(known, chosen)), SETTINGS)
+    assert refusal.in_the_way
+    assert kept(found) == [name for name in narrow if name != refusal.name]
+
+
 def test_a_number_on_its_bound_that_may_be_0_refuses_no_name():
     """Another number shows the effect; the interval of this one is what is possible."""
     coefficients = list(CATALOGUE["com_offset"].coefficients)

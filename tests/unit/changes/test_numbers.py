@@ -10,7 +10,7 @@ from cpfls_cli.changes.numbers import KINDS, flight_numbers, in_flight
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.lag import delayed
-from cpfls_cli.rotations import rotation_matrix
+from cpfls_cli.rotations import body_rate, rotation_matrix
 from cpfls_cli.stages.changed import flown_unlike as said
 from tests.builders.changed_flights import WEAK, flight_table
 from tests.builders.closed_loop_flights import PERIOD, VEHICLE, flown, signals_of
@@ -133,6 +133,21 @@ def test_a_gyroscope_that_is_mounted_turned():
     before, today = (flight_numbers(replace(each, name="flight.h5")).values for each in (given, remounted))
     found = [today[f"axes {axis}"] - before[f"axes {axis}"] for axis in "xyz"]
     assert found == pytest.approx(angles, abs=0.005)
+
+
+def test_a_gyroscope_that_is_turned_about_z_on_paths_that_roll_and_pitch_at_once():
+    """The turn is no scale of the axes, whose rates go together, and its error no larger than without it."""
+    given = without_velocity()
+    time = given.time - given.time[0]
+    roll, apart, yaw = (np.sin(2 * np.pi * time / period) for period in (2.1, 3.4, 6.3))
+    attitude = 0.1 * np.stack([roll, 0.3 * apart - roll, yaw], axis=1)
+    rate = body_rate(attitude, np.gradient(attitude, given.period, axis=0))
+    rate += 1e-3 * np.random.default_rng(3).normal(size=rate.shape)
+    straight = replace(given, attitude=attitude, body_rate=rate, name="flight.h5")
+    turned = replace(straight, body_rate=rate @ rotation_matrix(np.array([[0.0, 0.0, 0.1]]))[0])
+    before, today = flight_numbers(straight), flight_numbers(turned)
+    assert today.values["axes z"] - before.values["axes z"] == pytest.approx(0.1, abs=0.002)
+    assert today.errors["axes z"] < 1.5 * before.errors["axes z"]
 
 
 def test_a_mass_that_is_fixed_does_not_swing(usual):
