@@ -96,9 +96,10 @@ def measure(
     return Simulated.of(time, signals, noise_std, beyond, effects=values_of(flown), tracking=tracking)
 
 
-_AT_LIMITS, _BEYOND_PLAN, _ONE_FREQUENCY, _BAND = 0.1, 3.0, 0.5, 1.25
+_AT_LIMITS, _BEYOND_PLAN, _ONE_FREQUENCY, _BAND, _PERIODS = 0.1, 3.0, 0.5, 1.25, 4
 """Of a limit cycle, at least: share of samples that ask too much of a rotor, body rate off the plan over that of the
-plan, and share of its variance within a factor of one frequency, far beyond what a plan that is hard to fly leaves."""
+plan, share of its variance within a factor of one frequency, and periods of that; a plan that is hard to fly leaves far
+less."""
 
 
 class LimitCycle(NamedTuple):
@@ -140,7 +141,9 @@ def limit_cycle(flight: Simulated, planned: Mapping[str, Array]) -> LimitCycle |
     peak = float(frequency[np.argmax(power)])
     near = (frequency >= peak / _BAND) & (frequency <= peak * _BAND)
     most, asked_for = float(sizes[axis]), float(plan[:, axis].std())
-    if most < _BEYOND_PLAN * asked_for or power[near].sum() < _ONE_FREQUENCY * power.sum():
+    alike = power[near].sum() >= _ONE_FREQUENCY * power.sum()
+    lasting = peak * (flight.time[-1] - flight.time[0]) >= _PERIODS
+    if most < _BEYOND_PLAN * asked_for or not (alike and lasting):
         return None
     return LimitCycle(axis, peak, most, asked_for, limited)
 
