@@ -234,7 +234,7 @@ def check_data(data: dict[str, Any], source: str) -> tuple[Study | None, list[st
     except ValidationError as error:
         errors = [*error.errors(), *_hidden_errors(filled, error.errors())]
         return None, [*missing, *_describe_errors(errors, filled, source)]
-    wrong = missing or [f"{source}: {line}" for line in _no_body(study)]
+    wrong = missing or [f"{source}: {line}" for line in no_body(study, _CORRECTED)]
     wrong = wrong or [_line(location, [why], filled, source) for location, why in _no_vehicle(study.vehicle)]
     return (None if wrong else study), wrong
 
@@ -265,13 +265,13 @@ def gone_lines(data: dict[str, Any], source: str) -> list[str]:
     ]
 
 
-def _no_body(study: Study) -> Iterator[str]:
-    """Refuse, of configs alone, moments of inertia of no body: a principal one is at most the sum of the others.
+def no_body(study: Study, most: float = MEASURED) -> Iterator[str]:
+    """Say which moments of inertia are those of no body: a principal one is at most the sum of the others.
 
-    Of a flat vehicle it is the sum, so that an error in one moment is enough: what flights can correct is not refused.
-    What stands for one that a config leaves open is not stated by it.
+    Of a flat vehicle it is the sum, so that an error in one moment is enough: a config is refused beyond what flights
+    can correct only. What stands for one that a config leaves open is not stated by it.
     """
-    why = why_no_body(study.vehicle, _CORRECTED)
+    why = why_no_body(study.vehicle, most)
     if why and "inertia" not in study.vehicle.unknown:
         yield (
             f"vehicle.inertia_kg_m2 = {json.dumps(study.vehicle.inertia_kg_m2)}: {why}; check the units and the "

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from math import ceil, floor, log10
+from math import ceil, floor, log10, sqrt
 from typing import Final, Literal
 
 import numpy as np
@@ -101,11 +101,17 @@ class Proposal:
 
 
 def propose(
-    logs: Sequence[KnownLog], mass_kg: float | None, arm_m: float | None, *, scale_to_arm: bool = False
+    logs: Sequence[KnownLog],
+    mass_kg: float | None,
+    arm_m: float | None,
+    *,
+    thrust_factor: float | None = None,
+    scale_to_arm: bool = False,
 ) -> Proposal:
     """Make one proposal of what each of several logs is taken for; logs of two vehicles are refused.
 
-    The arm is from the middle to a rotor, m; places that a log states are scaled to it where that is asked for.
+    The arm is from the middle to a rotor, m; places that a log states are scaled to it where that is asked for. With a
+    mass and a thrust factor, N s^2, commands show the largest speed of the rotors.
     """
     winged = next((one for one in logs if one.recognition.winged), None)
     if winged is not None and len(logs) > 1:
@@ -153,7 +159,7 @@ def propose(
         gap_s=max(_LEAST_GAP_S, _rounded_up(_STEPS_BRIDGED * slowest)),
         airframe=airframe,
         rotors=len(airframe.rotors) if airframe else max(one.recognition.rotors for one in logs),
-        speed_max=_speed_max(logs, signals),
+        speed_max=_speed_max(logs, signals, mass_kg, thrust_factor),
         facts=(*([f"written by {logs[0].system}"] if logs[0].system else []), *noted),
         equal=tuple(one.name for one in logs if all(one is not other for other in apart)),
         warnings=tuple(dict.fromkeys((*warnings, *doubts))),
@@ -412,8 +418,10 @@ def airframe_of(logs: Sequence[KnownLog]) -> tuple[Airframe | None, list[str]]:
     return taken, [contradicts] if differ and best.clear else []
 
 
-def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:
-    """Round up what is somewhat above the largest speed; for commands any number will do, and 1000 is taken."""
+def _speed_max(
+    logs: Sequence[KnownLog], signals: Sequence[Guess], mass_kg: float | None, thrust_factor: float | None
+) -> float:
+    """Round up what is somewhat above the largest speed; commands show it by the thrust factor, or 1000 is taken."""
     largest, units = 0.0, {guess.signal: guess.columns.unit for guess in signals}
     unit = units.get("rotor_speed", units.get("rotor_command", "1"))
     for one in logs if unit != "1" else ():
@@ -422,6 +430,10 @@ def _speed_max(logs: Sequence[KnownLog], signals: Sequence[Guess]) -> float:
             changed = guessed is not None and guessed.columns.unit == "rad/s" and unit == "rpm"
             own = float(np.quantile(np.abs(one.recognition.speeds), 0.999))
             largest = max(largest, own * (known_unit("rpm").factor if changed else 1.0))
+    load, rotors = logs[0].recognition.load, logs[0].recognition.rotors
+    if not largest and load is not None and mass_kg is not None and thrust_factor is not None:
+        # Rotors that turn at their shares of it carry the mass.
+        return float(f"{sqrt(mass_kg / (rotors * thrust_factor * load.size)):.4g}")
     return _rounded_up(_ROOM * largest) if largest else 1000.0
 
 

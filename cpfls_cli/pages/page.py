@@ -199,7 +199,8 @@ def sections_of(sources: Sources) -> list[Section]:
         if name == "vehicle" and len(sources.vehicles) > 1:
             made.append(_of_template("vehicles", "vehicles", "The vehicles side by side", sources))
         made += sections
-        if name == "compare":
+        # Gains are for a vehicle that was found, whatever the config states of it.
+        if name == "compare" and any(own.stage != "tune" for own in sources.all):
             made.append(_of_template("stated_vehicle", "stated-vehicle", "Vehicle", sources))
     return [*made, _of_template("provenance", "provenance", "Provenance", sources)]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -94,6 +94,58 @@ def measure(
     )
     beyond = violations(motion.demand, vehicle.rotor_speed_max_rad_s, time)
     return Simulated.of(time, signals, noise_std, beyond, effects=values_of(flown), tracking=tracking)
+
+
+_AT_LIMITS, _BEYOND_PLAN, _ONE_FREQUENCY, _BAND, _PERIODS = 0.1, 3.0, 0.5, 1.25, 4
+"""Of a limit cycle, at least: share of samples that ask too much of a rotor, body rate off the plan over that of the
+plan, share of its variance within a factor of one frequency, and periods of that; a plan that is hard to fly leaves far
+less."""
+
+
+class LimitCycle(NamedTuple):
+    """An axis that oscillates at the limits of the rotors.
+
+    `off`, `planned`: root mean square of the body rate less that of the plan, and of the plan, rad/s; `limited`: share
+    of samples at which one rotor is asked for what it cannot do.
+    """
+
+    axis: int
+    frequency_hz: float
+    off: float
+    planned: float
+    limited: float
+
+
+def limit_cycle(flight: Simulated, planned: Mapping[str, Array]) -> LimitCycle | None:
+    """Find the axis that oscillates most, not as planned, while rotors are asked for what they cannot do.
+
+    Parameters
+    ----------
+    planned : mapping of str to array
+        `attitude` and `attitude_rate`, shape (time, 3) each, at the samples of the flight.
+
+    Returns
+    -------
+    LimitCycle or None
+        None where the loop does not oscillate at its limits.
+    """
+    limited = max((one.samples for one in flight.infeasible), default=0) / flight.samples
+    if limited < _AT_LIMITS or flight.body_rate is None:
+        return None
+    plan = rotations.body_rate(planned["attitude"], planned["attitude_rate"])
+    off = flight.body_rate - plan
+    sizes = off.std(axis=0)
+    axis = int(np.argmax(sizes))
+    power = np.abs(np.fft.rfft(off[:, axis] - off[:, axis].mean())) ** 2
+    frequency = np.fft.rfftfreq(flight.samples, float(np.median(np.diff(flight.time))))
+    peak = float(frequency[np.argmax(power)])
+    near = (frequency >= peak / _BAND) & (frequency <= peak * _BAND)
+    most, asked_for = float(sizes[axis]), float(plan[:, axis].std())
+    alike = power[near].sum() >= _ONE_FREQUENCY * power.sum()
+    lasting = peak * (flight.time[-1] - flight.time[0]) >= _PERIODS
+    if most < _BEYOND_PLAN * asked_for or not (alike and lasting):
+        return None
+    return LimitCycle(axis, peak, most, asked_for, limited)
 
 
 def _logged(

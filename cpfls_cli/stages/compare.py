@@ -17,7 +17,7 @@ from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.identified import IdentifiedModel
 from cpfls_cli.artifacts.job import Job, Progress, go_on
 from cpfls_cli.artifacts.model import MODEL_FLIGHT, LearnedFlight, as_inputs
-from cpfls_cli.config.check import why_no_body
+from cpfls_cli.config.check import no_body
 from cpfls_cli.config.study import Study, generator
 from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.effects.signals import GIVEN, Signals, recorded
@@ -194,7 +194,8 @@ def compare(run: Run, flights: FlightsArgument, model: ModelOption = None) -> Di
     roles = numbered_roles("flight", flights)
     inputs = run.take(roles | ({} if model is None else {"model": model}))
     check_ignored(run.study)
-    warn_of_no_body(run)
+    for why in no_body(run.study):
+        run.note(why)
     with_numbers(run, "compare", model, whole=model is not None and is_found(model))
     read, learned = read_flights(flights, run.study), learned_by(model)
     base = VehicleModel(vehicle=run.study.vehicle) if model is None else read_model(model, run.study)
@@ -271,13 +272,6 @@ def check_ignored(study: Study) -> None:
         if name not in CATALOGUE:
             hint = did_you_mean(name, CATALOGUE, "`cpfls effects` lists all")
             raise ConfigError(f"gap.ignore = {name}: no such effect ({hint})")
-
-
-def warn_of_no_body(run: Run) -> None:
-    """Note an inertia of the config that no body has and that a gap may correct."""
-    why = "" if "inertia" in run.study.vehicle.unknown else why_no_body(run.study.vehicle)
-    if why:
-        run.note(f"vehicle.inertia_kg_m2: {why}")
 
 
 def progress_of(progress: Progress, start: float = 0.0, end: float = 1.0) -> Callable[[float, str], None]:

@@ -14,6 +14,7 @@ from cpfls_cli.artifacts.diagnosis import Diagnosis, Disagreement, Extended
 from cpfls_cli.artifacts.gate import InputFile, format_name, read_origin
 from cpfls_cli.artifacts.job import go_on
 from cpfls_cli.artifacts.model import as_inputs, joined_flights
+from cpfls_cli.config.check import no_body
 from cpfls_cli.config.load import parse_config, stored_study, validate
 from cpfls_cli.errors import ComputationError, InputError, visible
 from cpfls_cli.flights.models import found_vehicle, is_found, learned_by, read_base
@@ -31,7 +32,7 @@ from cpfls_cli.simulators.study import VehicleOf, played
 from cpfls_cli.stage import Filled, Run, stage
 from cpfls_cli.stages import diagnose as of_diagnosis
 from cpfls_cli.stages._numbers import missing_flight, why_no_body_found, with_numbers
-from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, warn_of_no_body, with_seen
+from cpfls_cli.stages.compare import check_ignored, compared, learned_from, progress_of, with_seen
 from cpfls_cli.stages.extend import WORDS, extended
 from cpfls_cli.stages.init import Stated, proposed, taken
 from cpfls_cli.words import joined
@@ -121,7 +122,8 @@ def gap(
     for caution in run.cautions_of("disagreement", "diagnosis"):
         run.caution(caution)
     check_ignored(run.study)
-    warn_of_no_body(run)
+    for why in no_body(run.study):
+        run.note(why)
     # Of a simulator's file the numbers are those that it states, and a model gives those that it leaves open.
     base = read_base(model if of_file is None else None, run.study)
     given, split = _flights(run, flights, held_out, base, [*(inputs[role] for role in trained), *unseen.values()])

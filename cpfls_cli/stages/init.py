@@ -329,7 +329,10 @@ def proposed(
             known.append(replace(one, of_file=own.warnings))
     mass, model = stated.mass_kg, stated.model
     mass = model.mass_kg if mass is None and model is not None else mass
-    proposal = propose(known, mass, stated.arm_m, scale_to_arm=scale_to_arm) if known else None
+    proposal = None
+    if known:
+        thrust = stated.thrust_factor_n_s2
+        proposal = propose(known, mass, stated.arm_m, thrust_factor=thrust, scale_to_arm=scale_to_arm)
     vehicle = None if model is None else of_log(model, proposal, stated.mass_kg, stated.like)
     made = Proposed(
         proposal=proposal,

@@ -15,6 +15,8 @@ from cpfls_cli.arguments import FlownArgument
 from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import format_name
 from cpfls_cli.artifacts.job import require_numbers
+from cpfls_cli.autopilots.law import AXES
+from cpfls_cli.config.check import no_body
 from cpfls_cli.config.study import generator, settings_of
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.effects.scales import hover_speed
@@ -23,9 +25,10 @@ from cpfls_cli.flightlog.results import MOTION, Flight
 from cpfls_cli.flights.path import PlannedPath
 from cpfls_cli.logs.formats import is_log
 from cpfls_cli.report.content import Outcome
-from cpfls_cli.simulation.inverse import measure
+from cpfls_cli.simulation.inverse import LimitCycle, limit_cycle, measure
 from cpfls_cli.simulation.inverse import simulate as fly_exactly
 from cpfls_cli.simulation.model import Simulated, played_gusts, simulated_effects, with_effects
+from cpfls_cli.simulation.settings import ClosedLoopSettings
 from cpfls_cli.stage import Run, stage, stage_named
 from cpfls_cli.stages._flight import FIGURES, STILL_AIR, WORDS, infeasible_sentence
 from cpfls_cli.store import read
@@ -134,6 +137,8 @@ def simulate(
         with settings_of("simulation", run.study):
             closed_loop = replace(run.study.simulation, mode="closed-loop")
         run.study = run.study.model_copy(update={"simulation": closed_loop})
+    for why in no_body(run.study):
+        run.note(why)
     _take_numbers(run, model)
     closed = run.study.simulation.mode == "closed-loop"
     if model is not None and not closed:
@@ -198,9 +203,24 @@ def _closed_loop(run: Run, time: Array, planned: dict[str, Array], model: Vehicl
     if heavy := _too_heavy(study.vehicle if model is None else model.vehicle):
         raise ComputationError(heavy)
     flight = measure(time, planned, study.vehicle, study.simulation, rng, run.progress, model)
+    if (cycle := limit_cycle(flight, planned)) is not None:
+        run.caution(_oscillates(cycle, study.simulation.closed_loop))
     if model is not None and model.gusts is not None and not study.simulation.closed_loop.gusts:
         run.say(STILL_AIR)
     # No gap is measured against a body that is none.
     if run.found is None or not import_module("cpfls_cli.stages._numbers").why_no_body_found(run, run.found):
         run.go_on("gap", run.output, output=run.sibling("gap"))
     return flight
+
+
+def _oscillates(cycle: LimitCycle, settings: ClosedLoopSettings) -> str:
+    """Say that a loop oscillates at the limits of its rotors, and which setting to lower."""
+    own = "yaw_frequency_hz" if AXES[cycle.axis] == "yaw" else "attitude_frequency_hz"
+    key, remedy = f"{own} = {getattr(settings, own):g}", "lower it"
+    if settings.law is not None:
+        key, remedy = "autopilot_parameters", f"lower the gains of {settings.autopilot}; `cpfls tune` finds some"
+    return (
+        f"{AXES[cycle.axis]} oscillates at {cycle.frequency_hz:.2g} Hz at the limits of the rotors (a limit cycle): its"
+        f" body rate is {cycle.off:.3g} rad/s rms off the plan, which has {cycle.planned:.3g}, and a rotor is asked for"
+        f" what it cannot do at {100 * cycle.limited:.2g} % of the samples; simulation.closed_loop.{key}: {remedy}"
+    )

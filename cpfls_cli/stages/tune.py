@@ -260,7 +260,7 @@ def _of_vehicle(
     what = f"gains of cpfls for {model.name}, see {run.output.name}"
     suffix, text = parameter_file(autopilot, gains.firmware, what, gains.parameters)
     run.write_text(run.output.with_suffix(suffix), text, _WRITTEN)
-    run.next.append(("cpfls", "report", run.config, run.output, "-o", run.output.with_suffix(".html")))
+    run.next.append(("cpfls", "report", run.config, model, run.output, "-o", run.output.with_suffix(".html")))
     return replace(gains, warnings=(*refused, *assumed, *gains.warnings, *unheard))
 
 

@@ -426,6 +426,24 @@ def test_constants_that_are_known_are_options(cpfls, proposed, log, tmp_path):
     cpfls.done("compare", tmp_path / "study.yaml", log, "-o", tmp_path / "gap.h5", "--dry-run")
 
 
+@pytest.mark.parametrize("most", [900.0, 4000.0])
+@pytest.mark.parametrize(("scale", "offset"), [(1.0, 0.0), (1000.0, 1000.0)])
+def test_a_thrust_factor_and_the_mass_say_the_largest_speed_that_commands_are_shares_of(
+    proposed, tmp_path, own, most, scale, offset
+):
+    """A right factor of fast rotors would lift nothing at a largest speed that nobody stated."""
+    share = own.speed * 0.6 / own.speed.mean()
+    factor = 9.81 * float(MASS) / (4 * most**2 * (share**2).mean())
+    commands = named(offset + scale * share, "cmd1", "cmd2", "cmd3", "cmd4")
+    log = write_csv(tmp_path / "share.csv", flat_log(own, speed=commands))
+    words = ("--mass", MASS, "--arm", ARM)
+    _, text, data = proposed(log, *words, "--thrust-factor", f"{factor:.6g}")
+    assert data["vehicle"]["rotor_speed_max_rad_s"] == pytest.approx(most, rel=0.05)
+    assert "the thrust factor carries the mass" in " ".join(text.replace("#", "").split())
+    _, _, data = proposed(log, *words, output="open.yaml")
+    assert data["vehicle"]["rotor_speed_max_rad_s"] == 1000.0
+
+
 @pytest.mark.parametrize(("by", "mass"), [("speed", 37.0), ("speed", 44.0), ("command", 44.0), ("accelerometer", 44.0)])
 def test_two_masses_in_one_config_are_said_by_how_much(proposed, tmp_path, own, by, mass):
     """Of two flights with equal propellers, the rotors of the one carry 44 g where those of the other carry 37 g."""

@@ -187,6 +187,25 @@ def test_a_vehicle_that_its_rotors_cannot_carry_is_refused_with_what_to_check(sh
     assert "of the weight at most, so nothing can be flown: check mass_kg" in line
 
 
+def test_an_inertia_that_no_body_has_is_said_with_its_key(short, cpfls, tmp_path):
+    one = ("simulate", *short, "-o", tmp_path / "body.h5")
+    assert "no body" not in cpfls.done(*one).stderr
+    said = cpfls.done(*one, "--set", "vehicle.inertia_kg_m2=[0.6,0.6,1.6]", "--force").stderr
+    assert "vehicle.inertia_kg_m2 = [0.6, 0.6, 1.6]: no body has this inertia" in said
+    assert "check the units and the order" in said
+
+
+def test_a_loop_that_oscillates_at_its_limits_is_said_with_what_to_lower(short, cpfls, tmp_path):
+    hover = tmp_path / "hover.h5"
+    cpfls.done("trajectory", short[0], "--hover", "8", "--excite", "roll,pitch", "-o", hover)
+    for size, oscillates in ((6.5, False), (20.0, True)):
+        law = ("--autopilot", "px4", "--set", f"simulation.closed_loop.autopilot_parameters.MC_ROLL_P={size}")
+        said = cpfls.done("simulate", short[0], hover, *law, "-o", tmp_path / f"{size:g}.h5").stderr
+        assert ("roll oscillates at" in said) == oscillates
+        assert ("autopilot_parameters: lower the gains of px4; `cpfls tune` finds some" in said) == oscillates
+    assert "roll oscillates at" in cpfls("info", tmp_path / "20.h5").stderr
+
+
 def test_lost_flight_is_refused_with_a_remedy(short, refuse, tmp_path):
     words = ("--effect", "parameter_error.thrust_scale=-0.8", "--set", "simulation.closed_loop.deviation_max_m=5")
     (line,) = refuse("simulate", *short, *words, "-o", tmp_path / "flight.h5", code=1)

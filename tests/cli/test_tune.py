@@ -180,6 +180,11 @@ def test_the_page_draws_bode_nichols_and_steps(gains, cpfls, folder):
     page = (folder / "px4.html").read_text()
     for figure in ("tune-1-bode-roll", "tune-1-nichols-yaw", "tune-1-step"):
         assert figure in page
+    # The vehicle of the gains is the one that was found.
+    assert "The vehicle of the study config" not in page
+    assert "study.yaml vehicle.h5 px4.h5 -o" in " ".join(gains["px4"].stdout.replace(f"{folder}/", "").split())
+    cpfls.done("report", folder / "study.yaml", folder / "vehicle.h5", folder / "px4.h5", "-o", folder / "both.html")
+    assert "The vehicle of the study config" in (folder / "both.html").read_text()
 
 
 def test_info_shows_the_answer_again(gains, cpfls, folder):
