@@ -120,6 +120,7 @@ def diagnose(
 
     first = run(last, 0.0)
     if not can or not _left_open(first.diagnosis):
+        progress(1.0, "diagnosis")
         return first
     second = run((), 0.5)
     before, after = (float(np.nanmax(each.diagnosis.gap.after_floors)) for each in (first, second))

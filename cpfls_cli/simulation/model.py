@@ -10,7 +10,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects.effect import Coefficient, Effect, Shape
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.errors import SettingError
 from cpfls_cli.flightlog.results import Flight
@@ -139,7 +139,8 @@ def simulated_effects(
     ----------
     asked : mapping
         By name of the effect: values in the order of the catalogue, coefficients before shapes, or by their names;
-        coefficients without a value are 0.
+        coefficients without a value are 0, and shapes that may be left out follow these and wrong numbers of the
+        vehicle.
 
     Raises
     ------
@@ -148,7 +149,8 @@ def simulated_effects(
     SettingError
         If values are missing, too many or physically impossible, or effects do not go together.
     """
-    chosen = SimulatedEffects(tuple(_checked(name, given, vehicle) for name, given in asked.items()))
+    numbers = _by_name(VEHICLE_NUMBERS, asked.get(VEHICLE_NUMBERS.name, {}), {})
+    chosen = SimulatedEffects(tuple(_checked(name, given, vehicle, numbers) for name, given in asked.items()))
     _refuse_conflict(chosen)
     return chosen
 
@@ -238,17 +240,21 @@ def _refuse_conflict(chosen: SimulatedEffects) -> None:
     raise SettingError(_key(needing[0].name), f"{does}, which a flight with {', '.join(others)} or {last} does not log")
 
 
-def _checked(name: str, given: Sequence[float] | Mapping[str, float], vehicle: VehicleSettings) -> SimulatedEffect:
+def _checked(
+    name: str, given: Sequence[float] | Mapping[str, float], vehicle: VehicleSettings, of_vehicle: Mapping[str, float]
+) -> SimulatedEffect:
     effect = find(name)
     if "rotor_radius" in effect.needs and any(rotor.radius_m is None for rotor in vehicle.rotors):
         raise SettingError(_key(name), "needs vehicle.rotors.radius_m of every rotor")
-    values, flown = _by_name(effect, given), effect.exact or effect
+    values, flown = _by_name(effect, given, of_vehicle), effect.exact or effect
     for number in flown.numbers:
         _refuse_outside(effect, number, values[number.name], number.bounds(vehicle))
     return SimulatedEffect(flown, values)
 
 
-def _by_name(effect: Effect, given: Sequence[float] | Mapping[str, float]) -> dict[str, float]:
+def _by_name(
+    effect: Effect, given: Sequence[float] | Mapping[str, float], of_vehicle: Mapping[str, float]
+) -> dict[str, float]:
     names = [number.name for number in effect.numbers]
     # What only a chosen effect has can be given by its name.
     every = [number.name for number in (effect.exact or effect).numbers]
@@ -262,7 +268,10 @@ def _by_name(effect: Effect, given: Sequence[float] | Mapping[str, float]) -> di
     if unknown or unset:
         problem = f"has no {', '.join(unknown)}" if unknown else f"needs {', '.join(unset)}"
         raise SettingError(_key(effect.name), f"{problem}; takes {_wanted(effect)}")
-    return {name: given.get(name, 0.0) for name in every}
+    values = {name: given.get(name, 0.0) for name in every}
+    known = {**of_vehicle, **{each.name: values[each.name] for each in effect.coefficients}}
+    follow = {each.name: each.follows for each in effect.shapes if each.name not in given}
+    return values | {name: says(known) for name, says in follow.items() if says is not None}
 
 
 def _wanted(effect: Effect) -> str:

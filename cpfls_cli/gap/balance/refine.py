@@ -253,7 +253,7 @@ def refitted(hypothesis: System, weight: Array) -> System:
 
     error, (own, linear, held) = fitted(hypothesis)
     free = np.isnan(said := hypothesis.following(linear))
-    # Coefficients move as the shapes do that follow them, by less than half as far.
+    # Coefficients move with the shapes that follow them, by a share as far: a few rounds leave less than errors are.
     for _ in range(0 if free.all() else 4):
         hypothesis = hypothesis.with_shapes(np.where(np.isnan(said), hypothesis.shape_values, said))
         error, (own, linear, held) = fitted(hypothesis)

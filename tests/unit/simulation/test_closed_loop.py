@@ -109,6 +109,9 @@ def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
 def test_a_thrust_curve_needs_its_share_alone(given):
     (curve,) = simulated_effects({"thrust_slope": given}, VEHICLE).listed
     assert curve.values == {"linear": 0.4, "thrust_scale": 0.0}
+    wrong = {"thrust_scale": 0.2}
+    both = simulated_effects({"thrust_slope": [0.4], "parameter_error": wrong}, VEHICLE)
+    assert both.values("thrust_slope") == {"linear": 0.4, "thrust_scale": 0.2}
 
 
 def pendulum_wrench(signals, values):
