@@ -247,8 +247,10 @@ def _with_intervals(
     return tuple(
         within(Estimate(one.name, one.unit, float(v), float(v - h), float(v + h), one.bounds(vehicle)))
         for one, v, h in zip(known, value, half, strict=True)
-        # A column of zeros leaves its coefficient open: an offset along x, say, where only x is compared.
-        if one in effect.shapes or (np.isfinite(v) and (v != 0 or h != 0 or effect.kind == "parameter"))
+        # A column of zeros leaves its coefficient open: an offset along x, say, where only x is compared. A shape that
+        # follows a number of the vehicle is that number.
+        if (one.name not in NUMBERS if one in effect.shapes else np.isfinite(v))
+        and (v != 0 or h != 0 or one in effect.shapes or effect.kind == "parameter")
     )
 
 

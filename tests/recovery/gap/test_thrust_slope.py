@@ -33,7 +33,8 @@ def named(**known):
 def test_a_curve_of_the_commands_is_no_wrong_inertia(share):
     found = named(share=share)
     assert (found.verdict, [each.name for each in found.effects]) == ("NAMED", ["thrust_slope"])
-    number = found.effects[0].coefficients["linear"]
+    (number,) = found.effects[0].numbers
+    assert number.name == "linear"
     assert number.low < share < number.high
     assert number.value == pytest.approx(share, abs=0.02)
 
