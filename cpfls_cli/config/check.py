@@ -269,7 +269,7 @@ def no_body(study: Study, most: float = MEASURED) -> Iterator[str]:
     """Say which moments of inertia are those of no body: a principal one is at most the sum of the others.
 
     Of a flat vehicle it is the sum, so that an error in one moment is enough: a config is refused beyond what flights
-    can correct only. What stands for one that a config leaves open is not stated by it.
+    can correct only. A guess, where a config leaves the moments open, is not stated by it.
     """
     why = why_no_body(study.vehicle, most)
     if why and "inertia" not in study.vehicle.unknown:

@@ -128,7 +128,7 @@ class LogTable:
         return time[kept], rows[kept]
 
     def of_other_length(self, columns: Sequence[str]) -> bool:
-        """Tell whether columns of one topic have more or fewer values than it has stamps."""
+        """Check whether columns of one topic have more or fewer values than it has stamps."""
         topic = self.parts(columns[0])[0]
         return {len(self.topics[topic][self.parts(column)[1]]) for column in columns} != {len(self.clock(topic))}
 

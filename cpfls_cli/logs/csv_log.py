@@ -194,7 +194,7 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
 
 
 def _ways(numbers: Sequence[str], lines: Iterator[str]) -> str:
-    """Say how many numbers stand where names should, and what to write: of fewer lines, a line holds one signal."""
+    """Say how many numbers are where names should be, and what to write: of fewer lines, a line holds one signal."""
     turned = "write a line for each sample, not for each signal, and " * (1 + sum(map(bool, lines)) < len(numbers))
     return f"{len(numbers)} number{'s' * (len(numbers) > 1)}: {turned}{NAME_COLUMNS}"
 

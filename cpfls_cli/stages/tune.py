@@ -454,7 +454,7 @@ def _spreads(record: Vehicle, model: VehicleModel, rotor_lag: float) -> tuple[tu
     late = [names.index(FOUND_AS[key]) for key in (LAG, DELAY) if FOUND_AS[key] in names]
     delayed = 0.0 if model.commanded else _ASSUMED_DELAYED
     if model.commanded and LAG in intervals and DELAY not in intervals:
-        # A delay as short as a lag is open acts like it, and no flight tells them apart.
+        # A delay as short as a lag is open acts like it, and no flight separates them.
         delayed = min(max(intervals[LAG][1] - 1, 0.0), _ASSUMED_DELAYED)
         assumed.append(
             f"delay: flights show a lag alone; up to {100 * delayed:.2g} % of it, by its interval, may be a delay, and "

@@ -51,11 +51,18 @@ class Candidate(NamedTuple):
         return self._replace(shape={**self.shape, **values})
 
     def following(self, linear: Sequence[float] | Array, of_vehicle: Mapping[str, float]) -> dict[str, float]:
-        """Give what its coefficients and those of the vehicle, by name, say of its shapes, within their bounds."""
+        """Give what its coefficients and those of the vehicle, by name, say of its shapes, within their bounds, if any.
+
+        Of a load whose mass is 0 nothing says how deep its hook is.
+        """
         own = dict(zip((each.name for each in self.effect.coefficients), linear, strict=False))
         known = {**of_vehicle, **own}
         pairs = ((each, each.follows(known)) for each in self.effect.shapes if each.follows is not None)
-        return {each.name: float(np.clip(value, each.grid[0], each.grid[-1])) for each, value in pairs}
+        return {
+            each.name: float(np.clip(value, each.grid[0], each.grid[-1]))
+            for each, value in pairs
+            if not np.isnan(value)
+        }
 
 
 @dataclass(frozen=True, eq=False)

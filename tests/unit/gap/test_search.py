@@ -167,6 +167,14 @@ def test_a_step_that_has_to_be_a_thousandth_is_none(monkeypatch):
     assert start.tried[0] == 1000.0
 
 
+@pytest.mark.parametrize(("mass", "said"), [(0.0, {}), (0.5, {"depth_m": 0.2})])
+def test_of_a_load_without_mass_nothing_says_how_deep_its_hook_is(mass, said):
+    load = candidate("payload", length_m=0.52, damping_1_s=0.1, depth_m=0.0)
+    numbers = {"mass_times_depth": 0.1, "mass": mass}
+    linear = [numbers.get(each.name, 0.0) for each in load.effect.coefficients]
+    assert load.following(linear, {}) == said
+
+
 def test_a_load_whose_mass_goes_as_it_is_fitted_keeps_its_hook(monkeypatch):
     said = iter([[np.nan, np.nan, 0.1]])
     monkeypatch.setattr(System, "following", lambda *_: np.array(next(said, [np.nan] * 3)))
