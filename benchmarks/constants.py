@@ -24,7 +24,7 @@ from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.evaluation import Group
 from cpfls_cli.playback.fit import Fitted, fit, uncertainty, windows_of
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.model import VehicleModel
+from cpfls_cli.playback.model import ModelEffect, VehicleModel
 from cpfls_cli.playback.parameters import MASS
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure
@@ -60,7 +60,7 @@ LAG = "lag.time_constant_s"
 ASKED = {"thrust_factor": "1 %", "drag_factor": "3 %", LAG: "2 ms", "added mass": "3 %"}
 ASKED |= {f"inertia.I{axis}": "3 %" for axis in ("xx", "yy", "zz")}
 ASKED |= {f"place of the added mass, {axis}": "3 mm" for axis in "xy"}
-LINEAR, LARGEST_SPEED, NOMINAL_SPEED = 0.6, 1250.0, 1000.0
+LINEAR, LARGEST_SPEED, NOMINAL_SPEED = 0.45, 1250.0, 1000.0
 """Thrust curve of the flights without rotor speeds; the speed at a command of 1, and what a config says of it."""
 
 NOMINAL = nothing_known(replace(STATED, rotor_speed_max_rad_s=NOMINAL_SPEED))
@@ -178,7 +178,7 @@ def search(_seeds: int) -> None:
     for seed in range(1, SEARCHES + 1):
         rows += searched(f"speeds {seed}", nothing_known(), training(truth(), seed), TRUE_BLOCKS, true_numbers())
     known = {name: value for name, value in true_numbers().items() if name in OF_COMMANDS}
-    rows += searched("commands 1", NOMINAL, without_speeds(1), (*TRUE_BLOCKS, "thrust_law"), known)
+    rows += searched("commands 1", NOMINAL, without_speeds(1), (*TRUE_BLOCKS, "thrust_slope"), known)
     table("constants_search", "flights | blocks too many | missed | number | error | half interval | holds it", rows)
 
 
@@ -210,11 +210,7 @@ def searched(
 
 def curved() -> VehicleModel:
     """Give rotors whose thrust has a linear and a square part, and that hover at the speeds of `truth`."""
-    vehicle, names = truth().vehicle, ("thrust_factor_n_s2", "drag_factor_n_m_s2")
-    rotors = tuple(
-        replace(rotor, **{name: getattr(rotor, name) / (1 + LINEAR) for name in names}) for rotor in vehicle.rotors
-    )
-    return replace(truth(), thrust_linear=LINEAR, vehicle=replace(vehicle, rotors=rotors))
+    return replace(truth(), effects=(*truth().effects, ModelEffect("thrust_slope", {}, np.array([LINEAR]))))
 
 
 def without_speeds(seed: int) -> list[PlaybackFlight]:
@@ -228,7 +224,7 @@ def commands(seeds: int) -> None:
     true = {name: value for name, value in true_numbers().items() if name in OF_COMMANDS}
     for seed in range(1, seeds + 1):
         flights = without_speeds(seed)
-        fitted, numbers = found(NOMINAL, flights, (*TRUE_BLOCKS, "thrust_law"))
+        fitted, numbers = found(NOMINAL, flights, (*TRUE_BLOCKS, "thrust_slope"))
         fits.append(compared(numbers, true))
         speeds = np.concatenate([flight.speed for flight in flights]) / NOMINAL_SPEED
         flew = np.linspace(speeds.min(), speeds.max(), 200)
@@ -245,7 +241,8 @@ def commands(seeds: int) -> None:
 def thrust(model: VehicleModel, speed: Array) -> Array:
     """Compute the thrust of a rotor, N."""
     factor = model.vehicle.rotors[0].thrust_factor_n_s2
-    return np.asarray(factor * (speed**2 + model.thrust_linear * hover_speed(model.vehicle) * speed))
+    share, hover = sum(float(curve.coefficients[0]) for curve in model.thrust_curve), hover_speed(model.vehicle)
+    return np.asarray(factor * ((1 - share) * speed**2 + share * hover * speed))
 
 
 def rotorpy(seeds: int) -> None:

@@ -14,7 +14,7 @@ from cpfls_cli.effects.registry import CENTRE_OF_MASS
 from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.inertia import INERTIA_PARAMETERS, MEASURED, beyond_any_body, more_than_others, six_parameters, symmetric
 from cpfls_cli.playback.errors import FADING, AlongFlights
-from cpfls_cli.playback.parameters import LAW, FoundNumber
+from cpfls_cli.playback.parameters import CURVE, FoundNumber
 from cpfls_cli.playback.vehicle import VehicleFit
 from cpfls_cli.response import spectra
 from cpfls_cli.response.flown import VehicleResponse
@@ -52,7 +52,7 @@ _NAMES = {
 
 _FOUND_NAMES = {found: _NAMES[key] for key, found in FOUND_AS.items()}
 _FOUND_NAMES |= {
-    LAW: "linear part of the thrust",
+    CURVE: "share of the thrust in hover that is linear",
     "slow_actuation.roll_pitch": "share of the slow pole in roll and pitch",
     "slow_actuation.yaw": "share of the slow pole in yaw",
     "slow_actuation.slow_s": "time constant of the slow pole",

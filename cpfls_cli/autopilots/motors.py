@@ -90,22 +90,24 @@ def _clipped(share: Value, functions: Functions) -> Value:
     return functions.smallest(functions.largest(share, 0.0), 1.0)
 
 
-def straightening(curve: ThrustCurve, linear: float, most: float) -> float:
+def straightening(curve: ThrustCurve, share: float, hover: float, most: float) -> float:
     """Find the `expo` of a curve with which thrust comes nearest to a straight line of what is asked for.
 
     Parameters
     ----------
-    linear : float
-        l of what the motors give, ``signal^2 + l signal``.
+    share, hover : float
+        Of the thrust of the motors, how much is linear in the signal in hover, and the signal there.
     most : float
         Largest that may be found.
     """
-    ends = np.array([curve.low, curve.high])
-    least, full = ends**2 + linear * ends
+
+    def thrust(signal: Array) -> Array:
+        return (1 - share) * signal**2 + share * hover * signal
+
+    least, full = thrust(np.array([curve.low, curve.high]))
 
     def bent(expo: float) -> float:
-        signal = replace(curve, expo=expo).signal(_SHARES)
-        given = (signal**2 + linear * signal - least) / (full - least)
+        given = (thrust(replace(curve, expo=expo).signal(_SHARES)) - least) / (full - least)
         return float(((given - _SHARES) ** 2).sum())
 
     tried = np.arange(0.0, most + 0.5 * _TRIED, _TRIED)

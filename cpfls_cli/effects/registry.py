@@ -22,6 +22,9 @@ CENTRE_OF_MASS: Effect = next(known for known in CATALOGUE.values() if known.of_
 SUPPLY: Effect = next(known for known in CATALOGUE.values() if known.actuation and known.actuation.supply)
 """The effect of the voltage of a supply."""
 
+THRUST_CURVE: Effect = next(known for known in CATALOGUE.values() if known.tried_last)
+"""The effect of a thrust that is no square of what drives the rotors."""
+
 
 def effect(name: str) -> Effect:
     """Find an effect by its identifier.

@@ -17,6 +17,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
+from cpfls_cli.effects.registry import THRUST_CURVE
 from cpfls_cli.estimation.estimate import FOLDS, Normal, Prior, conditional_strength, one_step, solve
 from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.inertia import EXPLAINED, FLAT, KNOWN, VISIBLE
@@ -279,7 +280,7 @@ def find_constants(
         return None
     translates = all(flight.translates for flight in flights)
     # At a measured speed a propeller pulls by its square; next to gusts along z another law would join.
-    measured = set[str]() if any(flight.commanded for flight in flights) else {"thrust_law"}
+    measured = set[str]() if any(flight.commanded for flight in flights) else {THRUST_CURVE.name}
     tried = [
         block
         for block in blocks_of(vehicle)

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects import scales
-from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS
+from cpfls_cli.effects.registry import CATALOGUE, CENTRE_OF_MASS, THRUST_CURVE
 from cpfls_cli.estimation.estimate import Prior
 from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, six_parameters, symmetric
 from cpfls_cli.playback.flight import Body, PlaybackFlight
@@ -22,11 +21,11 @@ from cpfls_cli.playback.model import ModelEffect, VehicleModel, learned_wrench, 
 from cpfls_cli.playback.parameters import (
     AS_STATED,
     COUNTED,
+    CURVE,
     DELAY,
     DRAG,
     INERTIA,
     LAG,
-    LAW,
     LEARNED,
     LOG_INERTIA,
     LOG_MASS,
@@ -106,11 +105,26 @@ class ParameterPoint:
 
     @cached_property
     def vehicle(self) -> VehicleSettings:
-        """The vehicle with what was found as its own numbers."""
-        found = with_factors(self.free.vehicle, self.get(THRUST, 1.0), self.get(DRAG, 1.0))
+        """The vehicle with what was found as its own numbers, and rotors that carry it in hover by their squares."""
+        thrust = self._hover[0]
+        found = with_factors(self.free.vehicle, thrust, thrust * float(self._acting_number(DRAG_OVER_THRUST)))
         xx, yy, zz, xy, xz, yz = (float(self.inertia[entry]) for entry in INERTIA_ENTRIES)
         inertia = (xx, yy, zz, xy, xz, yz)
         return replace(found, mass_kg=self.mass, inertia_kg_m2=inertia, unknown=())
+
+    @cached_property
+    def _hover(self) -> tuple[float, float]:
+        """Thrust per squared speed in hover, relative to what is stated, and what share is linear in the speed there.
+
+        A curve of the thrust is fitted as it is where the vehicle as stated hovers; this one hovers elsewhere.
+        """
+        linear, heavier = self.get(CURVE, 0.0), self.mass / self.free.vehicle.mass_kg
+        square = self.get(THRUST, 1.0) - linear
+        # Of thrust that no speed carries the weight with, the largest.
+        root = np.sqrt(max(linear**2 + 4.0 * square * heavier, 0.0))
+        faster = 2.0 * heavier / (linear + root)
+        thrust = heavier / faster**2
+        return float(thrust), float(linear / (thrust * faster))
 
     @cached_property
     def effects(self) -> tuple[ModelEffect, ...]:
@@ -124,21 +138,20 @@ class ParameterPoint:
             known, places = of_vehicle(block, self.vehicle)
             own = np.zeros(len(known.coefficients))
             own[places] = [self.coefficients[number.name] for number in self.free.of_block(block)] * ratio
+            if block == THRUST_CURVE.name:
+                own[0] = self._hover[1]
             effects.append(ModelEffect(block, {}, own))
         return tuple(effects)
 
     @property
     def model(self) -> VehicleModel:
         """The model, with what was found as numbers of the vehicle."""
-        lighter = self.get(THRUST, 1.0) * self.free.vehicle.mass_kg / self.vehicle.mass_kg
         learned = [block for block in self.free.blocks if block in LEARNED]
         names = (number.name for block in learned for number in self.free.of_block(block))
         unnamed = np.array([self.coefficients[name] for name in names])
         return VehicleModel(
             vehicle=self.vehicle,
             response=self.response,
-            # The speed that hovers goes with the root of the mass over the thrust factor.
-            thrust_linear=self.get(LAW, 0.0) * float(np.sqrt(lighter)),
             effects=self.effects,
             remainder=self.free.remainder(learned, unnamed) if learned else None,
         )
@@ -146,12 +159,12 @@ class ParameterPoint:
     @property
     def physical(self) -> dict[str, Physical]:
         """All numbers as people know them, in order: moments of inertia, factors of the first rotor, SI."""
-        free, rotor = self.free, self.free.vehicle.rotors[0]
+        free = self.free
         entries = (self.inertia.item(entry) for entry in INERTIA_ENTRIES)
         stated = dict(zip((*LOG_INERTIA, *PRODUCT_NAMES), entries, strict=True))
         stated |= {
-            THRUST: self.get(THRUST, 1.0) * rotor.thrust_factor_n_s2,
-            DRAG: self.get(DRAG, 1.0) * rotor.drag_factor_n_m_s2,
+            THRUST: self.vehicle.rotors[0].thrust_factor_n_s2,
+            DRAG: self.vehicle.rotors[0].drag_factor_n_m_s2,
             LOG_MASS: self.mass,
         }
         others = {SLOW: self.response.slow_s, **self.coefficients}
@@ -265,14 +278,13 @@ def acting_numbers(
 
 def acting_at(free: FreeNumbers, number: Callable[[str], Value]) -> tuple[tuple[Acting, ...], Value]:
     """List what acts on a vehicle of free numbers, and the ratio of the drag factors that effects share."""
-    index, hover = free.index, scales.hover_speed(free.vehicle)
+    index = free.index
 
     def given(name: str, otherwise: float) -> Value:
         return number(name) if name in index else otherwise
 
     thrust, drag = given(THRUST, 1.0), given(DRAG, 1.0)
     numbers = {
-        "linear": times(given(LAW, 0.0), hover),
         "slow_roll_pitch": given(SLOW_SHARES[0], 0.0),
         "slow_yaw": given(SLOW_SHARES[1], 0.0),
     }

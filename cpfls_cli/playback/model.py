@@ -17,7 +17,7 @@ from cpfls_cli.consistency.check import Audit
 from cpfls_cli.dynamics import InertiaFunctions, InertiaModel, body_inertia, momentum_form, positive_definite
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Columns, Effect
-from cpfls_cli.effects.registry import CENTRE_OF_MASS, VEHICLE_NUMBERS, effect
+from cpfls_cli.effects.registry import CENTRE_OF_MASS, THRUST_CURVE, VEHICLE_NUMBERS, effect
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.inertia import symmetric
@@ -190,9 +190,6 @@ class VehicleModel:
     vehicle: VehicleSettings = part()
     """Mass, inertia and rotors of the model, which need not be those of a config."""
     response: RotorResponse = part(default=RotorResponse())
-    thrust_linear: float = about(
-        "a: thrust and drag follow w^2 + a w_h w, w_h the speed that hovers under the square alone", default=0.0
-    )
     effects: tuple[ModelEffect, ...] = part(default=())
     """What follows from motion and rotors is simulated; others are evaluated along a measured motion (`along`), or
     act on what drives the rotors (`filters`)."""
@@ -238,7 +235,6 @@ class VehicleModel:
         """What acts on it in any state: rotors, effects, and what is learned."""
         response = self.response
         numbers = {
-            "linear": self.thrust_linear * scales.hover_speed(self.vehicle),
             "slow_roll_pitch": response.slow_roll_pitch,
             "slow_yaw": response.slow_yaw,
         }
@@ -264,17 +260,22 @@ class VehicleModel:
         return tuple(one for one in self.effects if one.is_filter)
 
     @property
+    def thrust_curve(self) -> tuple[ModelEffect, ...]:
+        """The effect of a thrust that is no square of what drives the rotors, or none."""
+        return tuple(one for one in self.effects if one.name == THRUST_CURVE.name)
+
+    @property
     def needs(self) -> frozenset[str]:
         """What a flight has to have for all parts to act, which takes neither the command nor the measured force."""
         of_effects = (one.effect.needs - {"command", "force"} for one in self.effects)
-        learned = {"rotor_speed", "velocity"} if self.remainder else {"rotor_speed"} if self.thrust_linear else set()
+        learned = {"rotor_speed", "velocity"} if self.remainder else set()
         needs = frozenset(learned).union(*of_effects)
         return needs - {"torque", "thrust"} if "rotor_speed" in needs else needs
 
     @property
     def is_rigid_body(self) -> bool:
         """Whether it is mass, inertia and squared rotor speeds alone."""
-        return not (self.effects or self.remainder or self.thrust_linear or any(self.wind)) and self.response == (
+        return not (self.effects or self.remainder or any(self.wind)) and self.response == (
             RotorResponse()
         )
 
@@ -284,7 +285,7 @@ class VehicleModel:
         response = self.response
         slow = response.slow_roll_pitch or response.slow_yaw
         late = (response.lag_s or response.delay_s) and not self.commanded
-        return not (self.thrust_linear or self.remainder or slow or late)
+        return not (self.remainder or slow or late)
 
     @property
     def unsimulated(self) -> tuple[str, ...]:

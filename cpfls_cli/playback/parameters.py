@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import CATALOGUE, THRUST_CURVE
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.fuzzy.periodic import PeriodicStructure
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -30,7 +30,8 @@ PRODUCT_NAMES = tuple(f"products.{name}" for name in INERTIA_PARAMETERS[3:])
 PRODUCTS = "products"
 DELAY, LAG, SLOW = "delay.delay_s", "lag.time_constant_s", "slow_actuation.log_slow_s"
 SLOW_SHARES = ("slow_actuation.roll_pitch", "slow_actuation.yaw")
-THRUST, DRAG, LAW = "thrust_factor.scale", "drag_factor.scale", "thrust_law.linear"
+THRUST, DRAG = "thrust_factor.scale", "drag_factor.scale"
+CURVE = f"{THRUST_CURVE.name}.{THRUST_CURVE.coefficients[0].name}"
 MASS = "mass"
 """Block of groups of flights alone: one configuration has the stated mass, which gives all else its size."""
 
@@ -137,7 +138,6 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
     INERTIA: tuple(Number(name, "", 0.0, 0.5, -4.0, 4.0, 3.0) for name in LOG_INERTIA),
     "thrust_factor": (Number(THRUST, "", 1.0, 0.2, 0.1, 10.0, 2.0),),
     "drag_factor": (Number(DRAG, "", 1.0, 0.5, 0.01, 30.0, 4.0),),
-    "thrust_law": (Number(LAW, "", 0.0, 0.5, -0.9, 5.0, 2.0),),
     "lag": (Number(LAG, "s", 0.01, 0.02, 0.001, 0.3, 5.0),),
     "delay": (Number(DELAY, "s", 0.002, 0.01, 0.0, 0.1, 5.0),),
     "slow_actuation": (
@@ -157,7 +157,8 @@ def of_vehicle(block: str, vehicle: VehicleSettings) -> tuple[Effect, list[int]]
     What may be left out is of six rotors and more.
     """
     known = CATALOGUE[block]
-    acting = known if len(vehicle.rotors) >= 6 else known.form(len(known.coefficients) - known.optional, ())
+    fewer = min(len(known.coefficients), len(known.numbers) - known.optional)
+    acting = known if len(vehicle.rotors) >= 6 else known.form(fewer, ())
     return acting, [place for place, each in enumerate(acting.coefficients) if not each.by_force]
 
 
@@ -195,7 +196,8 @@ def blocks_of(vehicle: VehicleSettings) -> tuple[str, ...]:
     effects = (
         name
         for name, each in CATALOGUE.items()
-        if each.follows_state and each.kind == "wrench" and not each.shapes and each.needs <= _SEEN
+        if each is THRUST_CURVE
+        or (each.follows_state and each.kind == "wrench" and not each.shapes and each.needs <= _SEEN)
     )
     return (*known, PRODUCTS, *effects, *LEARNED)
 
@@ -206,7 +208,7 @@ _SEEN = {"body_rate", "velocity", "rotor_speed", "thrust"}
 
 def needs_velocity(block: str) -> bool:
     """Tell whether a block can only be found where the velocity was measured."""
-    return block in (*LEARNED, "thrust_factor", "thrust_law") or (
+    return block in (*LEARNED, "thrust_factor") or (
         block in CATALOGUE and bool(CATALOGUE[block].needs & {"velocity", "force"})
     )
 

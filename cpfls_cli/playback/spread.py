@@ -16,19 +16,13 @@ from cpfls_cli.inertia import INERTIA_ENTRIES, INERTIA_PARAMETERS, MEASURED, nea
 from cpfls_cli.playback.gusts import GUST_AXES, Gusts
 from cpfls_cli.playback.lack import Lack
 from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
-from cpfls_cli.playback.parameters import LEARNED, PRODUCT_NAMES, FoundNumber
+from cpfls_cli.playback.parameters import CURVE, LEARNED, PRODUCT_NAMES, FoundNumber
 from cpfls_cli.playback.vehicle import VehicleFit, bodily
 from cpfls_cli.vehicle.rotors import figures_of_vehicle, with_factors
 from cpfls_cli.vehicle_limits import broken_limits
 
 MOMENTS = tuple(f"inertia.{name}" for name in INERTIA_PARAMETERS[:3])
-THRUST, DRAG, LAW, LAG, DELAY = (
-    "thrust_factor",
-    "drag_factor",
-    "thrust_law.linear",
-    "lag.time_constant_s",
-    "delay.delay_s",
-)
+THRUST, DRAG, LAG, DELAY = "thrust_factor", "drag_factor", "lag.time_constant_s", "delay.delay_s"
 _SLOW_NAMES = tuple(
     (f"slow_actuation.{own}", name)
     for own, name in (("roll_pitch", "slow_roll_pitch"), ("yaw", "slow_yaw"), ("slow_s", "slow_s"))
@@ -43,6 +37,8 @@ _OF_A_GROUP = ": "
 """In the names of numbers that only another configuration has."""
 _EDGE = 1e-9
 """Rounding, of a moment of inertia next to the sum of the others."""
+_FALLS = 2.0
+"""Linear share a of the thrust in hover from which it falls there: its slope is 2 (1 - a) + a."""
 
 
 @dataclass(frozen=True)
@@ -209,8 +205,8 @@ def _impossible(model: VehicleModel, numbers: Sequence[FoundNumber], row: Array)
     values = dict(zip((number.name for number in numbers), row.tolist(), strict=True))
     if min(values.get(LAG, 0.0), values.get(DELAY, 0.0)) < 0.0:
         return "a lag or a delay below 0"
-    if _thrust_linear(model, numbers, values) <= -1.0:
-        return "a thrust that is not upward in hover"
+    if values.get(CURVE, 0.0) >= _FALLS:
+        return "a thrust that does not rise with the commands in hover"
     smallest, middle, largest = np.linalg.eigvalsh(symmetric(_inertia(model, values)))
     if smallest <= 0.0:
         return "a principal moment of inertia that is not above 0"
@@ -231,14 +227,6 @@ def _inertia(model: VehicleModel, values: Mapping[str, float]) -> Array:
     return parameters
 
 
-def _thrust_linear(model: VehicleModel, numbers: Sequence[FoundNumber], values: Mapping[str, float]) -> float:
-    """Give the law of the rotors, which is counted in the speed that hovers: that goes with the root of the thrust."""
-    begun = {number.name: number.value for number in numbers}
-    law = values[LAW] / begun[LAW] if LAW in begun else 1.0
-    thrust = values[THRUST] / begun[THRUST] if THRUST in begun else 1.0
-    return float(model.thrust_linear * law * np.sqrt(thrust))
-
-
 def model_at(model: VehicleModel, numbers: Sequence[FoundNumber], row: Array) -> VehicleModel:
     """Make the model of a vehicle with other numbers; factors of rotors that differ keep their ratios."""
     values = dict(zip((number.name for number in numbers), row.tolist(), strict=True))
@@ -252,7 +240,6 @@ def model_at(model: VehicleModel, numbers: Sequence[FoundNumber], row: Array) ->
     return replace(
         model,
         vehicle=replace(with_factors(model.vehicle, thrust, drag), inertia_kg_m2=(xx, yy, zz, xy, xz, yz)),
-        thrust_linear=_thrust_linear(model, numbers, values),
         response=replace(response, lag_s=values.get(LAG, response.lag_s), delay_s=response.delay_s + later, **slow),
         effects=tuple(_effect_at(each, values) for each in model.effects),
         remainder=None if model.remainder is None else _remainder_at(model.remainder, values),

@@ -12,7 +12,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.blocks import mean_error
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import CATALOGUE, THRUST_CURVE
 from cpfls_cli.evolution.archive import comparable
 from cpfls_cli.playback.evaluation import Group, JointNumbers
 from cpfls_cli.playback.fit import (
@@ -379,7 +379,7 @@ def choose(
     return Choice(chosen, best, added, everything, nothing, _front(judged), tuple(judged), complete)
 
 
-_HELD = ("thrust_factor", "drag_factor", "thrust_law", INERTIA, PRODUCTS)
+_HELD = ("thrust_factor", "drag_factor", THRUST_CURVE.name, INERTIA, PRODUCTS)
 """Blocks that make up for a body that is off, if they can."""
 
 _OF_A_LOOP = (_SLOW, *LEARNED)

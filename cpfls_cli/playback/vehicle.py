@@ -23,7 +23,7 @@ from cpfls_cli.playback.history_fit import find_history
 from cpfls_cli.playback.instruments import Instruments, instruments
 from cpfls_cli.playback.loop import ANY, LoopBounds, loop_and_plain
 from cpfls_cli.playback.model import VehicleModel
-from cpfls_cli.playback.parameters import INERTIA, LAG, LAW, ROOM, Difference, FoundNumber, Physical, interval
+from cpfls_cli.playback.parameters import INERTIA, LAG, ROOM, Difference, FoundNumber, Physical, interval
 from cpfls_cli.playback.player import Observer
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import (
@@ -232,13 +232,12 @@ def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[
 
     Moments of inertia stay as stated where all of these lie between their bounds. About yaw the bounds are those of the
     drag factor where that is not known, or of its ratio to the moment, which is then that of a flat body. The thrust
-    factor is that of the fit, for it carries the weight, unless a law of the rotors carries a part. Numbers are given
+    factor is that of the fit, for it carries the weight. Numbers are given
     as exact, for the loop widens them to the bounds (`widened_by_loop`); what has none is open by a factor of ten.
     """
     found, rotor = {number.name: number for number in fitted}, vehicle.rotors[0]
     open_thrust, open_drag, open_body = (name in vehicle.unknown for name in ("thrust_factor", "drag_factor", INERTIA))
-    carries = open_thrust and LAW not in found
-    thrust = found["thrust_factor"].value / rotor.thrust_factor_n_s2 if carries else 1.0
+    thrust = found["thrust_factor"].value / rotor.thrust_factor_n_s2 if open_thrust else 1.0
     low, high = np.array([loop.low, loop.high]) * [thrust, thrust, 1.0]
     bounded, middle = np.isfinite(low * high), np.nan_to_num(np.sqrt(low * high), nan=1.0)
     of_body, moved = bounded & [True, True, not open_drag], np.ones(3)
@@ -255,8 +254,7 @@ def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[
     loop, traded = loop._replace(low=low, high=high), False
     numbers = []
     if open_thrust:
-        number = _held_at("thrust_factor", "N s^2", rotor.thrust_factor_n_s2)
-        numbers.append(found["thrust_factor"] if carries else number)
+        numbers.append(found["thrust_factor"])
     if open_drag:
         exact = bool(bounded[2]) and stays
         numbers.append(_held_at("drag_factor", "N m s^2", drag * rotor.drag_factor_n_m_s2, exact=exact))
@@ -353,16 +351,14 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
     """Widen the intervals of inertia and drag factor by what the loop leaves open.
 
     About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where
-    the flights show the loop, or a body is held by bounds, nothing else is determined but what carries the weight, for
-    every effect answers with the loop, or with a body that is off: the thrust factor, where no law of the rotors found
-    jointly with it carries a part of the weight. Bounds of flights that show the loop determine no body. They are in
+    the flights show the loop, or a body is held by bounds, nothing else is determined but the thrust factor, which
+    carries the weight, for every effect answers with the loop, or with a body that is off. Bounds of flights that show the loop determine no body. They are in
     moments of inertia of the model whose numbers these are.
     """
     low, high = np.fmin(loop.low, 1.0), np.fmax(loop.high, 1.0)
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}
     factors["drag_factor"] = [1 / high[2], 1 / low[2]]
-    carries = {"thrust_factor"} if LAW not in {number.name for number in numbers} else set[str]()
-    carries |= {number.name for number in numbers if number.name.startswith(SUPPLY.name)}
+    carries = {"thrust_factor", *(number.name for number in numbers if number.name.startswith(SUPPLY.name))}
     for number in numbers:
         below, above = (float(factor) for factor in factors.get(number.name, (1.0, 1.0)))
         ends = number.low * below, number.high * above

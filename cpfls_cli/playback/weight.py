@@ -17,7 +17,7 @@ from cpfls_cli.inertia import INERTIA_PARAMETERS, KNOWN
 from cpfls_cli.playback.fit import BLOCKS
 from cpfls_cli.playback.flight import LoggedFlight, PlaybackFlight
 from cpfls_cli.playback.model import ModelEffect, VehicleModel
-from cpfls_cli.playback.parameters import LAW, FoundNumber, interval, needs_velocity
+from cpfls_cli.playback.parameters import CURVE, FoundNumber, interval, needs_velocity
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _CALIBRATED = 0.01
@@ -176,13 +176,13 @@ def _carried(part: Signals) -> Iterator[tuple[float, float, float, float]]:
 
 
 def widened_by_law(numbers: Sequence[FoundNumber], commands: CommandedThrust) -> Iterator[FoundNumber]:
-    """Widen the intervals of factors by the power of the voltage, and of the inertia where no thrust law was found.
+    """Widen intervals of factors by the power of the voltage, and of the inertia where the thrust has no curve found.
 
     Weight shows the thrust that carries it, and rotation how it changes over the moments of inertia, and how their drag
     does.
     """
     ends = dict.fromkeys(("thrust_factor", "drag_factor"), commands.full)
-    if LAW not in {number.name for number in numbers}:
+    if CURVE not in {number.name for number in numbers}:
         (low, high), (least, most) = commands.rises, commands.full
         ends |= dict.fromkeys((f"inertia.{name}" for name in INERTIA_PARAMETERS[:3]), (low, high))
         ends["drag_factor"] = low * least, high * most

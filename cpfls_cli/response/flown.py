@@ -219,7 +219,7 @@ def _of_rotors(model: VehicleModel, signals: Signals, hold: Hold) -> Array:
     """Evaluate torque and thrust of the rotors at the logged speeds, or as stated, shape (time, 6)."""
     if signals.rotor_speed is None:
         return signals.wrench
-    rotors = VehicleModel(vehicle=model.vehicle, thrust_linear=model.thrust_linear)
+    rotors = VehicleModel(vehicle=model.vehicle, effects=model.thrust_curve)
     still = np.zeros((len(signals), 3))
     terms = rotors.response.terms_at_samples(signals.rotor_speed, signals.period, hold)
     return rotors.wrench(still, still, terms)

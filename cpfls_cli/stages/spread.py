@@ -36,8 +36,7 @@ ENDINGS = (".yaml", ".json", ".npz")
 _CONVENTIONS = (
     "Body frame x forward, y left, z up, its origin the centre of mass; SI. Entry k of every column belongs to vehicle "
     "k, and all entries k belong together: numbers that the flights identify only by their ratio differ together. "
-    "Rotor i pushes thrust_factor w^2 along z and turns the body by -spin drag_factor w^2 about z; with "
-    "thrust_linear a, w^2 becomes w^2 + a w_h w, w_h the speed that hovers under the square alone. Commands act "
+    "Rotor i pushes thrust_factor w^2 along z and turns the body by -spin drag_factor w^2 about z. Commands act "
     "after delay_s through a first-order lag of motor_lag_s."
 )
 _ENDS = (2.5, 97.5)
@@ -209,8 +208,6 @@ def _columns(nominal: VehicleModel, models: tuple[VehicleModel, ...]) -> Iterato
     )
     yield "motor_lag_s", "s", np.array([each.lag_s for each in responses])
     yield "delay_s", "s", np.array([each.delay_s for each in responses])
-    if nominal.thrust_linear:
-        yield "thrust_linear", "1", np.array([each.thrust_linear for each in models])
     if nominal.response.slow_roll_pitch or nominal.response.slow_yaw:
         for name, unit in (("slow_roll_pitch", "1"), ("slow_yaw", "1"), ("slow_s", "s")):
             yield name, unit, np.array([getattr(each, name) for each in responses])

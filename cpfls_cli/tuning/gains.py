@@ -17,6 +17,7 @@ from cpfls_cli.arrays import Numbers
 from cpfls_cli.autopilots.law import AXES, AxisLaw, Law
 from cpfls_cli.autopilots.motors import straightening
 from cpfls_cli.autopilots.parameters import Autopilot, Parameter
+from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.result import about, part, result
 from cpfls_cli.tuning.margins import Evaluation, axis_loops, disk_of, evaluate, frequencies, is_stable, moved_by
@@ -537,10 +538,9 @@ def _curve(autopilot: Autopilot, model: VehicleModel) -> Iterator[Proposal]:
     parameter = autopilot.by_role("motors.expo")
     if parameter is None or not model.commanded:
         return
-    lift = sum(rotor.thrust_factor_n_s2 for rotor in model.vehicle.rotors)
-    hovering = np.sqrt(model.vehicle.mass_kg * model.vehicle.gravity_m_s2 / lift)
-    linear = model.thrust_linear * hovering / model.vehicle.rotor_speed_max_rad_s
-    wanted = straightening(autopilot.law().curve, float(linear), parameter.scale * parameter.high)
+    share = sum(float(curve.coefficients[0]) for curve in model.thrust_curve)
+    hover = hover_speed(model.vehicle) / model.vehicle.rotor_speed_max_rad_s
+    wanted = straightening(autopilot.law().curve, share, hover, parameter.scale * parameter.high)
     yield proposal_of(parameter, wanted / parameter.scale)
 
 

@@ -393,23 +393,22 @@ def wrench_by_part(acting: Iterable[Acting], instant: Instant) -> dict[str, tupl
 
 
 def rotor_wrench(instant: Instant, numbers: Numbers) -> Wrench:
-    """Compute what the rotors give: thrust and reaction by ``w^2 + linear w``, and what comes slowly behind a change.
+    """Compute what the rotors give: thrust and reaction by squared speeds, and what comes slowly behind a change.
 
     Parameters
     ----------
     numbers : Numbers
-        ``linear`` in rad/s; ``slow_roll_pitch`` and ``slow_yaw``, shares of the torque of the slow squared speed less
+        ``slow_roll_pitch`` and ``slow_yaw``, shares of the torque of the slow squared speed less
         that of the present one.
     """
     square = instant.rotor_speed**2
-    given = square + times(numbers["linear"], instant.rotor_speed)
-    torque: Vector = (0, 0, -instant.functions.total(instant.spins * instant.drag_factors * given))
+    torque: Vector = (0, 0, -instant.functions.total(instant.spins * instant.drag_factors * square))
     level, turn = numbers["slow_roll_pitch"], numbers["slow_yaw"]
     if not (zero(level) and zero(turn)):
         late = instant.slow_square - square
         x, y, z = instant.torque_of(instant.thrust_factors * late, instant.drag_factors * late)
         torque = add(torque, (times(level, x), times(level, y), times(turn, z)))
-    return Wrench(torque, at_hubs=(0, 0, instant.thrust_factors * given))
+    return Wrench(torque, at_hubs=(0, 0, instant.thrust_factors * square))
 
 
 def rotation_rows(attitude: Vector, functions: Functions) -> tuple[Vector, ...]:

@@ -71,6 +71,11 @@ def is_held(known, vehicle):
     return not VehicleModel(vehicle=vehicle, effects=(ModelEffect(known.name, shape, numbers),)).unsimulated
 
 
+def thrust_curve(share):
+    """A thrust of which so much is linear in the command in hover."""
+    return ModelEffect("thrust_slope", {}, np.array([share]))
+
+
 def remainder(order, breakpoints=SEVEN_RULES, rows=(0, 2, 5), size=1e-7):
     """A remainder with coefficients at random; an order of 0 makes it a seesaw."""
     columns = max(len(breakpoints) - 1, 1) * (1 + (2 * order if order else 1))
@@ -85,7 +90,6 @@ def whole(vehicle=QUAD, *, order=2, **changed):
     model = VehicleModel(
         vehicle=vehicle,
         response=RESPONSE,
-        thrust_linear=0.15,
         effects=polynomial_effects(vehicle),
         remainder=remainder(order),
     )

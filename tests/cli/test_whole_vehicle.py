@@ -23,7 +23,7 @@ from cpfls_cli.store import read
 from tests.builders.artifacts import edited
 from tests.builders.exported_vehicles import on_numpy
 from tests.builders.playback_flights import STATED, truth
-from tests.builders.vehicle_models import remainder, vehicle_of, write_vehicle
+from tests.builders.vehicle_models import remainder, thrust_curve, vehicle_of, write_vehicle
 from tests.builders.vehicles import OPEN_FACTORS
 
 CONFIG = f"""\
@@ -46,8 +46,7 @@ RESPONSE = RotorResponse(delay_s=0.013, lag_s=0.02, slow_roll_pitch=-0.3, slow_y
 WHOLE = replace(
     truth(),
     response=RESPONSE,
-    thrust_linear=0.1,
-    effects=(*truth().effects, ModelEffect("rotor_acceleration", {}, np.array([6e-6]))),
+    effects=(*truth().effects, ModelEffect("rotor_acceleration", {}, np.array([6e-6])), thrust_curve(0.1)),
     remainder=remainder(1, rows=(0, 1, 5), size=1e-5),
 )
 NOISE = {"attitude": 0.002, "body_rate": 0.01, "velocity": 0.01, "position": 0.002, "rotor_speed": 1.0}
@@ -141,7 +140,6 @@ WITHOUT = {
     "slow roll and pitch": response(slow_roll_pitch=0.0),
     "slow yaw": response(slow_yaw=0.0),
     "time of slow actuation": response(slow_s=0.1),
-    "law": replace(WHOLE, thrust_linear=0.0),
     "remainder": replace(WHOLE, remainder=None),
     **{one.name: replace(WHOLE, effects=tuple(e for e in WHOLE.effects if e is not one)) for one in WHOLE.effects},
 }

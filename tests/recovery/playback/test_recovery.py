@@ -143,7 +143,7 @@ def everything():
         rows=np.array([0, 1, 5]),
         coefficients=np.full((3, 6, 2), 2e-6),
     )
-    return replace(known, response=response, thrust_linear=0.3, remainder=remainder)
+    return replace(known, response=response, effects=(*known.effects, thrust_curve(0.3)), remainder=remainder)
 
 
 @pytest.fixture(scope="module")

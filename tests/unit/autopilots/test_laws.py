@@ -170,15 +170,16 @@ def test_parameters_without_a_gain_of_a_rate_are_of_another_vehicle():
     assert AUTOPILOTS["ardupilot"].of_log(found)["ATC_RAT_RLL_FLTT"] == 0.0
 
 
-@pytest.mark.parametrize("linear", [0.0, 0.4])
-def test_the_straightest_curve_is_the_inverse_where_an_autopilot_has_that(linear):
+@pytest.mark.parametrize(("share", "hover"), [(0.0, 0.5), (0.5, 0.4), (0.3, 0.7)])
+def test_the_straightest_curve_is_the_inverse_where_an_autopilot_has_that(share, hover):
+    linear = share / (1 - share) * hover
     for curve in (ThrustCurve(), ThrustCurve(0.0, 0.15, 0.95)):
         span = curve.high - curve.low
         exact = span / (span + 2 * curve.low + linear)
-        assert straightening(curve, linear, 1.0) == pytest.approx(exact, abs=2e-3)
+        assert straightening(curve, share, hover, 1.0) == pytest.approx(exact, abs=2e-3)
     series = ThrustCurve(0.0, 0.055, 1.0, series=True)
     # Betaflight's straightens less, so it needs more.
-    assert straightening(series, linear, 1.5) > 1.0
+    assert straightening(series, share, hover, 1.5) > 1.0
 
 
 def test_the_error_of_an_attitude_is_the_rotation_to_the_asked_one():

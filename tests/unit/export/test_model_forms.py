@@ -23,9 +23,11 @@ from tests.builders.exported_vehicles import on_numpy, sheet_of_vehicle
 from tests.builders.flown_exports import executed
 from tests.builders.playback_flights import flown, truth
 from tests.builders.spread_vehicles import found_record
-from tests.builders.vehicle_models import HEXA, QUAD, whole
+from tests.builders.vehicle_models import HEXA, QUAD, thrust_curve, whole
 
-DELAYED = replace(truth(), response=RotorResponse(lag_s=0.035, delay_s=0.013), thrust_linear=0.15)
+DELAYED = replace(
+    truth(), response=RotorResponse(lag_s=0.035, delay_s=0.013), effects=(*truth().effects, thrust_curve(0.15))
+)
 
 
 def refuse_constant(name):

@@ -218,7 +218,8 @@ def test_the_self_test_of_c_fails_where_the_code_was_changed(tmp_path, before, a
 
 def test_the_comparison_would_notice_a_wrong_weight(exports):
     model = MODELS["harmonic"]
-    wrong = replace(model, thrust_linear=model.thrust_linear * (1 + 1e-9))
+    first, *others = model.effects
+    wrong = replace(model, effects=(first._replace(coefficients=first.coefficients * (1 + 1e-6)), *others))
     points = reference_points(wrong, np.random.default_rng(5), 100)
     found = exports("harmonic", "jax").wrench(points.air, points.rate, points.rotor)
     assert np.max(np.abs(found - points.wrench) / points.scale) > ALLOWED

@@ -155,7 +155,8 @@ def test_a_rigid_body_has_no_effect_and_the_place_of_a_sensor_stays_a_number():
     numbers = parameters(thrust_scale=0.1, reference_x=0.2)
     again = with_effects(whole_vehicle(ExtendedModel(None, numbers, ()), QUAD))
     np.testing.assert_array_equal(again.parameters, numbers)
-    late = with_effects(replace(whole_vehicle(ExtendedModel(None, numbers, ()), QUAD), thrust_linear=0.1))
+    model = whole_vehicle(ExtendedModel(None, numbers, ()), QUAD)
+    late = with_effects(replace(model, remainder=vehicle_models.remainder(1)))
     np.testing.assert_array_equal(late.parameters, parameters(reference_x=0.2))
 
 

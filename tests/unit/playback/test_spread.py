@@ -13,7 +13,7 @@ from cpfls_cli.playback.parameters import FoundNumber, FreeNumbers
 from cpfls_cli.playback.spread import POSITIVE, drawn, model_at
 from tests.builders.playback_flights import STATED, pushed, truth
 from tests.builders.spread_vehicles import found_record, inertia_and_mass
-from tests.builders.vehicle_models import wrench_somewhere
+from tests.builders.vehicle_models import thrust_curve, wrench_somewhere
 
 COUNT = 400
 
@@ -43,7 +43,7 @@ def test_numbers_lie_in_their_intervals_as_often_as_they_should_and_go_together(
 
 
 def test_models_have_the_numbers_that_were_drawn():
-    model = replace(pushed(), thrust_linear=0.1)
+    model = replace(pushed(), effects=(*pushed().effects, thrust_curve(0.1)))
     spread = spread_of(found_record(model), 3)
     for row, own in zip(spread.values, spread.models, strict=True):
         values = dict(zip(spread.names, row.tolist(), strict=True))
@@ -52,9 +52,7 @@ def test_models_have_the_numbers_that_were_drawn():
         assert own.vehicle.rotors[3].drag_factor_n_m_s2 == pytest.approx(values["drag_factor"])
         assert own.response.lag_s == values["lag.time_constant_s"]
         assert own.effects[0].coefficients[0] == values["linear_damping.d_x"]
-        # The speed that hovers falls with the root of the thrust factor, and the linear part is counted in it.
-        ratio = values["thrust_factor"] / model.vehicle.rotors[0].thrust_factor_n_s2
-        assert own.thrust_linear == pytest.approx(0.1 * np.sqrt(ratio))
+        assert own.thrust_curve == model.thrust_curve
 
 
 def test_vehicles_for_new_commands_are_as_much_later_as_the_one_that_they_are_drawn_about():
@@ -68,7 +66,7 @@ def test_vehicles_for_new_commands_are_as_much_later_as_the_one_that_they_are_dr
 
 
 def test_the_model_of_a_fit_is_made_again_from_what_people_know_of_its_numbers():
-    blocks = ("inertia", "thrust_factor", "drag_factor", "thrust_law", "lag", "slow_actuation", "linear_damping")
+    blocks = ("inertia", "thrust_factor", "drag_factor", "thrust_slope", "lag", "slow_actuation", "linear_damping")
     free = FreeNumbers(STATED, blocks)
     steps = np.random.default_rng(0).uniform(0.05, 0.2, (2, len(free.numbers)))
     scales = np.array([number.scale for number in free.numbers])

@@ -240,7 +240,7 @@ def test_an_inertia_of_commands_is_as_open_as_their_law():
     drag = FoundNumber("drag_factor", "", 1.0, 0.9, 1.1, np.nan, True, False)
     wide = next(widened_by_law([drag], CommandedThrust((), (0.5, 1.0), (0.8, 1.2))))
     assert (wide.low, wide.high, wide.determined) == (pytest.approx(0.36), pytest.approx(1.32), False)
-    law = FoundNumber("thrust_law.linear", "", 0.3, 0.2, 0.4, np.nan, True, False)
+    law = FoundNumber("thrust_slope.linear", "", 0.3, 0.2, 0.4, np.nan, True, False)
     assert next(widened_by_law([*numbers, law], CommandedThrust((), (0.5, 1.0)))) == numbers[0]
 
 
@@ -307,9 +307,9 @@ def test_flights_that_show_the_loop_determine_what_carries_the_weight_alone():
     numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in names]
     assert LOOP.shows_loop
     assert [number.name for number in widened_by_loop(numbers, LOOP) if number.determined] == ["thrust_factor"]
-    # A law found next to it carries a part of the weight, and answers with the loop as every effect.
-    numbers.append(FoundNumber("thrust_law.linear", "", -0.3, -0.4, -0.2, np.nan, True, False))
-    assert not any(number.determined for number in widened_by_loop(numbers, LOOP))
+    # A curve found next to it answers with the loop, as every effect; the thrust factor carries the weight all the same.
+    numbers.append(FoundNumber("thrust_slope.linear", "", -0.3, -0.4, -0.2, np.nan, True, False))
+    assert [number.name for number in widened_by_loop(numbers, LOOP) if number.determined] == ["thrust_factor"]
 
 
 def test_of_a_vehicle_whose_body_is_held_only_narrow_bounds_and_what_carries_the_weight_are_determined():
