@@ -80,12 +80,13 @@ class ParameterPoint:
 
     @property
     def response(self) -> RotorResponse:
-        """Response of the rotors."""
+        """Response of the rotors, its shares of what these rotors give."""
+        level, turn = (self.get(name, 0.0) * self.get(THRUST, 1.0) / self._hover[0] for name in SLOW_SHARES)
         return RotorResponse(
             delay_s=self.get(DELAY, 0.0),
             lag_s=self.get(LAG, self.free.lag_s),
-            slow_roll_pitch=self.get(SLOW_SHARES[0], 0.0),
-            slow_yaw=self.get(SLOW_SHARES[1], 0.0),
+            slow_roll_pitch=level,
+            slow_yaw=turn,
             slow_s=float(np.exp(self.get(SLOW, float(np.log(RotorResponse().slow_s))))),
         )
 
@@ -167,7 +168,9 @@ class ParameterPoint:
             DRAG: self.vehicle.rotors[0].drag_factor_n_m_s2,
             LOG_MASS: self.mass,
         }
-        others = {SLOW: self.response.slow_s, **self.coefficients}
+        response = self.response
+        shares = zip(SLOW_SHARES, (response.slow_roll_pitch, response.slow_yaw), strict=True)
+        others = {SLOW: response.slow_s, **dict(shares), **self.coefficients}
         for effect in self.effects:
             names = (number.name for number in free.of_block(effect.name))
             _, places = of_vehicle(effect.name, self.vehicle)
@@ -284,10 +287,7 @@ def acting_at(free: FreeNumbers, number: Callable[[str], Value]) -> tuple[tuple[
         return number(name) if name in index else otherwise
 
     thrust, drag = given(THRUST, 1.0), given(DRAG, 1.0)
-    numbers = {
-        "slow_roll_pitch": given(SLOW_SHARES[0], 0.0),
-        "slow_yaw": given(SLOW_SHARES[1], 0.0),
-    }
+    numbers = {"slow_roll_pitch": given(SLOW_SHARES[0], 0.0), "slow_yaw": given(SLOW_SHARES[1], 0.0)}
 
     def rotors(see: Instant, p: Numbers) -> Wrench:
         return rotor_wrench(see.moved(thrust_scale=thrust, drag_scale=drag), p)

@@ -179,8 +179,8 @@ class ModelEffect(NamedTuple):
         return columns(signals, self.shape).at_samples(self.linear, signals.time)
 
     def missing(self, signals: Signals) -> tuple[str, ...]:
-        """Name the signals that it needs and a flight lacks; a filter may lack the command: it leaves speeds alone."""
-        return tuple(each for each in self.effect.missing(signals) if not (self.is_filter and each == "command"))
+        """Name the signals that it acts by and a flight lacks; command and measured force only show it."""
+        return tuple(each for each in self.effect.missing(signals) if each not in {"command", "force"})
 
 
 @result
@@ -234,10 +234,7 @@ class VehicleModel:
     def parts(self) -> tuple[Acting, ...]:
         """What acts on it in any state: rotors, effects, and what is learned."""
         response = self.response
-        numbers = {
-            "slow_roll_pitch": response.slow_roll_pitch,
-            "slow_yaw": response.slow_yaw,
-        }
+        numbers = {"slow_roll_pitch": response.slow_roll_pitch, "slow_yaw": response.slow_yaw}
         parts = [Acting("rotors", rotor_wrench, numbers)]
         for one in self.effects:
             if one.name not in self.unsimulated:
@@ -275,9 +272,7 @@ class VehicleModel:
     @property
     def is_rigid_body(self) -> bool:
         """Whether it is mass, inertia and squared rotor speeds alone."""
-        return not (self.effects or self.remainder or any(self.wind)) and self.response == (
-            RotorResponse()
-        )
+        return not (self.effects or self.remainder or any(self.wind)) and self.response == (RotorResponse())
 
     @property
     def of_catalogue(self) -> bool:

@@ -352,8 +352,8 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
 
     About yaw torque and inertia are known by their ratio: what makes Izz larger makes the drag factor smaller. Where
     the flights show the loop, or a body is held by bounds, nothing else is determined but the thrust factor, which
-    carries the weight, for every effect answers with the loop, or with a body that is off. Bounds of flights that show the loop determine no body. They are in
-    moments of inertia of the model whose numbers these are.
+    carries the weight, for every effect answers with the loop, or with a body that is off. Bounds of flights that show
+    the loop determine no body. They are in moments of inertia of the model whose numbers these are.
     """
     low, high = np.fmin(loop.low, 1.0), np.fmax(loop.high, 1.0)
     factors = {f"inertia.{name}": ends for name, *ends in zip(INERTIA_PARAMETERS[:3], low, high, strict=True)}

@@ -61,7 +61,7 @@ from cpfls_cli.pages.trust import NOTHING_COMES, contradicted, tell_before_searc
 from cpfls_cli.playback.errors import AlongFlights
 from cpfls_cli.playback.flight import LoggedFlight, contradictions_of
 from cpfls_cli.playback.loop import ANY, LoopBounds, shows_loop_anyhow
-from cpfls_cli.playback.parameters import MASS, blocks_of
+from cpfls_cli.playback.parameters import CURVE, MASS, blocks_of
 from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
@@ -192,6 +192,7 @@ WORDS: Mapping[str, Any] = {
     "ACCEPTABLE": ACCEPTABLE,
     "ANY": ANY,
     "BY_HAND": BY_HAND,
+    "CURVE": CURVE,
     "DRAG": DRAG,
     "FAR": _FAR,
     "FAST_HZ": FAST_HZ,

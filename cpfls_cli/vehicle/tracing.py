@@ -194,7 +194,7 @@ def array_symbols(rotors: int) -> Functions:
 
     def total(x: Value) -> Value:
         if not isinstance(x, Symbol):
-            return x.sum(axis=0) if isinstance(x, np.ndarray) else rotors * x
+            return float(x.sum()) if isinstance(x, np.ndarray) else rotors * x
         return x.made("total", x) if x.place in x.graph.by_rotor else rotors * x
 
     names = ("sqrt", "exp", "sin", "cos", "floor", "where")

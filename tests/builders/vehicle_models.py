@@ -88,10 +88,7 @@ def remainder(order, breakpoints=SEVEN_RULES, rows=(0, 2, 5), size=1e-7):
 def whole(vehicle=QUAD, *, order=2, **changed):
     """A model that has every part."""
     model = VehicleModel(
-        vehicle=vehicle,
-        response=RESPONSE,
-        effects=polynomial_effects(vehicle),
-        remainder=remainder(order),
+        vehicle=vehicle, response=RESPONSE, effects=polynomial_effects(vehicle), remainder=remainder(order)
     )
     return replace(model, **changed)
 

@@ -29,6 +29,7 @@ from tests.builders.playback_flights import (
     true_numbers,
     truth,
 )
+from tests.builders.vehicle_models import thrust_curve
 
 RATE = 3
 # Mean length of the difference of two 3-vectors of noise, for a deviation of 1.

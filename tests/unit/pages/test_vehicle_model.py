@@ -458,7 +458,7 @@ def test_a_table_has_a_column_of_what_is_stated_where_it_has_any():
 def test_a_thrust_factor_comes_with_the_law_that_it_is_of():
     numbers = (number_of("thrust_factor"), number_of("thrust_slope.linear", -0.45, -0.8, -0.1))
     said = blocks_of(vehicle_of(whole(), numbers=numbers))
-    law = "; thrust is the thrust factor times w (w − 0.450 w_h), with w_h the speed in hover"
+    law = "; thrust is the thrust factor times w (1.45 w − 0.450 w_h), with w_h the speed in hover"
     (head,) = [block.text for block in said if isinstance(block, Heading) and law in block.text]
     assert head.startswith("Constants with 95 % intervals")
 

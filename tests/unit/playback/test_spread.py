@@ -52,7 +52,7 @@ def test_models_have_the_numbers_that_were_drawn():
         assert own.vehicle.rotors[3].drag_factor_n_m_s2 == pytest.approx(values["drag_factor"])
         assert own.response.lag_s == values["lag.time_constant_s"]
         assert own.effects[0].coefficients[0] == values["linear_damping.d_x"]
-        assert own.thrust_curve == model.thrust_curve
+        assert own.thrust_curve[0].coefficients[0] == values["thrust_slope.linear"]
 
 
 def test_vehicles_for_new_commands_are_as_much_later_as_the_one_that_they_are_drawn_about():

@@ -307,7 +307,7 @@ def test_flights_that_show_the_loop_determine_what_carries_the_weight_alone():
     numbers = [FoundNumber(name, "", 1.0, 0.9, 1.1, np.nan, True, False) for name in names]
     assert LOOP.shows_loop
     assert [number.name for number in widened_by_loop(numbers, LOOP) if number.determined] == ["thrust_factor"]
-    # A curve found next to it answers with the loop, as every effect; the thrust factor carries the weight all the same.
+    # A curve found next to it answers with the loop, as every effect; the thrust factor carries the weight still.
     numbers.append(FoundNumber("thrust_slope.linear", "", -0.3, -0.4, -0.2, np.nan, True, False))
     assert [number.name for number in widened_by_loop(numbers, LOOP) if number.determined] == ["thrust_factor"]
 
