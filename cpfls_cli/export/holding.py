@@ -40,7 +40,6 @@ NOTHING, _ROUNDING = 1e-9, 1e-12
 """Distance in SI that half a second without a part may end off, and torque or force: below both are rounding."""
 
 _LAG, _DELAY, _SLOW = "lag of the rotors", "delay of the rotors", "slow actuation"
-_LINEAR = "part of the thrust that is linear in the speed"
 _ROTORS = "what differs between rotors, and their places"
 _LEARNED = "the learned part, without a name"
 _NO_BODY = "inertia with a moment larger than the sum of the others, which no body has: the nearest possible is used"
@@ -303,8 +302,7 @@ def together(model: VehicleModel, held: Held) -> Off:
 def _left(model: VehicleModel, whole: Held, holds: Holds) -> Iterator[tuple[str, Held]]:
     """Give the whole model but for what is not held of each part."""
     rotors = model.rotors
-    columns = {_ROTORS: slice(1 + rotors, 1 + 2 * rotors), _LINEAR: slice(1, 1 + rotors)}
-    columns[_SLOW] = slice(1 + 3 * rotors, None)
+    columns = {_ROTORS: slice(1 + rotors, 1 + 2 * rotors), _SLOW: slice(1 + 3 * rotors, None)}
     parts = weights_by_part(model)
     for name in (one.name for one in model.parts):
         title = CATALOGUE[name].title if name in CATALOGUE else _LEARNED

@@ -162,8 +162,15 @@ class Numbers:
         return np.asarray(np.linalg.pinv((rows / length[:, None]).T) / length[:, None])
 
     def of(self, weights: Array) -> dict[str, float]:
-        """Find the numbers whose torque and force come nearest to those of a table of weights."""
-        return dict(zip(self.names, (self._inverse @ (weights * self.size).ravel()).tolist(), strict=True))
+        """Find the numbers whose torque and force come nearest to those of a table of weights.
+
+        What is linear in the speeds is as much by their squares in hover where no number is, so that it hovers as fast.
+        """
+        sized, rotors = weights * self.size, (weights.shape[2] - 1) // 4
+        linear, squares = slice(1, 1 + rotors), slice(1 + rotors, 1 + 2 * rotors)
+        rows = ~self.tables[:, :, 0, linear].any(axis=(0, 2))
+        sized[rows, 0, squares] += sized[rows, 0, linear]
+        return dict(zip(self.names, (self._inverse @ sized.ravel()).tolist(), strict=True))
 
     def holds(self, weights: Array) -> Array:
         """Give the weights of the nearest numbers, shape (6, terms, 1 + 4 rotors)."""
@@ -174,12 +181,13 @@ Wrenches = Callable[[Instant], Mapping[str, Wrench]]
 """From what is seen to torque and force per unit of numbers."""
 
 
-def numbers_of(model: VehicleModel, wrenches: Wrenches, *, alike: bool) -> Numbers:
+def numbers_of(model: VehicleModel, wrenches: Wrenches, *, alike: bool, lines: bool = False) -> Numbers:
     """Arrange the numbers of a simulator whose rotors give thrust and yaw torque by their squared speeds.
 
-    `wrenches` is what it knows besides these; `alike` asks for one thrust and one torque factor of all rotors.
+    `wrenches` is what it knows besides these, and `lines` whether thrust that is linear in the speeds is among it;
+    `alike` asks for one thrust and one torque factor of all rotors.
     """
-    rotors, hubs = model.rotors, places(model, alike=alike)
+    rotors, hubs = model.rotors, places(model, alike=alike, lines=lines)
     moved = tuple(replace(rotor, position_m=tuple(hub)) for rotor, hub in zip(model.vehicle.rotors, hubs, strict=True))
     vehicle = replace(model.vehicle, rotors=moved)
     names = wrenches(Instant(vehicle, Each([1.0] * rotors), (1.0,) * 3, (1.0,) * 3))
@@ -207,9 +215,10 @@ def _sizes(rotors: int) -> Array:
     return np.asarray(np.sqrt((motion_terms(air, rate) ** 2).mean(axis=0)))
 
 
-def places(model: VehicleModel, *, alike: bool) -> Array:
+def places(model: VehicleModel, *, alike: bool, lines: bool = False) -> Array:
     """Find where rotors have to stand so that their thrust gives the torque of the model, shape (rotor, 3), m."""
-    squares = weights_of_model(model)[:, 0, 1 + model.rotors : 1 + 2 * model.rotors]
+    _, linear, squares, *_ = np.split(weights_of_model(model)[:, 0], 1 + model.rotors * np.arange(4), axis=1)
+    squares = squares if lines else squares + linear / hover_speed(model.vehicle)
     thrust = np.full(model.rotors, squares[_UP].mean()) if alike else squares[_UP]
     hubs = np.array([rotor.position_m for rotor in model.vehicle.rotors], dtype=float)
     return np.column_stack([-squares[_PITCH] / thrust, squares[_ROLL] / thrust, hubs[:, 2]])

@@ -64,7 +64,7 @@ def ardupilot_held(model: VehicleModel) -> tuple[Held, Holds]:
     body = constant_body(model)
     inertia = np.diag(np.diag(body.inertia))
     body = body._replace(inertia=inertia, inverse=np.asarray(np.linalg.inv(inertia), dtype=float), gravity=_GRAVITY)
-    numbers = numbers_of(model, _wrenches, alike=True)
+    numbers = numbers_of(model, _wrenches, alike=True, lines=True)
     squares = slice(1 + model.rotors, 1 + 2 * model.rotors)
     own = weights_of_model(model)
     hover = _hover_speed(numbers.of(own), body.mass, model.rotors)
@@ -137,7 +137,7 @@ def _keys(model: VehicleModel, held: Held, order: IntArray) -> dict[str, Any]:
     # As fast as the vehicle's in hover, where the other grows with the square.
     cube = found["thrust"] * (3 * hover**2 + 2 * linear * hover) / most
     yaw = 2 * found["yaw"] * hover / (_YAW_SHARE * size * cube)
-    hubs, turns = places(model, alike=True), spins(vehicle)
+    hubs, turns = places(model, alike=True, lines=True), spins(vehicle)
     keys = {
         "mass": held.body.mass,
         "diagonal_size": size,

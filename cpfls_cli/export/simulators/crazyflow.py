@@ -41,7 +41,7 @@ _USE = (
 def crazyflow_held(model: VehicleModel) -> tuple[Held, Holds]:
     """Take what these dynamics fly of a vehicle."""
     require_four(model, "crazyflow and drone-models mix")
-    numbers = numbers_of(model, _wrenches, alike=True)
+    numbers = numbers_of(model, _wrenches, alike=True, lines=True)
     holds = with_drag(numbers, model.vehicle)
     return held_by(model, holds, constant_body(model), numbers, lags=True), holds
 
@@ -68,7 +68,7 @@ def _wrenches(see: Instant) -> Mapping[str, Wrench]:
 def crazyflow_text(sheet: Sheet, held: Held, remarks: Sequence[str], _file: str) -> str:
     """Write a vehicle as a section of TOML, with what it does not hold."""
     found, vehicle = held.numbers, sheet.model.vehicle
-    hubs, length = places(sheet.model, alike=True), arm(vehicle)
+    hubs, length = places(sheet.model, alike=True, lines=True), arm(vehicle)
     most = vehicle.rotor_speed_max_rad_s
     rate = 1.0 / held.response.lag_s if held.response.lag_s else 0.0
     given: dict[str, Any] = {

@@ -6,9 +6,10 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.errors import InputError
 from cpfls_cli.export.holding import FUZZY, of_a_body, probe_flight
-from cpfls_cli.export.registry import exported
+from cpfls_cli.export.registry import FORMS, exported
 from cpfls_cli.playback.model import VehicleModel
 from cpfls_cli.playback.player import player_of
 from cpfls_cli.playback.rotors import RotorResponse
@@ -16,7 +17,7 @@ from tests.builders.exported_models import CASES, model_of
 from tests.builders.exported_vehicles import sheet_of_vehicle
 from tests.builders.flown_exports import FLYING
 from tests.builders.playback_flights import STATED, truth
-from tests.builders.vehicle_models import HEXA, QUAD, whole
+from tests.builders.vehicle_models import HEXA, QUAD, thrust_curve, whole
 from tests.builders.verified_exports import AGREES, verified
 
 LIBRARIES = ("casadi", "jax")
@@ -92,6 +93,18 @@ def test_each_simulator_names_what_it_lacks():
     assert "linear rotational damping" not in lacks["mjcf"]
     assert "rotor drag" not in lacks["mjcf"]
     assert "flapping" in lacks["mjcf"]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_thrust_curve_hovers_at_the_same_speed_in_every_form(form):
+    """By squares alone where a form has no more; the curve is missing there, or where its torque about z is none."""
+    model = replace(truth(), effects=(thrust_curve(0.6),))
+    hover = hover_speed(model.vehicle)
+    made = exported(sheet_of_vehicle(model), form, "v")
+    _, lines, squares, *_ = np.split(made.held.weights[:, 0], 1 + model.rotors * np.arange(4), axis=1)
+    wrench = hover * lines.sum(axis=1) + hover**2 * squares.sum(axis=1)
+    assert wrench[5] == pytest.approx(model.vehicle.mass_kg * model.vehicle.gravity_m_s2, rel=1e-9)
+    assert lines[2].any() != any("thrust curve" in each.title for each in made.missing)
 
 
 def test_sizes_are_those_of_what_is_missing():
