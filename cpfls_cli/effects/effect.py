@@ -196,6 +196,11 @@ class Effect:
         return self.acts is not None and not elsewhere
 
     @property
+    def of_commands(self) -> bool:
+        """Whether a flight that has it logs commands, which its rotors do not simply follow."""
+        return self.actuation is not None or "command" in self.needs
+
+    @property
     def is_lag(self) -> bool:
         """Whether it delays the rotors or their log, as a control loop seems to; the voltage of a supply does not."""
         if self.actuation is None:

@@ -189,9 +189,9 @@ def _actuation(motion: SimulatedMotion, effects: SimulatedEffects) -> dict[str, 
     Where no effect replaces the lag of the rotors, a hidden flight logs the command after it, so that the effects are
     all that is left between log and rotors.
     """
-    acting = [one.effect.actuation for one in effects.listed if one.effect.actuation is not None]
-    if not acting:
+    if not effects.hides_rotor_speed:
         return {"rotor_speed": motion.speed, "rotor_command": motion.command}
+    acting = [one.effect.actuation for one in effects.listed if one.effect.actuation is not None]
     voltage = {"voltage": motion.voltage} if any(each.supply is not None for each in acting) else {}
     lag = any(each.lag is not None for each in acting)
     return {"rotor_command": motion.command if lag else motion.lagged, **voltage}

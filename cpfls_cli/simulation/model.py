@@ -50,7 +50,7 @@ class SimulatedEffects:
     @property
     def hides_rotor_speed(self) -> bool:
         """Whether the flight logs commands in place of rotor speeds."""
-        return any(one.effect.actuation is not None for one in self.listed)
+        return any(one.effect.of_commands for one in self.listed)
 
 
 @result
@@ -235,7 +235,7 @@ def _refuse_conflict(chosen: SimulatedEffects) -> None:
     needing = [one.effect for one in chosen.listed if "measured_rotor_speed" in one.effect.needs]
     if not (chosen.hides_rotor_speed and needing):
         return
-    *others, last = (name for name, effect in CATALOGUE.items() if effect.actuation is not None)
+    *others, last = (name for name, effect in CATALOGUE.items() if effect.of_commands)
     does = needing[0].log.does if needing[0].log is not None else "needs measured rotor speeds"
     raise SettingError(_key(needing[0].name), f"{does}, which a flight with {', '.join(others)} or {last} does not log")
 

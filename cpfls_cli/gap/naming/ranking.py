@@ -152,10 +152,13 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
     The shapes of the chosen effects are in the base by their derivatives, so that a candidate is judged by what it
     adds after they have moved.
     """
-    base = hypothesis.base
-    parts = [base, number_columns(hypothesis, fit(hypothesis, floor))[..., base.shape[2] :]]
+    base, linear = hypothesis.base, fit(hypothesis, floor)
+    parts = [base, number_columns(hypothesis, linear)[..., base.shape[2] :]]
     priors, placed = [known_before(hypothesis)], list[tuple[Candidate, IntArray, Array]]()
-    own_wrench, places = hypothesis.rotor_wrench, np.arange(base.shape[2] + parts[1].shape[2])
+    (_, of_vehicle), *_ = hypothesis.places
+    # What turns the vehicle: a curve of the thrust in the base is as much a part of it as the squares.
+    own_wrench = hypothesis.rotor_wrench + base[..., of_vehicle.stop :] @ linear[of_vehicle.stop :]
+    places = np.arange(base.shape[2] + parts[1].shape[2])
     first = len(places)
     for candidate in candidates:
         columns = hypothesis.columns(candidate)

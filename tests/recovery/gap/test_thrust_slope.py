@@ -5,17 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cpfls_cli.effects.registry import CATALOGUE
 from cpfls_cli.gap.diagnose import diagnose
+from cpfls_cli.gap.naming.ranking import rank_effects
 from cpfls_cli.gap.settings import GapSettings
-from tests.builders.gap_flights import VEHICLE, fly
+from tests.builders.gap_flights import VEHICLE, candidate, fly, weak
 
 FEW = GapSettings(shifts=39)
 HOVER = np.sqrt(VEHICLE.mass_kg * 9.81 / sum(rotor.thrust_factor_n_s2 for rotor in VEHICLE.rotors))
 
 
-def commanded(seed, share=0.0, **given):
+def commanded(seed, share=0.0, gyro=0.005, **given):
     """A log of the commands of rotors whose thrust is a square and, this share of it in hover, a line of them."""
-    signals = fly(seed, gyro=0.005)
+    signals = fly(seed, gyro=gyro)
     ratio = (signals.rotor_speed / HOVER) ** 2
     command = HOVER * (-share + np.sqrt(share**2 + 4 * (1 - share) * ratio)) / (2 * (1 - share))
     assert (1 - share) * command**2 + share * HOVER * command == pytest.approx(signals.rotor_speed**2)
@@ -70,6 +72,15 @@ def test_a_wrong_inertia_is_no_curve_of_the_commands():
 
 def test_a_square_is_named_nothing():
     assert named().verdict == "NO_GAP"
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_next_to_a_curve_less_drag_with_less_inertia_explains_nothing(share):
+    """It leaves less of the yaw torque, noise with it, and so it did where the curve was no part of that torque."""
+    flights = [weak(commanded(seed, share, gyro=0.02), force=True) for seed in (1, 2)]
+    curve, drag = candidate("thrust_slope", thrust_scale=0.0), CATALOGUE["drag_factor_error"]
+    (best,) = rank_effects(flights, [curve], [drag], FEW, None).ranking
+    assert best.gain < 1.0
 
 
 def test_flights_of_which_one_has_measured_speeds_have_no_curve():

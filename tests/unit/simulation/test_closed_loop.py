@@ -27,7 +27,7 @@ from cpfls_cli.simulation.inverse import (
     squared_speeds,
     tilt_of,
 )
-from cpfls_cli.simulation.model import simulated_effects
+from cpfls_cli.simulation.model import SimulatedEffects, simulated_effects
 from cpfls_cli.simulation.settings import ClosedLoopSettings, SimulationSettings
 from cpfls_cli.trajectory.excited import added_motion
 from cpfls_cli.trajectory.planning import plan
@@ -109,6 +109,7 @@ def test_effect_leaves_in_the_balance_what_the_catalogue_says(name):
 def test_a_thrust_curve_needs_its_share_alone(given):
     (curve,) = simulated_effects({"thrust_slope": given}, VEHICLE).listed
     assert curve.values == {"linear": 0.4, "thrust_scale": 0.0}
+    assert SimulatedEffects((curve,)).hides_rotor_speed, "measured speeds have the square of their blades"
     wrong = {"thrust_scale": 0.2}
     both = simulated_effects({"thrust_slope": [0.4], "parameter_error": wrong}, VEHICLE)
     assert both.values("thrust_slope") == {"linear": 0.4, "thrust_scale": 0.2}
