@@ -299,7 +299,7 @@ def find_constants(
     for slowest in range(len(balances.bands_hz) - 1, 0, -1):
         faster = found.bands.copy()
         faster[slowest] = False
-        fast = search.chosen(faster, held)
+        fast = search.chosen(faster, held, found)
         if (fast.agrees(found) and found.explains(slowest)) or not (past or fast.identifies):
             break
         found = fast
@@ -323,9 +323,13 @@ class _Search(NamedTuple):
         """Take the balances at values of the numbers."""
         return _Problem(free, self.balances.sums(free.base, values), values, bands, self.balances.bands_hz, held)
 
-    def chosen(self, bands: BoolArray, held: Set[str]) -> _Problem:
-        """Estimate numbers in some bands, and add the block that lowers the residual most until none does."""
-        found = self.solved(self.asked, bands, {}, held)
+    def chosen(self, bands: BoolArray, held: Set[str], begun: _Problem | None = None) -> _Problem:
+        """Estimate numbers in some bands, and add the block that lowers the residual most until none does.
+
+        Of what was found in more bands the blocks are in already: by fewer a lag and a delay are hardly two.
+        """
+        blocks, known = (self.asked, {}) if begun is None else (begun.blocks, begun.free.named(begun.values))
+        found = self.solved(blocks, bands, known, held)
         while best := self._best_block(found):
             more = self.solved([*found.blocks, best], bands, found.free.named(found.values), found.held & {DRAG})
             if not len(more.places_of([best])):
