@@ -44,10 +44,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
             if all(map(str.strip, first.values())):
                 break
             first = {name: own.strip() or later for (name, own), later in zip(first.items(), row, strict=True)}
-    numeric = [name for name in names if name in first and _kind(first[name])]
-    if names.count("") > 1:
-        # As of a spreadsheet that filled its lines.
-        numeric = [name for name in numeric if name]
+    # Several columns without a name are of a spreadsheet that filled its lines.
+    numeric = [name for name in names if name in first and _kind(first[name]) and (name or names.count("") < 2)]
     if stated:
         columns = read_csv(path, set(numeric))
         held = [name for name in numeric if np.isfinite(columns[name]).any()]
@@ -97,8 +95,7 @@ def read_csv(path: Path, wanted: set[str]) -> dict[str, Array]:
     if not count:
         raise InputError(f"{path}: holds column names but no samples")
     values = np.array(numbers).reshape(count, len(kept))
-    columns: dict[str, Array] = {name: np.empty(0) for name in names}
-    return columns | {names[index]: values[:, position] for position, index in enumerate(kept)}
+    return dict.fromkeys(names, np.empty(0)) | {names[index]: own for index, own in zip(kept, values.T, strict=True)}
 
 
 _Rows = Iterator[tuple[int, list[str]]]
@@ -173,8 +170,9 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     # A loop that writes a separator behind each field leaves an empty one, in either of both.
     while len(names) > len(first) > 0 and not names[-1]:
         names.pop()
-    if len(first) > len(names) > 1 and not any(first[len(names) :]):
-        rows = ((at, own[: len(names)] if not any(own[len(names) :]) else own) for at, own in rows)
+    # What a viewer computes has no name in some of its exports.
+    if len(first) > len(names) > 1 and (stated or not any(first[len(names) :])):
+        rows = ((at, own[: len(names)] if stated or not any(own[len(names) :]) else own) for at, own in rows)
         first = first[: len(names)]
     if any(map(_DECIMAL_COMMA.fullmatch, first)):
         rows = ((at, list(map(_with_points, fields))) for at, fields in rows)
@@ -306,8 +304,7 @@ def _number(field: str, path: Path, row: int, column: str) -> float:
     try:
         return number_of(field)
     except ValueError:
-        text = field.strip()
-        raise InputError(f"{path}:{row}: column '{column}' = {text[:40]!r}: not a number") from None
+        raise InputError(f"{path}:{row}: column '{column}' = {field.strip()[:40]!r}: not a number") from None
 
 
 def _plain_numbers(fields: list[str]) -> list[float]:

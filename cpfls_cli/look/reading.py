@@ -336,12 +336,13 @@ class _Reader:
             held += f"; {joined(surfaces)} are no rotors" if surfaces else ""
             known = named_signals(column_groups(self.log.table.names))
             for group in [own.group for own in known if own.signal == "body_rate"][:1]:
-                still = np.ptp(self.log.table.values(group.columns)[1], axis=0).max(initial=0.0) == 0
+                values = self.log.table.values(group.columns)[1]
                 derived = "are derivatives of angles, or wrong: as rates of the body they do not fit the attitude"
                 if self.signal("attitude") is None:
                     derived = "may be derivatives of angles; what a gyroscope reads is best called gyro_x and so on"
                 other = derived if group.derivative else "are no rates of the body"
-                held += f"; {joined(group.columns)} {'never change' if still else other}"
+                still = "never change" if len(values) else "hold no samples"
+                held += f"; {joined(group.columns)} {other if np.diff(values, axis=0).any() else still}"
             raise InputError(f"a log without a gyroscope (it holds {held}): {faster}")
         return found
 

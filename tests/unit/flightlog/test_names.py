@@ -130,6 +130,7 @@ def first(names, signal, system=""):
         ("att.gx_[deg/s] att.gy_[deg/s] att.gz_[deg/s]", "body_rate", "att.gx_[deg/s] att.gy_[deg/s] att.gz_[deg/s]"),
         ("motval_0 motval_1 motval_2 motval_3", "rotor_command", "motval_0 motval_1 motval_2 motval_3"),
         ("motorrpm1 motorrpm2 motorrpm3", "rotor_speed", "motorrpm1 motorrpm2 motorrpm3"),
+        ("pwm_in_us_1 pwm_in_us_2 pwm_in_us_3", "rotor_command", "pwm_in_us_1 pwm_in_us_2 pwm_in_us_3"),
         # The first instance of a topic bears no number.
         ("ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM", "rotor_speed", "ESC.RPM ESC[1].RPM ESC[2].RPM ESC[3].RPM"),
     ],
@@ -184,6 +185,8 @@ def test_columns_are_found_by_their_names(names, signal, columns):
         ("X Y Z P Q R", "attitude"),
         ("kp_r kp_p kp_y", "attitude"),
         ("v_dot_x v_dot_y v_dot_z", "velocity"),
+        ("pwm_in[0] pwm_in[1] pwm_in[2] pwm_in[3]", "rotor_command"),
+        ("GyroIntegration[0] GyroIntegration[1] GyroIntegration[2]", "body_rate"),
     ],
 )
 def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):

@@ -284,6 +284,11 @@ def test_what_the_log_viewer_exports_is_read_as_the_log(read, tmp_path):
         np.testing.assert_allclose(exported.topics[""][name], values, rtol=1e-6, atol=1e-9, err_msg=name)
     assert exported.topics[""]["flightModeFlags"].tolist() == [1.0] * len(rows)
     assert (exported.units, exported.system) == (log.units, log.system)
+    # Some viewers write more of what they compute than they name.
+    head, values = text[: text.index('"loopIteration"')], text[text.index('"loopIteration"') :].splitlines()
+    longer = read(head + "\n".join([values[0], *(f"{line},0.5,NaN" for line in values[1:])]) + "\n", "more.bbl.csv")
+    for name, own in exported.topics[""].items():
+        np.testing.assert_array_equal(longer.topics[""][name], own)
     # A spreadsheet drops quotes that it does not need, and fills each line; of much of Europe with semicolons.
     width = len(NAMES) + 2
     filled = [next(csv.reader([line])) for line in text.splitlines()]

@@ -224,6 +224,7 @@ def test_columns_that_are_called_rates_and_are_none_are_named():
     for rates, why in (
         (np.gradient(angles, OWN.time, axis=0), "are derivatives of angles, or wrong: as rates of .* the attitude"),
         (0 * angles, "never change"),
+        (np.nan * angles, "hold no samples"),
     ):
         contents = logs.WRITERS[""](OWN)
         fields = contents.topics[""]
