@@ -31,6 +31,11 @@ def test_a_damping_that_drives_is_set_to_zero_and_the_others_stay():
     assert found.gain > 1000
 
 
+def test_an_effect_of_one_refused_sign_is_refused():
+    assert scored(flights((candidate("rotor_drag"), [-1.5e-3])), CATALOGUE["rotor_drag"]).gain == -np.inf
+    assert scored(flights((candidate("rotor_drag"), [1.5e-3])), CATALOGUE["rotor_drag"]).gain > 100
+
+
 def half_open(bound):
     """An offset of torque about x, and a number that these flights hardly show, held within bounds."""
 
