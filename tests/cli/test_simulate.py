@@ -123,6 +123,12 @@ def test_effects_of_the_config_do_the_same_as_those_of_the_command_line(fly):
         np.testing.assert_array_equal(*(read(path, name)[0] for path in (first, second)))
 
 
+def test_same_seed_same_bytes(fly):
+    first, second, other = (fly(*words, name=f"{n}.h5")[0] for n, words in enumerate([(), (), ("--seed", 6)]))
+    assert first.read_bytes() == second.read_bytes()
+    assert np.abs(read(first, "body_rate")[0] - read(other, "body_rate")[0]).max() > 1e-3
+
+
 def test_mode_of_the_command_line_goes_before_that_of_the_config(fly, short, cpfls, tmp_path):
     path, said = fly("--mode", "inverse", "--set", "simulation.noise={}")
     assert "off the path" not in said
