@@ -36,6 +36,13 @@ def test_an_effect_of_one_refused_sign_is_refused():
     assert scored(flights((candidate("rotor_drag"), [1.5e-3])), CATALOGUE["rotor_drag"]).gain > 100
 
 
+@pytest.mark.parametrize(("damping", "refused"), [(1.2, False), (2.4, True)])
+def test_a_damping_of_more_than_any_body_has_is_refused(damping, refused):
+    found = scored(flights((candidate("linear_damping"), [damping, 0.0, 0.0])), CATALOGUE["linear_damping"])
+    assert (found.gain == -np.inf) == refused
+    assert refused or found.coefficients[0] == pytest.approx(damping, rel=0.02)
+
+
 def half_open(bound):
     """An offset of torque about x, and a number that these flights hardly show, held within bounds."""
 
