@@ -148,13 +148,6 @@ def test_a_later_run_leaves_no_file_of_an_earlier_one(none):
     assert {path.name for path in none.folder.iterdir()} == (FILES - {"extended.h5"}) | {"notes.txt"}
 
 
-def test_extended_model_holds_the_effect_and_the_inertia(found):
-    with h5py.File(found.folder / "extended.h5") as file:
-        assert file["effects/name"][()].tolist() == [b"com_offset"]
-        assert file["effects/linear/values"][:2] == pytest.approx(OFFSET, rel=0.02)
-        assert file["inertia"][()] == pytest.approx([0.6, 0.6, 1.2, 0, 0, 0], rel=0.01, abs=1e-12)
-
-
 def test_playback_of_measured_rotors_gets_better(found):
     # The logs hold neither attitude nor velocity.
     assert set(found.summary["playback"]["at_end"]) == {"body_rate"}

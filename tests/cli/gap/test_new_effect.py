@@ -76,9 +76,11 @@ def new(tmp_path_factory):
             ["simulate", "study.yaml", path, "--seed", number, "--effect", "cubic_damping=0.3,0.3,0.3", "-o", flight],
         ]
     commands += [
-        ["gap", "study.yaml", "flight-1.h5", "--held-out", "flight-2.h5", "-o", "gap", "--json"],
-        ["export", "gap/extended.h5", "-o", "vehicle.c"],
-        ["replay", "study.yaml", "gap/extended.h5", "flight-2.h5", "-o", "replay.h5", "--json"],
+        ["compare", "study.yaml", "flight-1.h5", "-o", "gap.h5"],
+        ["diagnose", "study.yaml", "gap.h5", "--held-out", "flight-2.h5", "-o", "found.h5", "--json"],
+        ["extend", "study.yaml", "found.h5", "-o", "extended.h5"],
+        ["export", "extended.h5", "-o", "vehicle.c"],
+        ["replay", "study.yaml", "extended.h5", "flight-2.h5", "-o", "replay.h5", "--every", "50", "--json"],
         ["effects"],
     ]
     words = (sys.executable, "-c", PROGRAM, folder / "effects", json.dumps(commands))
@@ -96,7 +98,7 @@ def test_it_is_listed_and_flown(new):
 
 
 def test_it_is_named_with_its_coefficients(new):
-    found = json.loads(new.said["gap"])
+    found = json.loads(new.said["diagnose"])
     (effect,) = found["effects"]
     assert (found["verdict"], effect["name"]) == ("NAMED", "cubic_damping")
     about_yaw = effect["coefficients"]["d_z"]

@@ -173,22 +173,15 @@ def test_folder_that_vanishes(program, tmp_path):
     )
 
 
-CONFIGS = {
-    "rigid-body base, local search": ("base=rigid-body", "local_search.enabled=true", "population=10", "generations=1"),
-    "paper's base": ("base=none",),
-}
+LEARNED = ("base=rigid-body", "local_search.enabled=true", "population=10", "generations=1")
 
 
-def options(keys):
-    return [word for key in keys for word in ("--set", f"identification.{key}")]
-
-
-@pytest.mark.parametrize("keys", CONFIGS.values(), ids=CONFIGS)
-def test_two_processes_and_a_cluster_give_the_same_bytes(cpfls, words, tmp_path, keys, request):
+def test_two_processes_and_a_cluster_give_the_same_bytes(cpfls, words, tmp_path, request):
     pytest.importorskip("distributed", reason="Dask is not installed: pip install 'cpfls[dask]'")
     address = request.getfixturevalue("address")
+    options = [word for key in LEARNED for word in ("--set", f"identification.{key}")]
     for name, who in {"one": (), "two": ("--workers", 2), "dask": ("--scheduler", address)}.items():
-        cpfls.done(*words, "-o", tmp_path / name, *options(keys), *who)
+        cpfls.done(*words, "-o", tmp_path / name, *options, *who)
     one, two, dask = ((tmp_path / name).read_bytes() for name in ("one", "two", "dask"))
     assert one == two
     assert one == dask

@@ -246,7 +246,7 @@ def full(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gap")
     diagnosis = made.diagnosis()
     written(folder / "diagnosis.h5", diagnosis)
-    with drawn():
+    with drawn(shown=False):
         return shown(folder, made.disagreement(), diagnosis, made.extended())
 
 
