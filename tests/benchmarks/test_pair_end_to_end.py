@@ -19,14 +19,15 @@ DAMPING, ACROSS, ALONG = 0.04 * 0.027, 9.1785e-7, 10.311e-7
 
 @pytest.fixture(scope="module")
 def answer(tmp_path_factory):
-    """The summary of `cpfls gap`, and what was hidden."""
+    """The folder of `cpfls gap`, its summary, and what was hidden."""
     place = tmp_path_factory.mktemp("pair")
     case = make("pair", "pair", "sixkg", HIDDEN, np.random.default_rng(5), level=0.5)
     [logs] = fly([[Set(case, "mid", "white", 11)]], place, duration=8.0)
     flights = [*sorted(logs.glob("train_*.csv")), *sorted(logs.glob("held_out_*.csv"))]
+    folder = place / "gap"
     held = [word for path in flights[3:] for word in ("--held-out", path)]
-    words = ("gap", logs / "study.yaml", *flights[:3], *held, "-o", place / "gap", "--set", "gap.shifts=39")
-    return SimpleNamespace(summary=run.summary(*words), hidden=case.hidden)
+    result = run.done("gap", logs / "study.yaml", *flights[:3], *held, "-o", folder, "--json", "--set", "gap.shifts=39")
+    return SimpleNamespace(folder=folder, summary=json.loads(result.stdout), hidden=case.hidden, logs=logs, held=held)
 
 
 def test_both_effects_are_named_and_nothing_else(answer):
@@ -47,6 +48,22 @@ def test_gap_closes_on_flights_held_out(answer):
     for channels in ("floors", "force_floors"):
         assert max(before[channels]) > 20
         assert max(after[channels]) < 1.5
+
+
+def test_every_artifact_is_good(answer):
+    names = {"disagreement.h5", "diagnosis.h5", "extended.h5", "report.html", "gap.json"}
+    assert {path.name for path in answer.folder.iterdir()} == names
+    for name in ("disagreement", "diagnosis", "extended"):
+        run.done("check", answer.folder / f"{name}.h5")
+
+
+def test_extended_model_leaves_the_gap_that_was_promised(answer):
+    again = answer.folder.parent / "again.h5"
+    flights = answer.held[1::2]
+    model = answer.folder / "extended.h5"
+    gap = run.summary("compare", answer.logs / "study.yaml", *flights, "--model", model, "-o", again)["gap"]
+    assert gap["torque_n_m"] == pytest.approx(answer.summary["gap_after"]["torque_n_m"], rel=1e-6)
+    assert max(gap["floors"]) < 1.5
 
 
 @pytest.fixture(scope="module")

@@ -299,6 +299,11 @@ def test_a_good_log_has_no_notes(notes_of):
         assert "quality" not in file
 
 
+def test_motors_slower_than_the_log_are_said(notes_of):
+    (note,), _ = notes_of(**{f"u{i}": np.repeat(0.5 + 0.05 * NOISE[:400, i], 5) for i in range(1, 5)})
+    assert note.startswith("cpfls: note: rotor_command is updated 10 times a second, but the log has 50 rows a second:")
+
+
 def test_motors_on_the_ground_are_said_and_the_crop_that_is_named_mends_it(notes_of):
     grounded = {f"u{i}": np.r_[np.full(200, -0.1), 0.5 + 0.05 * NOISE[200:, i]] for i in range(1, 5)}
     (rest, below), _ = notes_of(**grounded)
@@ -306,6 +311,13 @@ def test_motors_on_the_ground_are_said_and_the_crop_that_is_named_mends_it(notes
     assert "rotor_command is below zero in 200 of 2000 rows" in below
     crop = rest[rest.index("import.crop_s: ") :].partition(" keeps")[0].replace(": ", "=").replace(" ", "")
     assert notes_of("--set", crop, **grounded)[0] == []
+
+
+def test_a_dead_and_a_clipped_column_are_said_by_name(notes_of):
+    clipped = np.clip(1.6 * np.sin(2 * np.arange(2000) / 50) + 0.02 * NOISE[:, 1], -2, 1.3)
+    notes, _ = notes_of(u3=np.full(2000, 0.4), q=clipped, pitch=-0.8 * np.cos(2 * np.arange(2000) / 50))
+    assert any("column u3 of import.signals.rotor_command does not change in 2000 rows: dead" in note for note in notes)
+    assert any("column q stays at its extreme" in note for note in notes)
 
 
 def test_a_filter_before_the_log_is_said_and_its_cut_off_is_kept(notes_of):

@@ -597,7 +597,7 @@ def answer(training, held):
     return diagnose(*recordings, GapSettings(), np.random.default_rng(1)).diagnosis
 
 
-@pytest.mark.parametrize("wrong", ["in g", "filtered at 5 Hz", "attitude late"])
+@pytest.mark.parametrize("wrong", ["in g", "with gravity", "late", "filtered at 5 Hz", "attitude late"])
 def test_the_effect_is_named_in_spite_of_a_wrong_channel(flights, wrong):
     change, words = WRONG[wrong]
     found = answer(*(change(signals) for signals in flights))
@@ -607,8 +607,9 @@ def test_the_effect_is_named_in_spite_of_a_wrong_channel(flights, wrong):
     assert np.nanmax(found.gap.before_floors) < 20
 
 
-def test_the_effect_is_named_in_spite_of_an_attitude_that_leans(flights):
-    found = answer(*map(askew([0.03, 0.02, 0.0]), flights))
+@pytest.mark.parametrize("turn", [[0.03, 0.02, 0.0], [0.0, 0.03, 0.0]])
+def test_the_effect_is_named_in_spite_of_an_attitude_that_leans(flights, turn):
+    found = answer(*map(askew(turn), flights))
     assert (found.verdict, [effect.name for effect in found.effects]) == ("NAMED", ["rotor_drag"])
     assert found.effects[0].numbers[0].value == pytest.approx(DRAG, rel=0.05)
 

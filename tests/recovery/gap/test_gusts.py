@@ -170,13 +170,15 @@ def test_an_inertia_that_nothing_was_asked_of_is_said_by_what_was_before(flown, 
         assert numbers["inertia_y"].low < 1 / heavy - 1 < numbers["inertia_y"].high
 
 
-def test_a_lag_is_distinguished_from_a_delay_and_from_the_loop_by_what_was_before(flown, monkeypatch):
+@pytest.mark.parametrize("differs", [False, True])
+def test_a_lag_is_distinguished_from_a_delay_and_from_the_loop_by_what_was_before(flown, monkeypatch, differs):
     """Also where a fit to all motion, which is the loop's, says that flights differ."""
     recordings = recorded(flown["late"], TRUE.vehicle, setpoints=True, commanded=True)
-    named = diagnose_module._named
-    monkeypatch.setattr(
-        diagnose_module, "_named", lambda *given: named(*given)._replace(differ=("the flights differ",))
-    )
+    if differs:
+        named = diagnose_module._named
+        monkeypatch.setattr(
+            diagnose_module, "_named", lambda *given: named(*given)._replace(differ=("the flights differ",))
+        )
     run = diagnosed(recordings)
     assert run.diagnosis.verdict is GapVerdict.NAMED
     assert not run.diagnosis.alternatives

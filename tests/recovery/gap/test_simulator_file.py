@@ -108,6 +108,16 @@ def test_thrust_and_inertia_that_are_both_wrong(tmp_path, logs):
     np.testing.assert_allclose(moments, TRUE.inertia, rtol=0.03)
 
 
+def test_an_inertia_20_percent_too_small(tmp_path, logs):
+    said, new = corrected(tmp_path, logs, inertia=(1 / 1.2, 1 / 1.2, 1.0))
+    changes = {change["element"]: change for change in said["corrected"]["changes"]}
+    assert list(changes) == ["ixx", "iyy"]
+    for change, true in zip(changes.values(), TRUE.inertia, strict=False):
+        assert change["low"] < true < change["high"]
+    np.testing.assert_allclose(np.diag(new.inertia)[:2], TRUE.inertia[:2], rtol=0.05)
+    assert {rotor.thrust.value for rotor in new.rotors} == {TRUE.thrust_factor}
+
+
 @pytest.mark.parametrize(("ending", "spins"), [("xml", (1, 1, -1, 1)), ("sdf", (1, -1, -1, 1))])
 def test_rotors_that_turn_the_other_way(tmp_path, few, ending, spins):
     """One of them, or two of different spins, which roll and pitch would not show."""

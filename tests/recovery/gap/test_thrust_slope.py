@@ -31,8 +31,8 @@ def named(**known):
     return diagnose(flights[:2], flights[2:], FEW, np.random.default_rng(1)).diagnosis
 
 
-def test_a_curve_of_the_commands_is_no_wrong_inertia():
-    share = 0.2
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_a_curve_of_the_commands_is_no_wrong_inertia(share):
     found = named(share=share)
     assert (found.verdict, [each.name for each in found.effects]) == ("NAMED", ["thrust_slope"])
     (number,) = found.effects[0].numbers
@@ -41,9 +41,9 @@ def test_a_curve_of_the_commands_is_no_wrong_inertia():
     assert number.value == pytest.approx(share, abs=0.02)
 
 
-def test_next_to_a_wrong_mass_the_curve_leaves_the_inertia_as_it_is():
+@pytest.mark.parametrize("heavier", [0.1, 0.4])
+def test_next_to_a_wrong_mass_the_curve_leaves_the_inertia_as_it_is(heavier):
     """A vehicle that weighs less than stated hovers at another command, about which the curve has its share."""
-    heavier = 0.4
     found = named(share=0.5, mass_kg=(1 + heavier) * VEHICLE.mass_kg)
     curve, wrong = found.effects
     assert (found.verdict, curve.name, wrong.name) == ("NAMED", "thrust_slope", "parameter_error")
