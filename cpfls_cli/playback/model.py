@@ -272,7 +272,7 @@ class VehicleModel:
     @property
     def is_rigid_body(self) -> bool:
         """Whether it is mass, inertia and squared rotor speeds alone."""
-        return not (self.effects or self.remainder or any(self.wind)) and self.response == (RotorResponse())
+        return not (self.effects or self.remainder or any(self.wind)) and self.response == RotorResponse()
 
     @property
     def of_catalogue(self) -> bool:

@@ -232,8 +232,8 @@ def held_by_bounds(vehicle: VehicleSettings, loop: LoopBounds, fitted: Sequence[
 
     Moments of inertia stay as stated where all of these lie between their bounds. About yaw the bounds are those of the
     drag factor where that is not known, or of its ratio to the moment, which is then that of a flat body. The thrust
-    factor is that of the fit, for it carries the weight. Numbers are given
-    as exact, for the loop widens them to the bounds (`widened_by_loop`); what has none is open by a factor of ten.
+    factor is that of the fit, for it carries the weight. Numbers are given as exact, for the loop widens them to the
+    bounds (`widened_by_loop`); what has none is open by a factor of ten.
     """
     found, rotor = {number.name: number for number in fitted}, vehicle.rotors[0]
     open_thrust, open_drag, open_body = (name in vehicle.unknown for name in ("thrust_factor", "drag_factor", INERTIA))
