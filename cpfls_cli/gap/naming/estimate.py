@@ -327,14 +327,12 @@ def on_bound(found: NamedFit) -> Refusal | None:
     chosen, effects = found.hypothesis.chosen, found.estimates.effects
     for (effect, _), numbers in zip(chosen, effects, strict=True):
         shapes = [shape.name for shape in effect.shapes]
-        at_ends = [
-            any(bound and number.low <= bound <= number.high for bound in number.plausible)
-            for number in numbers
-            if number.name in shapes
-        ]
-        if len(shapes) > 1 and all(at_ends):
-            all_of_them = " and ".join(map(spoken, shapes))
-            return Refusal(effect.name, f"{all_of_them} may all be at the bounds of what is possible", True)
+        own = [number for number in numbers if number.name in shapes]
+        at_ends = [any(bound and each.low <= bound <= each.high for bound in each.plausible) for each in own]
+        # A shape that is its only number is its size; in the place of a curve others would follow the same error.
+        if len(effect.numbers) > 1 and at_ends and all(at_ends):
+            names = " and ".join(map(spoken, shapes))
+            return Refusal(effect.name, f"{names} may be at the bounds of what is possible", len(shapes) > 1)
     for index, (effect, _) in enumerate(chosen):
         on_bounds = _on_bounds(sized(effect, effects[index]))
         bounds = {number.name: f"{bound:.3g} {number.unit}" for number, bound in on_bounds.items()}

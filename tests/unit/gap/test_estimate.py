@@ -11,7 +11,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import Equations, least_squares
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.causes import judge_effects
-from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of, fitted, may_be_another
+from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of, fitted, may_be_another, on_bound
 from cpfls_cli.gap.naming.ranking import chance_of_ranks, likely, off_by, within_bounds
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
@@ -84,6 +84,26 @@ def test_what_may_be_0_is_not_surely_on_its_bound(low, listed):
     """Also where its interval ends at 0, below which it cannot be."""
     number = Estimate("k_d", "1", 0.05, low, 0.06, (0.0, 0.05))
     assert _on_bounds([number]) == ({number: 0.05} if listed else {})
+
+
+@pytest.mark.parametrize(("sideways", "error", "refused"), [(1.5, 0.8, True), (1.5, 0.0, True), (0.6, 0.15, False)])
+def test_a_curve_over_descent_that_sideways_speed_may_not_end_is_no_name(sideways, error, refused):
+    """It is one over axial speed then, which the formula of an inflow may be off by."""
+    descent, vehicle = CATALOGUE["vertical_descent"], VehicleSettings()
+    numbers = {each.name: (0.2, 0.05) for each in descent.coefficients} | {"sideways": (sideways, error)}
+    known = tuple(
+        Estimate(each.name, each.unit, value, value - error, value + error, each.bounds(vehicle))
+        for each, (value, error) in zip(descent.numbers, numbers.values(), strict=True)
+    )
+    found = SimpleNamespace(
+        hypothesis=SimpleNamespace(chosen=((descent, {"sideways": sideways}),)),
+        estimates=SimpleNamespace(effects=(known,)),
+    )
+    refusal = on_bound(found)
+    assert (refusal is not None) == refused
+    if refusal is not None:
+        assert not refusal.in_the_way
+        assert refusal.sentence.endswith("not named: sideways may be at the bounds of what is possible")
 
 
 @pytest.mark.parametrize(("east", "north", "refused"), [(0.05, -0.1, True), (0.05, 0.4, False)])
