@@ -19,7 +19,7 @@ from cpfls_cli.errors import InputError, NotAnArtifactError
 from cpfls_cli.files import FileState, is_hdf5, is_sealed, read_content, state_of
 from cpfls_cli.version import __version__
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 """Raised when a dataset is renamed, removed or changes its meaning; new optional datasets do not raise it."""
 
 CONFIG = "config"

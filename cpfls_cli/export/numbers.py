@@ -140,7 +140,7 @@ def motion_terms(air: Array, rate: Array) -> Array:
 
 
 _ROLL, _PITCH, _YAW, _UP = 0, 1, 2, 5
-_PROBES = 900
+_PROBES, _LEAST = 900, 1e-6
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,9 @@ def _sizes(rotors: int) -> Array:
 def places(model: VehicleModel, *, alike: bool, lines: bool = False) -> Array:
     """Find where rotors have to stand so that their thrust gives the torque of the model, shape (rotor, 3), m."""
     _, linear, squares, *_ = np.split(weights_of_model(model)[:, 0], 1 + model.rotors * np.arange(4), axis=1)
-    squares = squares if lines else squares + linear / hover_speed(model.vehicle)
+    whole = squares + linear / hover_speed(model.vehicle)
+    # Where next to nothing is a square the lines are all that has a lever.
+    squares = squares if lines and (np.abs(squares[_UP]) > _LEAST * np.abs(whole[_UP])).all() else whole
     thrust = np.full(model.rotors, squares[_UP].mean()) if alike else squares[_UP]
     hubs = np.array([rotor.position_m for rotor in model.vehicle.rotors], dtype=float)
     return np.column_stack([-squares[_PITCH] / thrust, squares[_ROLL] / thrust, hubs[:, 2]])

@@ -27,7 +27,7 @@ from cpfls_cli.vehicle.values import ARRAYS, ZERO, Each, Functions, Value, Vecto
 
 LEARNED = "learned[{}]"
 """Name of a coefficient of the learned part."""
-_OF_ROTORS = {"linear": "rad/s", "slow_roll_pitch": "1", "slow_yaw": "1"}
+_OF_ROTORS = {"slow_roll_pitch": "1", "slow_yaw": "1"}
 _FACTORS = {"thrust_factor": ("thrust_factor_n_s2", "N s^2"), "drag_factor": ("drag_factor_n_m_s2", "N m s^2")}
 
 

@@ -167,7 +167,8 @@ class Sheet:
             f"Vehicle: {model.vehicle.mass_kg:.6g} kg, {model.rotors} rotors; delay {response.delay_s:.4g} s, "
             f"lag {response.lag_s:.4g} s, slow actuation {response.slow_roll_pitch:.4g} (roll, pitch) and "
             f"{response.slow_yaw:.4g} (yaw) within {response.slow_s:.4g} s; "
-            f"{len(self.numbers)} numbers of torque and force."
+            + "".join(f"{one.coefficients[0]:.4g} of the thrust in hover linear; " for one in model.thrust_curve)
+            + f"{len(self.numbers)} numbers of torque and force."
         )
         if model.effects:
             known = [CATALOGUE[effect.name] for effect in model.effects]

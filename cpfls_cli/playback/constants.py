@@ -17,7 +17,6 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.blocks import ENOUGH_BLOCKS, contiguous, half_width, jackknife_covariance, jackknife_error, mean_error
-from cpfls_cli.effects.registry import THRUST_CURVE
 from cpfls_cli.estimation.estimate import FOLDS, Normal, Prior, conditional_strength, one_step, solve
 from cpfls_cli.flightlog.stated_vehicle import SLOW_HZ
 from cpfls_cli.inertia import EXPLAINED, FLAT, KNOWN, VISIBLE
@@ -26,7 +25,16 @@ from cpfls_cli.playback.evaluation import JointNumbers
 from cpfls_cli.playback.fit import Fitted, Uncertainty
 from cpfls_cli.playback.flight import PlaybackFlight
 from cpfls_cli.playback.instruments import Instruments
-from cpfls_cli.playback.parameters import DRAG, INERTIA, LEARNED, LOG_INERTIA, FreeNumbers, blocks_of, needs_velocity
+from cpfls_cli.playback.parameters import (
+    DRAG,
+    INERTIA,
+    LEARNED,
+    LOG_INERTIA,
+    FreeNumbers,
+    blocks_of,
+    needs_velocity,
+    of_no_command,
+)
 from cpfls_cli.result import About, about, part, result
 from cpfls_cli.vehicle.settings import VehicleSettings
 
@@ -279,12 +287,9 @@ def find_constants(
     if len(periods) > 1 or len(fitting_bands(max(periods))) < len(BANDS) - 1:
         return None
     translates = all(flight.translates for flight in flights)
-    # At a measured speed a propeller pulls by its square; next to gusts along z another law would join.
-    measured = set[str]() if any(flight.commanded for flight in flights) else {THRUST_CURVE.name}
+    left_out = {*leave_out, *LEARNED, _NOT_TRIED, *of_no_command(flight.commanded for flight in flights)}
     tried = [
-        block
-        for block in blocks_of(vehicle)
-        if block not in (*leave_out, *LEARNED, _NOT_TRIED, *measured) and (translates or not needs_velocity(block))
+        block for block in blocks_of(vehicle) if block not in left_out and (translates or not needs_velocity(block))
     ]
     blocks = [block for block in (*vehicle.unknown, *tried) if block == INERTIA or block in vehicle.unknown]
     search = _Search(vehicle, balances, blocks, tried)

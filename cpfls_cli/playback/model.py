@@ -328,11 +328,12 @@ class VehicleModel:
                 signals = apply(signals, one.shape)
         return signals
 
-    def response_to(self, signals: Signals) -> RotorResponse:
-        """Give the response to the rotor speeds of a flight."""
-        if self.commanded and not signals.commanded:
-            return replace(self.response, delay_s=0.0, lag_s=0.0)
-        return self.response
+    def driven_by(self, signals: Signals) -> VehicleModel:
+        """Give the model for what drives the rotors of a flight: at measured speeds commands are behind them."""
+        if not self.commanded or signals.commanded:
+            return self
+        curve, behind = self.thrust_curve, replace(self.response, delay_s=0.0, lag_s=0.0)
+        return replace(self, response=behind, effects=tuple(one for one in self.effects if one not in curve))
 
     def hold_of(self, signals: Signals, usual: Hold) -> Hold:
         """Tell what a speed of a flight is between samples for this model."""
@@ -350,15 +351,14 @@ class VehicleModel:
         -------
         array, shape (time, 6), N m and N, body frame
         """
-        others = self.other_wrench(signals)
+        others, driven = self.other_wrench(signals), self.driven_by(signals)
         if signals.rotor_speed is None:
             rotor = np.zeros((len(signals), 1 + 4 * self.rotors))
             others = others + signals.wrench
         else:
             hold = self.hold_of(signals, "previous" if signals.commanded else "linear")
-            response = self.response_to(signals)
-            rotor = response.terms_at_samples(signals.rotor_speed, signals.period, hold)
-        held = self.wrench(self._air(signals), signals.body_rate, rotor)
+            rotor = driven.response.terms_at_samples(signals.rotor_speed, signals.period, hold)
+        held = driven.wrench(self._air(signals), signals.body_rate, rotor)
         return held + self.with_lever(others)
 
     def with_lever(self, wrench: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Annotated, NamedTuple
@@ -74,7 +74,8 @@ class Number:
     @property
     def believed(self) -> float:
         """Half of an interval that says no more than what is believed of any such vehicle."""
-        return min(self.scale, (self.high - self.low) / (2 * ROOM if self.block in CATALOGUE else 2))
+        room = ROOM if self.block in CATALOGUE and self.block != THRUST_CURVE.name else 1.0
+        return min(self.scale, (self.high - self.low) / (2 * room))
 
     @property
     def absent(self) -> float:
@@ -213,6 +214,11 @@ def needs_velocity(block: str) -> bool:
     )
 
 
+def of_no_command(commanded: Iterable[bool]) -> set[str]:
+    """Name what flights without any commands do not show: at a measured speed a propeller pulls by its square."""
+    return set() if any(commanded) else {THRUST_CURVE.name}
+
+
 class Rules(NamedTuple):
     """Partition and consequents of a remainder: even rules over the circle, order of the harmonics (0: seesaw)."""
 
@@ -285,6 +291,9 @@ class FreeNumbers:
         vehicle = self.vehicle
         if block in _OF_ROTORS:
             return _OF_ROTORS[block]
+        if block == THRUST_CURVE.name:
+            # No more of the thrust than all of it can be linear, nor does it fall as the commands rise.
+            return (Number(CURVE, THRUST_CURVE.coefficients[0].unit, 0.0, 0.5, -1.0, 1.0, 2.0),)
         if block == PRODUCTS:
             size = scales.smallest_inertia(vehicle)
             return tuple(

@@ -126,12 +126,12 @@ def player_of(model: VehicleModel, flight: PlaybackFlight, parts: Sequence[Signa
         Stretches of the flight as the model meets them (`VehicleModel.acting`), along which effects that are no
         polynomials are evaluated; none for a model without such effects and a flight with rotor speeds.
     """
-    response, stated = model.response_to(parts[0]) if parts else model.response, flight.wrench
+    model, stated = model.driven_by(parts[0]) if parts else model, flight.wrench
     if stated is not None:
-        stated = replace(flight, speed=stated).rotor_terms(*response.times)[:, 1:7]
+        stated = replace(flight, speed=stated).rotor_terms(*model.response.times)[:, 1:7]
     return Player(
         flown=model.flown,
-        rotor=flight.rotor_terms(*response.times),
+        rotor=flight.rotor_terms(*model.response.times),
         along=_along(model, stated, parts),
         wind=model.wind,
     )

@@ -31,7 +31,16 @@ from cpfls_cli.playback.fit import (
     windows_of,
 )
 from cpfls_cli.playback.flight import PlaybackFlight
-from cpfls_cli.playback.parameters import INERTIA, LEARNED, PRODUCTS, FreeNumbers, Rules, blocks_of, needs_velocity
+from cpfls_cli.playback.parameters import (
+    INERTIA,
+    LEARNED,
+    PRODUCTS,
+    FreeNumbers,
+    Rules,
+    blocks_of,
+    needs_velocity,
+    of_no_command,
+)
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.result import About
 from cpfls_cli.rounding import ascending, at_most, less, smallest
@@ -345,7 +354,8 @@ def tried_blocks(
 ) -> tuple[str, ...]:
     """List the blocks that the flights can say anything of."""
     moves = all(flight.translates for flight in flights)
-    left_out = {*settings.leave_out, *(LEARNED if settings.quick else ())}
+    left_out = {*settings.leave_out, *of_no_command(flight.commanded for flight in flights)}
+    left_out |= {*LEARNED} if settings.quick else set()
     found = (block for block in blocks_of(vehicle) if block not in left_out)
     return tuple(block for block in found if moves or not needs_velocity(block))
 

@@ -398,8 +398,8 @@ def rotor_wrench(instant: Instant, numbers: Numbers) -> Wrench:
     Parameters
     ----------
     numbers : Numbers
-        ``slow_roll_pitch`` and ``slow_yaw``, shares of the torque of the slow squared speed less
-        that of the present one.
+        ``slow_roll_pitch`` and ``slow_yaw``, shares of the torque of the slow squared speed less that of the present
+        one.
     """
     square = instant.rotor_speed**2
     torque: Vector = (0, 0, -instant.functions.total(instant.spins * instant.drag_factors * square))

@@ -14,7 +14,7 @@ drag at refSpd and refAngle is not the motors' is the body's. `fly_ardupilot` is
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from cpfls_cli import rotations
 from cpfls_cli.arrays import Array, IntArray
-from cpfls_cli.effects.scales import arm
+from cpfls_cli.effects.scales import arm, hover_speed
 from cpfls_cli.export.holding import Held, Holds, constant_body, held_by
 from cpfls_cli.export.numbers import Numbers, cross_order, numbers_of, places, spins, weights_of_model
 from cpfls_cli.export.sheet import Sheet
@@ -45,7 +45,7 @@ _SEA_LEVEL, _LAPSE, _POWER = 1.225, 0.0065 / 288.15, 4.2559
 _YAW_SHARE, _DAMPING = 0.05, np.radians(400.0)
 _REFERENCE_M_S, _STEEPEST = 10.0, np.radians(80.0)
 _VOLTS = 12.6
-_RADIUS_SHARE = 0.5
+_RADIUS_SHARE, _LEAST = 0.5, 1e-6
 """Radius of rotors that nobody knows, in arms."""
 _ONE_SIGN = ("thrust_linear", "drag", "damping")
 """Numbers that ArduPilot takes from 0 up."""
@@ -67,7 +67,7 @@ def ardupilot_held(model: VehicleModel) -> tuple[Held, Holds]:
     numbers = numbers_of(model, _wrenches, alike=True, lines=True)
     squares = slice(1 + model.rotors, 1 + 2 * model.rotors)
     own = weights_of_model(model)
-    hover = _hover_speed(numbers.of(own), body.mass, model.rotors)
+    hover = hover_speed(model.vehicle)
 
     def turned(weights: Array) -> Array:
         """Give yaw torque that is linear in the speed to the square that grows as fast in hover."""
@@ -76,7 +76,11 @@ def ardupilot_held(model: VehicleModel) -> tuple[Held, Holds]:
         given[2, 0, 1 : 1 + model.rotors] = 0.0
         return given
 
-    numbers = _without(numbers, [name for name in _ONE_SIGN if numbers.of(turned(own))[name] < 0])
+    first = numbers.of(turned(own))
+    gone = {name for name in _ONE_SIGN if first[name] < 0}
+    # propExpo has a part that is square; where there is none, squares carry the weight.
+    gone |= {"thrust_linear"} if first["thrust"] <= _LEAST * first["thrust_linear"] / hover else set()
+    numbers = _without(numbers, gone)
     found = dict.fromkeys(_ONE_SIGN, 0.0) | numbers.of(turned(own))
 
     def holds(weights: Array) -> Array:
@@ -85,7 +89,7 @@ def ardupilot_held(model: VehicleModel) -> tuple[Held, Holds]:
     return replace(held_by(model, holds, body), numbers=found), holds
 
 
-def _without(numbers: Numbers, names: Sequence[str]) -> Numbers:
+def _without(numbers: Numbers, names: Collection[str]) -> Numbers:
     kept = [place for place, name in enumerate(numbers.names) if name not in names]
     return Numbers(tuple(numbers.names[place] for place in kept), numbers.tables[kept], numbers.size)
 

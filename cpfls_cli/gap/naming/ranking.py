@@ -13,6 +13,7 @@ import numpy as np
 
 from cpfls_cli.arrays import Array, BoolArray, IntArray
 from cpfls_cli.effects.effect import Effect
+from cpfls_cli.effects.registry import THRUST_CURVE
 from cpfls_cli.gap.balance.balance_system import System, channel_size, floors, system
 from cpfls_cli.gap.balance.refine import fit, number_columns, torque_loss_ratio
 from cpfls_cli.gap.balance.weak_flight import CHANNELS, Candidate, WeakFlight
@@ -155,9 +156,9 @@ def scoring_matrix(hypothesis: System, candidates: Sequence[Candidate], floor: A
     base, linear = hypothesis.base, fit(hypothesis, floor)
     parts = [base, number_columns(hypothesis, linear)[..., base.shape[2] :]]
     priors, placed = [known_before(hypothesis)], list[tuple[Candidate, IntArray, Array]]()
-    (_, of_vehicle), *_ = hypothesis.places
-    # What turns the vehicle: a curve of the thrust in the base is as much a part of it as the squares.
-    own_wrench = hypothesis.rotor_wrench + base[..., of_vehicle.stop :] @ linear[of_vehicle.stop :]
+    # A curve of the thrust is a part of what turns the vehicle; torques of one axis alone shrink with its inertia.
+    curves = (base[..., own] @ linear[own] for each, own in hypothesis.places if each.effect.name == THRUST_CURVE.name)
+    own_wrench = sum(curves, hypothesis.rotor_wrench)
     places = np.arange(base.shape[2] + parts[1].shape[2])
     first = len(places)
     for candidate in candidates:
