@@ -95,10 +95,11 @@ def test_each_simulator_names_what_it_lacks():
     assert "flapping" in lacks["mjcf"]
 
 
+@pytest.mark.parametrize("share", [0.6, 1.0])
 @pytest.mark.parametrize("form", FORMS)
-def test_a_thrust_curve_hovers_at_the_same_speed_in_every_form(form):
+def test_a_thrust_curve_hovers_at_the_same_speed_in_every_form(form, share):
     """By squares alone where a form has no more; the curve is missing there, or where its torque about z is none."""
-    model = replace(truth(), effects=(thrust_curve(0.6),))
+    model = replace(truth(), effects=(thrust_curve(share),))
     hover = hover_speed(model.vehicle)
     made = exported(sheet_of_vehicle(model), form, "v")
     _, lines, squares, *_ = np.split(made.held.weights[:, 0], 1 + model.rotors * np.arange(4), axis=1)

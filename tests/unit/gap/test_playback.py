@@ -22,6 +22,7 @@ from cpfls_cli.playback.rotors import RotorResponse
 from cpfls_cli.simulation.model import simulated_effects
 from tests.builders.closed_loop_flights import VEHICLE, by_columns, flown, signals_of
 from tests.builders.playback_flights import mean_errors
+from tests.builders.vehicle_models import thrust_curve
 
 BIAS = np.array([0.0, 0.01, 0.05])
 PARAMETERS = [coefficient.name for coefficient in VEHICLE_NUMBERS.coefficients]
@@ -109,6 +110,19 @@ def test_a_lag_leaves_measured_speeds_as_they_are():
     errors, flight = played_back(model_of({"motor_lag": [0.05]}), signals)
     np.testing.assert_array_equal(flight.speed, signals.rotor_speed)
     assert errors["body_rate"][0] < 0.01 * errors["body_rate"][2]
+
+
+def test_at_measured_speeds_neither_lag_nor_curve_of_the_commands_acts():
+    measured = signals_of(flown())
+    model = VehicleModel(
+        vehicle=VEHICLE, response=RotorResponse(lag_s=0.05), effects=(thrust_curve(0.4),), commanded=True
+    )
+    rigid, commands = VehicleModel(vehicle=VEHICLE), replace(measured, commanded=True)
+    np.testing.assert_array_equal(model.wrench_along(measured), rigid.wrench_along(measured))
+    apart = np.abs(model.wrench_along(commands) - rigid.wrench_along(commands)).max(axis=0)
+    assert (apart[[0, 1, 5]] > 1e-3).all()
+    players = [player_of(each, logged(measured).playback, [measured]) for each in (model, rigid)]
+    np.testing.assert_array_equal(*(player.wrench(logged(measured).playback) for player in players))
 
 
 def test_what_the_flight_lacks_is_named():

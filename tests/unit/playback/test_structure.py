@@ -253,6 +253,8 @@ def test_flights_that_can_be_parted_and_judged_are_asked_for_what_they_show(flig
     still = [replace(flight, has_velocity=False) for flight in flights]
     assert set(tried_blocks(STATED, flights, QUICK)) == set(TRIED)
     assert set(tried_blocks(STATED, still, QUICK)) == {"linear_damping", "quadratic_damping", "inertia"}
+    every, commands = replace(QUICK, leave_out=()), [replace(flight, commanded=True) for flight in flights]
+    assert {*tried_blocks(STATED, commands, every)} - {*tried_blocks(STATED, flights, every)} == {"thrust_slope"}
     parts = parts_of(flights, QUICK)
     assert [[windows.flight.name for windows in part] for part in parts] == [[each.name] for each in flights]
     first, second = (part[0].starts for part in parts_of(flights[:1], QUICK))
