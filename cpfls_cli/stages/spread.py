@@ -24,7 +24,7 @@ from cpfls_cli.inertia import symmetric
 from cpfls_cli.pages.trust import trust_words
 from cpfls_cli.playback.gusts import GUST_AXES
 from cpfls_cli.playback.model import VehicleModel, commanded_anew
-from cpfls_cli.playback.parameters import FoundNumber
+from cpfls_cli.playback.parameters import CURVE, FoundNumber
 from cpfls_cli.playback.spread import Spread, drawn, require_sure
 from cpfls_cli.result import about as described
 from cpfls_cli.result import result
@@ -37,7 +37,7 @@ _CONVENTIONS = (
     "Body frame x forward, y left, z up, its origin the centre of mass; SI. Entry k of every column belongs to vehicle "
     "k, and all entries k belong together: numbers that the flights identify only by their ratio differ together. "
     "Rotor i pushes thrust_factor w^2 along z and turns the body by -spin drag_factor w^2 about z; with "
-    "thrust_slope.linear a, w^2 becomes (1 - a) w^2 + a w_h w, w_h the speed that hovers by the square. Commands act "
+    f"{CURVE} a, w^2 becomes (1 - a) w^2 + a w_h w, w_h the speed that hovers by the square. Commands act "
     "after delay_s through a first-order lag of motor_lag_s."
 )
 _ENDS = (2.5, 97.5)
