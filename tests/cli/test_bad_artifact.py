@@ -120,7 +120,7 @@ def test_selection_given_as_flight_to_identify(refuse, pipeline, study, tmp_path
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("schema_version", 99, "schema_version = 99: written by a newer cpfls; this one reads up to 3"),
+        ("schema_version", 99, "schema_version = 99: written by a newer cpfls; this one reads up to 4"),
         (
             "schema_version",
             "x",

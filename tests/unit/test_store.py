@@ -81,7 +81,7 @@ def test_equal_content_is_an_equal_file(written, tmp_path):
 def test_any_reader_sees_what_each_dataset_is(written):
     with h5py.File(written) as file:
         assert dict(file.attrs) | {"cpfls_version": ""} == {
-            "format": "cpfls/craft", "stage": "look", "schema_version": 3, "cpfls_version": "", "seed": 3,
+            "format": "cpfls/craft", "stage": "look", "schema_version": 4, "cpfls_version": "", "seed": 3,
             "cautions": "one\ntwo",
         }  # fmt: skip
         assert dict(file["mass"].attrs) == {"units": "kg", "frame": "none", "description": "as it flew"}
