@@ -173,7 +173,7 @@ def column_groups(names: Mapping[str, object] | tuple[str, ...]) -> tuple[Column
     return (*found, *(ColumnGroup(name, "one", (name,)) for name in known))
 
 
-_BEHIND_AXES = ("dot", "ddot", "rate", "vel", "acc")
+_BEHIND_AXES = ("dot", "ddot", "rate", "vel", "acc", "gyro")
 
 
 def _of_axes(names: Mapping[str, None]) -> Iterator[ColumnGroup]:

@@ -166,7 +166,9 @@ def _of_rotors(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]]) 
 def _of_other_length(log: LogTable, named: Sequence[Named]) -> str:
     """Name the columns of a flat log that would be signals, had they a value for each stamp."""
     columns = dict.fromkeys(column for own in named for column in own.group.columns)
-    odd = [name for name in columns if log.flat and log.of_other_length((name,))]
+    # A few numbers are of a calibration or its like.
+    long = [name for name in columns if log.flat and 2 * len(log.topics[""][name]) > len(log.clock(""))]
+    odd = [name for name in long if log.of_other_length((name,))]
     return f"more or fewer values than stamps ({log.time_column}), and left out: {some(odd, _SHOWN)}" if odd else ""
 
 
@@ -180,7 +182,7 @@ def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
         return f"no flight in it: {names} never change, or hold too few samples for a flight"
     if system and not log.flat:
         return f"holds only {some([*log.topics], _SHOWN)}: no gyroscope, attitude or outputs, so no flight"
-    words = {word for name in log.names for word in words_of(name)}
+    words = {word for name in log.names if name != log.time_column for word in words_of(name)}
     if words <= OF_TRACKS and all(words & {*axis} for axis in _ON_EARTH):
         return (
             f"a track of positions ({some([*log.names], _SHOWN)}) holds no motion of the body: give the autopilot's log"
@@ -220,7 +222,7 @@ def _signs(log: LogTable, candidates: Mapping[SignalName, Sequence[Named]], roto
         up = -1.0 if first["position"].frame == "NED" or first["position"].group.axis == "n" else 1.0
         stated = first["position"].unit or motion_columns.length_unit(height, 1 / float(log.grid[1] - log.grid[0]))
         height = up * known_unit(stated).factor * height[:, 2]
-    elif rotors is None and rate is None:
+    elif rotors is None:
         # A height that no config takes still says what flies.
         known = [(row.columns, row.scale) for row in KNOWN if row.signal == "height" and is_of(system, row.system)]
         found = next((own for own in (*known, *height_columns(log.names)) if {*own[0]} <= {*log.names}), None)

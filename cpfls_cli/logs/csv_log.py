@@ -58,6 +58,8 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     if wanted is not None:
         return LogContents({"": read_csv(path, set(wanted))}, units)
     left_out = sorted(set(names) - {*numeric, ""})
+    if left_out and [name.lower() for name in numeric[1:]] == ["value"]:
+        raise InputError(f"{path}: holds one value a row, named by {some(left_out, MOST_LISTED)}: give each a column")
     warnings = [f"columns that hold text are left out: {some(left_out, MOST_LISTED)}"] * bool(left_out)
     warnings += ["columns without a name are left out"] * (names.count("") > 1 and bool(first.get("", "").strip()))
     columns = read_csv(path, set(numeric))
@@ -149,7 +151,7 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
     if remark and (len(numbers) == len(fields) or some_words):
         header, lines, line = remark, chain([header], lines), line - 1
     names = [name.strip() for name in _fields(header)]
-    numbers = [name for name in names if name and _kind(name) == "number"]
+    numbers = [name for name in names if name and _kind(name)]
     # Columns may be numbered, and a row of data may hold words.
     numbered = len(set(numbers)) == len(numbers) < len(names) and all(map(str.isdecimal, numbers))
     if 2 * len(numbers) > len(names) and not numbered:

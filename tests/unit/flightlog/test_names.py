@@ -23,6 +23,8 @@ def first(names, signal, system=""):
         ("qx qy qz qw", "quaternion", "qw qx qy qz"),
         ("omega_x omega_y omega_z", "body_rate", "omega_x omega_y omega_z"),
         ("gyro.x gyro.y gyro.z", "body_rate", "gyro.x gyro.y gyro.z"),
+        ("xacc yacc zacc xgyro ygyro zgyro", "body_rate", "xgyro ygyro zgyro"),
+        ("positions[0] positions[1] positions[2]", "position", "positions[0] positions[1] positions[2]"),
         ("ang_vel_x ang_vel_y ang_vel_z", "body_rate", "ang_vel_x ang_vel_y ang_vel_z"),
         ("angVelX angVelY angVelZ", "body_rate", "angVelX angVelY angVelZ"),
         ("px py pz", "position", "px py pz"),
@@ -187,6 +189,7 @@ def test_columns_are_found_by_their_names(names, signal, columns):
         ("v_dot_x v_dot_y v_dot_z", "velocity"),
         ("pwm_in[0] pwm_in[1] pwm_in[2] pwm_in[3]", "rotor_command"),
         ("GyroIntegration[0] GyroIntegration[1] GyroIntegration[2]", "body_rate"),
+        ("ang_vel_cmds[0] ang_vel_cmds[1] ang_vel_cmds[2]", "body_rate"),
     ],
 )
 def test_what_is_wished_estimated_or_squared_is_no_measurement(names, signal):
@@ -243,9 +246,10 @@ def test_an_airplane_flies_where_its_nose_points(names, angle, found):
 
 
 def test_a_height_is_one_column_in_its_unit():
-    assert list(height_columns(("t", "Alt", "gps_altitude", "altitude(ft)"))) == [
+    assert list(height_columns(("t", "Alt", "gps_altitude", "altitude(ft)", "pressure_alt"))) == [
         (("Alt",), 1.0),
         (("altitude(ft)",), 0.3048),
+        (("pressure_alt",), 1.0),
     ]
 
 

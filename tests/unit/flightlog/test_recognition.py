@@ -601,6 +601,16 @@ def test_a_stand_with_idling_rotors_is_no_flight(own):
         seen(flat_log(still))
 
 
+def test_what_hardly_turns_flies_where_a_height_alone_says_so():
+    time = np.arange(0.0, 22.0, 0.01)
+    noise = np.random.default_rng(1).normal(0.0, 0.01, (3, len(time)))
+    log = {"t": time, **dict(zip(("xgyro", "ygyro", "zgyro"), noise, strict=True))}
+    with pytest.raises(InputError, match="the vehicle neither turns nor moves"):
+        recognise({"": log}, {}, {}, "")
+    climb = 121.0 + np.interp(time, [8.0, 14.0], [0.0, 5.0]) + noise[0]
+    assert recognise({"": log | {"pressure_alt": climb}}, {}, {}, "").flown.flies
+
+
 def test_a_matrix_without_names_is_recognised_by_how_its_columns_move_together(own):
     body_velocity = own.rotation.inv().apply(own.velocity)
     noise = np.random.default_rng(4).normal(0, 300, (len(own.time), 3))
@@ -694,6 +704,10 @@ def test_columns_of_more_or_fewer_values_than_stamps_are_left_out_and_named():
         InputError, match=r"^more or fewer values than stamps \(t\), and left out: gyro_y; write as many"
     ):
         recognise({"": own}, {}, {}, "")
+    # A few numbers are of a calibration.
+    few = {"t": np.arange(100.0), **{f"gyro/cal[{axis}]": np.arange(4.0) ** axis for axis in (0, 1, 2)}}
+    with pytest.raises(InputError, match=r"^no column is recognised as a signal of a flight"):
+        recognise({"": few}, {}, {}, "")
 
 
 def test_single_axes_are_said_to_be_no_signal():
@@ -713,6 +727,12 @@ def test_a_track_of_positions_is_no_log_of_a_flight():
     log[""]["millis"] = np.arange(100.0)
     with pytest.raises(InputError, match=r"a track of positions \(millis, latitude.* give the autopilot's log"):
         recognise(log, {}, {}, "")
+    # Of its stamps and places words say more.
+    own = {"UTC (YYYY-MM-DD)": "millis", "Decimal latitude": "latitude", "Altitude above Start Point": "altitude"}
+    worded = {own.get(name, name): values for name, values in log[""].items()}
+    worded |= {new: worded.pop(old, log[""][old]) for new, old in own.items()}
+    with pytest.raises(InputError, match=r"a track of positions \(.*Decimal latitude"):
+        recognise({"": worded}, {"UTC (YYYY-MM-DD)": "s"}, {}, "")
     # What else is in it may be motion of the body.
     log[""]["kippwinkel"] = np.arange(100.0) ** 2
     with pytest.raises(InputError, match="no column is recognised as a signal of a flight"):

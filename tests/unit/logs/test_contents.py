@@ -511,11 +511,18 @@ def test_dates_and_times_of_day_are_stamps_in_seconds(read, first):
     assert np.diff(own.topics[""]["time"]) == pytest.approx(1.25)
 
 
+def test_a_table_of_one_value_a_row_is_refused(read):
+    with pytest.raises(InputError, match=r"log\.csv: holds one value a row, named by key: give each a column"):
+        read("t,key,Value\n0.5,gyro_x,1\n0.5,gyro_y,2\n")
+
+
 def test_a_log_without_names_says_where_they_go(read):
     with pytest.raises(InputError, match=r"has no line of column names, line 1 holds 3 numbers: put a line above it"):
         read(_rows(","))
     with pytest.raises(InputError, match="line 1 holds 3 numbers"):
         read("1008.24,10901,acc.z,0.01\n1008.25,10902,acc.z,0.02\n")
+    with pytest.raises(InputError, match="line 1 holds 3 numbers"):
+        read("12:00:59.468,65535,74\n12:01:00.521,65535,62\n")
     with pytest.raises(InputError, match=r"line 1 holds 9 numbers: write a line for each sample, not for each signal"):
         read(f"{','.join(map(str, range(9)))}\n" * 4)
     with pytest.raises(InputError, match="line 1 holds 1 number: put"):
