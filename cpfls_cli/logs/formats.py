@@ -27,6 +27,7 @@ DATAFLASH_MAGIC = b"\xa3\x95\x80\x80"
 SDLOG2_MAGIC = b"\xa3\x95\x80"
 DATAFLASH_TEXT_MAGIC = b"FMT, 128, "
 BLACKBOX_MAGIC = b"H Product:Blackbox flight data recorder"
+ROS1_MAGIC = b"#ROSBAG V"
 USD_MAGIC = b"\xbc"
 GZIP_MAGIC = b"\x1f\x8b"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -117,6 +118,7 @@ LOG_FORMATS = (
     LogFormat(".bbl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, f"{_READERS}blackbox"),
     LogFormat(".bfl", "Betaflight blackbox", "a blackbox log", BLACKBOX_MAGIC, f"{_READERS}blackbox"),
     LogFormat("", "Crazyflie uSD", "a log of a Crazyflie's uSD card", USD_MAGIC, f"{_READERS}crazyflie_usd"),
+    LogFormat(".bag", "ROS 1 bag", "a bag of ROS 1", ROS1_MAGIC, f"{_READERS}rosbag", *_ROSBAGS),
     LogFormat(".db3", "ROS 2 bag", "SQLite", b"SQLite format 3\x00", f"{_READERS}rosbag", *_ROSBAGS),
     LogFormat(".mcap", "ROS 2 bag", "MCAP", b"\x89MCAP", f"{_READERS}rosbag", *_ROSBAGS),
     LogFormat(".h5", "HDF5", "HDF5", HDF5_MAGIC, f"{_READERS}matrices", shared=True),
@@ -310,7 +312,6 @@ _SLOW: Final = (
 )
 # What a file begins with, at which place, what it is called, and the way to a log.
 _FOREIGN: Final = (
-    (b"#ROSBAG V", 0, "a bag of ROS 1", "make a bag of ROS 2 of it with rosbags-convert (package rosbags)"),
     (b"PK\x03\x04", 0, "a zip archive", _UNPACK),
     (b"\x1f\x8b", 0, "data compressed by gzip", _UNPACK),
     (b"BZh", 0, "data compressed by bzip2", _UNPACK),

@@ -1,4 +1,4 @@
-"""Reader of ROS 2 bags, SQLite or MCAP: topics of messages, flattened to their numbers."""
+"""Reader of bags of ROS 1, and of ROS 2, SQLite or MCAP: topics of messages, flattened to their numbers."""
 
 import re
 from collections.abc import Collection, Iterator, Sequence
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rosbags import rosbag1
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
@@ -15,7 +16,7 @@ from rosbags.typesys.store import Typestore
 from cpfls_cli.arrays import Array
 from cpfls_cli.errors import InputError
 from cpfls_cli.flightlog.topics import STAMP, topic_and_field
-from cpfls_cli.logs.formats import LogContents
+from cpfls_cli.logs.formats import ROS1_MAGIC, LogContents
 from cpfls_cli.logs.records import date, seconds
 
 _NANOSECOND = 10**9
@@ -35,6 +36,7 @@ _UNITS = (
     (re.compile(r"^voltage$"), "V"),
 )
 _Path = tuple[str | int, ...]
+_Reader = Reader | rosbag1.Reader
 
 
 def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
@@ -44,18 +46,20 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     those of the recorder where there are none; ``timestamp_received`` is always the recorder's. Where a sender's clock
     runs at another pace, as a simulation's does, all stamps are put on it.
     """
+    with path.open("rb") as stream:
+        reader_of = rosbag1.Reader if stream.read(len(ROS1_MAGIC)) == ROS1_MAGIC else Reader
     try:
-        with Reader(path) as reader:
+        with reader_of(path) as reader:
             return _read(path, reader, None if wanted is None else {topic_and_field(column)[0] for column in wanted})
     except InputError:
         raise
     except Exception as error:
         # SQLite, MCAP and compression each break in their own way.
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{path}: cannot be read as a ROS 2 bag: {reason}") from None
+        raise InputError(f"{path}: cannot be read as a bag of ROS: {reason}") from None
 
 
-def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
+def _read(path: Path, reader: _Reader, wanted: set[str] | None) -> LogContents:
     topics: dict[str, dict[str, Array]] = {}
     units: dict[str, str] = {}
     read: dict[str, tuple[np.ndarray, dict[str, np.ndarray]]] = {}
@@ -83,7 +87,7 @@ def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
         shifted += [f"{topic} ({offset:+.3g} s)"] if offset and not drifts else []
     if not topics:
         listed = f": no definition fits {', '.join(unknown)}" if unknown else ""
-        raise InputError(f"{path}: a ROS 2 bag without readable messages{listed}")
+        raise InputError(f"{path}: a bag of ROS without readable messages{listed}")
     causes = (
         ("topics left out because the file has no matching definition of their messages", unknown),
         ("these topics do not use the recorder's clock and are shifted by the median offset", shifted),
@@ -91,16 +95,18 @@ def _read(path: Path, reader: Reader, wanted: set[str] | None) -> LogContents:
     )
     warnings = tuple(f"{words}: {', '.join(own)}" for words, own in causes if own)
     begins = reader.start_time / _NANOSECOND
-    return LogContents(topics, units, system="ROS 2", warnings=warnings, flown_at=date(begins), begins={"": begins})
+    system = "ROS 1" if isinstance(reader, rosbag1.Reader) else "ROS 2"
+    return LogContents(topics, units, system=system, warnings=warnings, flown_at=date(begins), begins={"": begins})
 
 
-def _columns_of_topic(reader: Reader, connections: Sequence[Connection]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _columns_of_topic(reader: _Reader, connections: Sequence[Connection]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Read all messages of a topic: when they were received, ns, and their numbers by name."""
     types = _types(connections[0])
+    read = types.deserialize_ros1 if isinstance(reader, rosbag1.Reader) else types.deserialize_cdr
     received, rows = [], []
     paths: dict[str, _Path] = {}
     for connection, stamp, data in reader.messages(connections=connections):
-        message = types.deserialize_cdr(data, connection.msgtype)
+        message = read(data, connection.msgtype)
         paths = paths or dict(_ways_to_numbers(message))
         received.append(stamp)
         rows.append([_at(message, path) for path in paths.values()])

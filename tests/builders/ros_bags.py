@@ -1,10 +1,11 @@
-"""Bags of ROS 2, with messages of the standard and one as PX4 sends it."""
+"""Bags of ROS 1 and 2, with messages of the standard and one as PX4 sends it."""
 
 import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
 
+from rosbags import rosbag1
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -29,7 +30,9 @@ def rates(stamp_us, xyz):
 
 
 def write_bag(folder, kind, sent):
-    """Write a bag of the kind ``.db3`` or ``.mcap`` of topics, when received in ns, and messages; give its file."""
+    """Write a bag of a kind, ``.bag`` of ROS 1, of topics, when received in ns, and messages; give its file."""
+    if kind == ".bag":
+        return _write_old_bag(folder, sent)
     plugin = {".db3": StoragePlugin.SQLITE3, ".mcap": StoragePlugin.MCAP}[kind]
     with Writer(folder, version=9, storage_plugin=plugin) as writer:
         connections = {}
@@ -38,3 +41,22 @@ def write_bag(folder, kind, sent):
                 connections[topic] = writer.add_connection(topic, message.__msgtype__, typestore=STORE)
             writer.write(connections[topic], received, STORE.serialize_cdr(message, message.__msgtype__))
     return folder / f"{folder.name}{kind}"
+
+
+def _write_old_bag(folder, sent):
+    """Write a bag of ROS 1, whose headers count."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg("uint64 timestamp\nuint64 timestamp_sample\nfloat32[3] xyz\n", RATES))
+    folder.mkdir()
+    path = folder / f"{folder.name}.bag"
+    with rosbag1.Writer(path) as writer:
+        connections = {}
+        for topic, received, message in sent:
+            kind = message.__msgtype__
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            if hasattr(message, "header"):
+                header = store.types["std_msgs/msg/Header"](0, message.header.stamp, message.header.frame_id)
+                message = store.types[kind](**(vars(message) | {"header": header}))
+            writer.write(connections[topic], received, store.serialize_ros1(message, kind))
+    return path

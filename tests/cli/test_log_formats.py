@@ -74,9 +74,9 @@ def test_messages_name_a_new_format(refuse, log_study, tmp_path):
     other.write_text("t\n")
     assert refuse("import", log_study, other, *words) == [
         f"{other}: not a log: its name must end in one of .csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl,"
-        " .bfl, .db3, .mcap, .h5, .hdf5, .mat, .npz, .json, .jsonl, .fake, or it must hold one of Parquet, ULog,"
-        " ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag, HDF5, MATLAB, Fake,"
-        " or a line of column names above numbers"
+        " .bfl, .bag, .db3, .mcap, .h5, .hdf5, .mat, .npz, .json, .jsonl, .fake, or it must hold one of Parquet, ULog,"
+        " ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 1 bag, ROS 2 bag, HDF5, MATLAB,"
+        " Fake, or a line of column names above numbers"
     ]
     assert formats.suffixes_in_words().endswith(", .json, .jsonl or .fake")
     assert formats.formats_in_words().endswith(", NumPy, JSON, Fake")
@@ -210,6 +210,7 @@ WRITERS = {
     "log.bin": (ardupilot, None, ARDUPILOT),
     "log.log": (partial(ardupilot, text=True), None, ARDUPILOT),
     "log00": (crazyflie, None, below("fixed.log", PLAIN)),
+    "log.bag": (bag, None, OF_TOPICS),
     "log.db3": (bag, None, OF_TOPICS),
     "log.mcap": (bag, None, OF_TOPICS),
     "log.h5": (arrays(hdf5), "t", INDEXED),
@@ -223,6 +224,7 @@ BEGINS = {
     "log.ulg": 1e-6 * ulogs.BEGIN,
     "log.bin": 9e-6,
     "log.log": 9e-6,
+    "log.bag": 1e-9 * ros_bags.BEGIN_NS,
     "log.db3": 1e-9 * ros_bags.BEGIN_NS,
     "log.mcap": 1e-9 * ros_bags.BEGIN_NS,
 }

@@ -24,6 +24,11 @@ def first(names, signal, system=""):
         ("omega_x omega_y omega_z", "body_rate", "omega_x omega_y omega_z"),
         ("gyro.x gyro.y gyro.z", "body_rate", "gyro.x gyro.y gyro.z"),
         ("xacc yacc zacc xgyro ygyro zgyro", "body_rate", "xgyro ygyro zgyro"),
+        (
+            "rotating_speed.x rotating_speed.y rotating_speed.z",
+            "body_rate",
+            "rotating_speed.x rotating_speed.y rotating_speed.z",
+        ),
         ("positions[0] positions[1] positions[2]", "position", "positions[0] positions[1] positions[2]"),
         ("ang_vel_x ang_vel_y ang_vel_z", "body_rate", "ang_vel_x ang_vel_y ang_vel_z"),
         ("angVelX angVelY angVelZ", "body_rate", "angVelX angVelY angVelZ"),

@@ -315,10 +315,10 @@ def test_the_page_on_import_describes_every_format():
 
 def test_words():
     suffixes = ".csv, .csv.gz, .parquet, .ulg, .bin, .px4log, .log, .bbl, .bfl, Crazyflie uSD"
-    suffixes += ", .db3, .mcap, .h5, .hdf5, .mat, .npz, .json or .jsonl"
+    suffixes += ", .bag, .db3, .mcap, .h5, .hdf5, .mat, .npz, .json or .jsonl"
     assert suffixes_in_words() == suffixes
-    formats = "CSV, Parquet, ULog, ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 2 bag"
-    formats += ", HDF5, MATLAB, NumPy, JSON"
+    formats = "CSV, Parquet, ULog, ArduPilot DataFlash, PX4 sdlog2, Betaflight blackbox, Crazyflie uSD, ROS 1 bag"
+    formats += ", ROS 2 bag, HDF5, MATLAB, NumPy, JSON"
     assert formats_in_words() == formats
 
 
@@ -975,7 +975,6 @@ TELEMETRY = b"".join(struct.pack(">Q", 14 * 10**14 + 10**5 * i) + b"\xfe\x09" + 
 @pytest.mark.parametrize(
     ("name", "content", "what", "way"),
     [
-        ("a.bag", b"#ROSBAG V2.0\n" + bytes(99), "a bag of ROS 1", "rosbags-convert"),
         ("a.bin", bytes(999), "a file that begins with zeros", "take it from the device again"),
         ("a.tlog", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),
         ("a.bin", TELEMETRY, "telemetry of MAVLink", "the log that the autopilot writes itself"),

@@ -1,4 +1,4 @@
-"""Bags of ROS 2, in both kinds of storage, whole and broken."""
+"""Bags of ROS 1, and of ROS 2 in both kinds of storage, whole and broken."""
 
 import sqlite3
 
@@ -11,7 +11,7 @@ from tests.builders.ros_bags import BEGIN_NS, STORE, imu, rates, write_bag
 
 MILLISECOND = 10**6
 LATE = 3 * MILLISECOND
-KINDS = (".db3", ".mcap")
+KINDS = (".bag", ".db3", ".mcap")
 
 
 def sent(count=20):
@@ -44,7 +44,7 @@ def test_messages_are_flattened_and_stamped_by_who_sent_them(bag):
     assert warning.startswith(
         "these topics do not use the recorder's clock and are shifted by the median offset: /fmu/out/rates (+1.7e+09 s)"
     )
-    assert contents.system == "ROS 2"
+    assert contents.system == ("ROS 1" if bag.suffix == ".bag" else "ROS 2")
 
 
 def slowed(pace, jump=0):
@@ -100,7 +100,7 @@ def test_only_topics_that_are_wanted_are_read(bag):
 def test_a_bag_that_is_cut_off(tmp_path, kind):
     path = write_bag(tmp_path / "bag", kind, sent(400))
     path.write_bytes(path.read_bytes()[:5000])
-    with pytest.raises(InputError, match=r"cannot be read as a ROS 2 bag: \w+"):
+    with pytest.raises(InputError, match=r"cannot be read as a bag of ROS: \w+"):
         log_contents(path)
 
 
@@ -121,7 +121,7 @@ def test_types_without_definition_are_named(tmp_path):
 
 
 def test_a_bag_without_messages(tmp_path):
-    with pytest.raises(InputError, match=r"a ROS 2 bag without readable messages$"):
+    with pytest.raises(InputError, match=r"a bag of ROS without readable messages$"):
         log_contents(write_bag(tmp_path / "bag", ".mcap", []))
 
 
