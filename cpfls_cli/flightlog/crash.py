@@ -182,6 +182,9 @@ def resting(signs: Signs, active: BoolArray) -> Resting:
     carried = held | binary_dilation(binary_opening(rests, window[: len(window) // 2 + 1]), window)
     plunges = _plunges(signs, active)
     carried |= (plunges >= 0) & (np.arange(len(active)) >= plunges)
+    for first, after in runs(active):
+        begin = _tumbles_from(signs, flies, first, after)
+        carried[begin:after] |= (after - begin) * signs.period > _LIES_S
     return Resting(np.asarray(carried, dtype=bool), np.asarray(lies, dtype=bool), plunges)
 
 
@@ -192,6 +195,16 @@ def _plunges(signs: Signs, active: BoolArray) -> int:
     falls = active[step:] & (signs.height[:-step] - signs.height[step:] > _PLUNGES_M_S * step * signs.period)
     long = (first for first, after in runs(falls) if (after - first) * signs.period > _PLUNGE_S - SLOW_S)
     return next(long, -1)
+
+
+def _tumbles_from(signs: Signs, flies: BoolArray, first: int, after: int) -> int:
+    """Give the sample from which a vehicle that was high turns over near the ground and never leaves it again."""
+    if signs.height is None or signs.upright is None:
+        return after
+    high = signs.height[first:after] > signs.height[first] + _DROP_M
+    over = averaged(_turned_up(signs.upright, flies), signs.period, _FALL_S)[first:after] < 0
+    over[: np.flatnonzero(np.append(True, high))[-1]] = False
+    return first + int(np.argmax(np.append(over & high.any(), True)))
 
 
 def turns_over(signs: Signs, active: BoolArray) -> bool:

@@ -71,6 +71,16 @@ def tumbles(own):
     return then(own, 2.5, rate=17.0, felt=(0.0, 0.0, 1.0), rotors=ONE_AT_FULL, falls=7.0)
 
 
+def rolls_on_the_ground(own, height=0.0):
+    """Take off, fly 5 m high, lose control, fall to some height, and roll there to the end with the rotors on."""
+    flown = changed(own, position=own.position.copy())
+    flown.position[:, 2] = np.interp(own.time, [0.0, 4.0], [0.0, 5.0])
+    rolls = then(then(flown, 1.2, rate=17.0, felt=(0.0, 0.0, 1.0), rotors=ONE_AT_FULL, falls=7.0), 25.0, rate=6.0)
+    rolls.speed[len(own.time) :] = own.speed.mean() * np.array(ONE_AT_FULL)
+    rolls.position[rolls.time > own.time[-1] + 1.2, 2] = height
+    return rolls
+
+
 def gives_way(own):
     """Lean more and more with two rotors at full, swing, and hit the ground three seconds later."""
     leans = then(own, 1.5, rate=0.8, felt=(0.0, 0.0, 9.0), rotors=(2.5, 0.9, 2.5, 0.9))

@@ -176,6 +176,14 @@ def test_flips_are_flight_also_where_the_log_ends_in_them(own, known):
         assert flown(log, known).span_s is None
 
 
+def test_what_turns_over_near_the_ground_and_never_leaves_it_again_has_crashed(own):
+    found = flown(ended.rolls_on_the_ground(own))
+    assert found.span_s == (0.0, pytest.approx(ended.SECONDS, abs=0.5))
+    assert found.ended.startswith("loss of control at 40.0 s")
+    # High above the ground it flies.
+    assert flown(ended.rolls_on_the_ground(own, height=4.0)).span_s is None
+
+
 def test_a_push_before_the_end_of_a_log_that_is_flown_out_of_is_no_loss_of_control(own):
     """Such as the wake of another vehicle: its rotors do not turn it, and it flies on as before."""
     pushed = ended.changed(own, rate=own.rate.copy(), angles=own.angles.copy())
