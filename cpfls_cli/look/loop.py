@@ -38,6 +38,8 @@ _TINY = float(np.finfo(float).tiny)
 Z, X, Y = 0, 1, 2
 _OVER_FREQUENCY = ("gain", "phase", "gain_error")
 _OVER_TIME = ("step", "step_low", "step_high", "law_step")
+_EMPTY = dict.fromkeys(("frequency", "time", *_OVER_FREQUENCY, *_OVER_TIME), np.zeros(0))
+_NOTHING: dict[str, Any] = {"windows": 0, "clear_hz": np.nan, "law_explains": False, **_EMPTY}
 
 
 @result
@@ -107,7 +109,7 @@ def _axis_loop(flight: LogFlight, axis: int, plant: AxisPlant, law: Law | None) 
         measured=found is not None,
         reason="" if found else reason,
         instrument=source if found else "",
-        **_whole({**_nothing(), **every, **(loop.fields(time, flight.rate_hz, length, every) if loop else {})}),
+        **_whole({**_NOTHING, **every, **(loop.fields(time, flight.rate_hz, length, every) if loop else {})}),
     )
 
 
@@ -209,11 +211,6 @@ def _measured(found: _Response, time: Array, length: int) -> dict[str, Any]:
         "step_low": steps[0] - half,
         "step_high": steps[0] + half,
     }
-
-
-def _nothing() -> dict[str, Any]:
-    curves = ("frequency", "time", *_OVER_FREQUENCY, *_OVER_TIME)
-    return {"windows": 0, "clear_hz": np.nan, "law_explains": False, **dict.fromkeys(curves, np.zeros(0))}
 
 
 def _jackknifed(values: Array) -> Estimate | None:

@@ -548,17 +548,13 @@ def _merged(found: Sequence[Event]) -> Iterator[Event]:
     for kind in dict.fromkeys(event.kind for event in found):
         own = sorted((event for event in found if event.kind == kind), key=lambda event: event.time_s)
         if kind in ("message", "error", "failsafe"):
-            yield from _same_texts(own)
+            for text in dict.fromkeys(event.text for event in own):
+                same = [event for event in own if event.text == text]
+                yield same[0] if len(same) == 1 else _as_one(same, f"{text}, {len(same)} times")
         elif len(own) <= (_MOST_KEPT if kind in _KEPT else _MOST_OF_A_KIND):
             yield from own
         else:
             yield _as_one(own, _in_words(kind, own))
-
-
-def _same_texts(own: Sequence[Event]) -> Iterator[Event]:
-    for text in dict.fromkeys(event.text for event in own):
-        same = [event for event in own if event.text == text]
-        yield same[0] if len(same) == 1 else _as_one(same, f"{text}, {len(same)} times")
 
 
 def _as_one(many: Sequence[Event], text: str) -> Event:
