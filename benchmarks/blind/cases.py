@@ -110,6 +110,7 @@ NAMES = {
     "notch_filter": "notch_filter",
     "rotor_interference": "own_wake",
     "thrust_curve": "thrust_slope",
+    "thrust_tilt": "rotor_tilt",
     "wake_on_body": "own_wake",
 }
 """Names that the catalogue has for what is hidden under another; what it takes in of ``OUTSIDE`` gets a line here."""

@@ -164,12 +164,14 @@ class RotorInterference(Term):
 
 
 class ThrustTilt(Term):
-    """Motors mounted askew: each thrust leans by a fixed small angle."""
+    """Motors mounted askew: each thrust leans by a fixed small angle, and the reaction with it."""
 
     stage = "hub"
 
     def apply(self, now, r):
         now.side[:, :, r] += self.lean * now.thrust[:, r]
+        reaction = self.of("torque_factor") * now.spin[:, r] * now.speed[:, r] ** 2
+        now.torque[:2, r] -= (self.lean * reaction).sum(1)
 
 
 class LooseArm(Term):

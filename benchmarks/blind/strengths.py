@@ -248,7 +248,7 @@ FORMS = {
     "inflow_momentum": (CATALOGUE["inflow"], "inflow"),
     "lag_second_order": (_lag_second_order, "low_pass_filter"),
     "lag_uneven": (_lag_uneven, "motor_lag"),
-    "thrust_tilt": (_thrust_tilt, "torque_bias"),
+    "thrust_tilt": (_thrust_tilt, "rotor_tilt"),
 }
 """Effects close to one of the catalogue, in another form: draw, and the nearest effect of the catalogue."""
 

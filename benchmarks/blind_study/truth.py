@@ -58,11 +58,7 @@ def _delay(hidden, _vehicle):
 def _mismatch(hidden, vehicle):
     gain, spin = np.array(hidden["gain"]), np.array(vehicle.spin)
     if vehicle.count != 4:
-        # Others grow along x and y, and with the spin; what all have in common looks like another inertia.
-        x, y = (own / np.ptp(own) for own in vehicle.hubs[:2])
-        patterns = np.stack([x, y, x * spin, y * spin, np.ones_like(x), spin])
-        found = np.linalg.lstsq(patterns.T, gain, rcond=None)[0]
-        return {f"difference_{place + 1}": float(found[place]) for place in range(4)}
+        return {f"difference_{place + 1}": value for place, value in enumerate(_grown(gain, vehicle)[:4])}
     # What a pair has in common looks like another inertia, so a difference is relative to the mean of its pair.
     pairs = [(gain[i] - gain[i + 2]) / (1 + (gain[i] + gain[i + 2]) / 2) for i in (0, 1)]
     left, right = gain[spin > 0].mean(), gain[spin < 0].mean()
@@ -80,6 +76,28 @@ def _payload(hidden, _vehicle):
     mass, (x, y, z) = hidden["mass"], hidden["point"]
     hook = {"mass_times_depth": -mass * z, "mass_times_right": -mass * y, "mass_times_behind": -mass * x}
     return hook | {"mass": mass, "length_m": hidden["length"], "damping_1_s": hidden["damping"], "depth_m": -z}
+
+
+def _grown(of_rotors, vehicle):
+    """Split what is of each rotor as others than quadrotors show it: along x and y, also with the spin, and alike.
+
+    What all of one spin have in common looks like another inertia.
+    """
+    x, y = (own / np.ptp(own) for own in vehicle.hubs[:2])
+    spin = np.array(vehicle.spin)
+    patterns = np.stack([x, y, x * spin, y * spin, np.ones_like(x), spin])
+    return np.linalg.lstsq(patterns.T, of_rotors, rcond=None)[0].tolist()
+
+
+def _tilt(hidden, vehicle):
+    lean, out = np.array(hidden["lean"]), vehicle.hubs[:2] / np.linalg.norm(vehicle.hubs[:2], axis=0)
+    known = {}
+    for kind, of_rotors in (("twist", out[0] * lean[1] - out[1] * lean[0]), ("bend", (out * lean).sum(0))):
+        quadrotor = [*(of_rotors[:2] - of_rotors[2:4]), of_rotors.mean()]
+        *parts, alike = quadrotor if vehicle.count == 4 else _grown(of_rotors, vehicle)[:5]
+        known |= {f"{kind}_{place + 1}": float(part) for place, part in enumerate(parts)}
+        known |= {"twist_all": float(alike)} if kind == "twist" else {}
+    return known
 
 
 def _parameters(hidden, _vehicle):
@@ -113,6 +131,7 @@ _OF = {
     "com_offset": lambda h, _: _axes("c", h["offset"][:2]),
     "products_of_inertia": lambda h, _: {f"I{pair}": h[pair] for pair in ("xy", "xz", "yz")},
     "rotor_mismatch": _mismatch,
+    "thrust_tilt": _tilt,
     "thrust_curve": lambda h, _: {"linear": h["share"]},
     "torque_bias": lambda h, _: _axes("M", h["torque"]),
     "payload": _payload,

@@ -52,21 +52,37 @@ def forward_selection(
         step = rank_effects(flights, chosen, effects, settings, rng)
         steps.append(step)
         progress(len(steps))
-        if len(chosen) >= settings.effects_max:
-            return chosen, steps
-        grown = _grown(step) if acceptable(step, settings) else []
-        grown += grown_elsewhere(beam[1:], step, effects, settings)
+        most = len(chosen) >= settings.effects_max
+        grown = _grown(step) if not most and acceptable(step, settings) else []
+        grown += [] if most else grown_elsewhere(beam[1:], step, effects, settings)
         if not grown:
-            return chosen, steps
+            return _exchanged(chosen, step, effects, settings), steps
         number = float(np.log(step.hypothesis.known.sum()))
         best = simplest(ascending(grown, lambda scored: -scored.gain), step.above_floor, number)
         refitted = refined(flights, best.chosen, step.floor)
         # A set that was there before would recur for ever.
         if of_motion(best.gain, step, refitted) < step.least_gain() or names_of(refitted.chosen) in tried:
-            return chosen, steps
+            return _exchanged(chosen, step, effects, settings), steps
         tried.add(names_of(refitted.chosen))
         step.hypothesis.cache.clear()
         beam = [refitted.chosen, *(scored.chosen for scored in grown if scored is not best)][:_BEAM]
+
+
+def _exchanged(
+    chosen: tuple[Candidate, ...], step: RankedStep, effects: Sequence[Effect], settings: GapSettings
+) -> tuple[Candidate, ...]:
+    """Put a simpler effect in the place of one that took up what another explains, found after it."""
+    flights = step.hypothesis.flights
+    for place, candidate in enumerate(chosen[:-1]):
+        others = (*chosen[:place], *chosen[place + 1 :])
+        look = rank_effects(flights, others, effects, settings, None, also=(candidate,), floor=step.floor)
+        if _lags([candidate]) or not look.ranking:
+            continue
+        number = float(np.log(look.hypothesis.known.sum()))
+        best = simplest(look.ranking, look.above_floor, number)
+        if free_numbers(best.chosen) < free_numbers(chosen):
+            return _exchanged(refined(flights, best.chosen, step.floor).chosen, step, effects, settings)
+    return chosen
 
 
 def acceptable(step: RankedStep, settings: GapSettings) -> bool:

@@ -17,7 +17,15 @@ from tests.builders.gap_flights import candidate, fly, weak
 SETTINGS = GapSettings(shifts=99)
 TRIED = [
     CATALOGUE[name]
-    for name in ("com_offset", "torque_bias", "linear_damping", "rotor_mismatch", "products_of_inertia", "rotor_drag")
+    for name in (
+        "com_offset",
+        "torque_bias",
+        "linear_damping",
+        "rotor_mismatch",
+        "rotor_tilt",
+        "products_of_inertia",
+        "rotor_drag",
+    )
 ]
 
 
@@ -37,6 +45,8 @@ def names(chosen):
         ("products_of_inertia", [0.03, 0.0, 0.02]),
         ("rotor_drag", [1.5e-3]),
         ("rotor_mismatch", [0.05, -0.03, 0.02, 0.0, 0.0, 0.0]),
+        # A single rotor: M1 leans by a degree, as its arm is twisted, and half of that outwards.
+        ("rotor_tilt", [0.0044, 0.0175, 0.0087, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     ],
 )
 def test_forward_finds_one_effect_and_stops(name, coefficients):

@@ -48,6 +48,7 @@ USUAL = {
     ("com_offset", "c_x"): ((-0.03, 0.03), (-0.002, 0.002)),
     ("products_of_inertia", "Ixz"): ((-0.1, 0.1), (-1e-6, 1e-6)),
     ("rotor_mismatch", "difference_1"): ((-0.15, 0.15), (-0.1, 0.1)),
+    ("rotor_tilt", "twist_1"): ((-0.1, 0.1), (-0.1, 0.1)),
     ("torque_bias", "M_z"): ((-0.5, 0.5), None),
     ("payload", "mass"): ((0.2, 1.5), (0.002, 0.01)),
     ("payload", "mass_times_depth"): ((0.01, 0.3), (2e-5, 2e-4)),
@@ -124,7 +125,7 @@ def test_what_is_needed_can_be_there(flight, commanded, name):
 def test_all_are_there_and_in_order():
     modules = {module.name for module in pkgutil.iter_modules(catalogue.__path__)}
     assert (set(CATALOGUE), list(CATALOGUE)[:2]) == (modules, ["linear_damping", "quadratic_damping"])
-    assert list(CATALOGUE)[32] == "parameter_error"
+    assert list(CATALOGUE)[33] == "parameter_error"
 
 
 def test_an_unknown_name_gives_the_nearest():

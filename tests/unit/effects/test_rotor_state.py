@@ -163,6 +163,27 @@ def test_what_one_spin_lifts_more_shows_in_force_only(columns, flight):
     np.testing.assert_allclose(true.body_torque - flight.torque, flight.torque * [-0.05, 0.05, 0.0], atol=1e-12)
 
 
+def test_tilted_rotors_push_along_their_shafts_and_turn_the_vehicle_against_them(columns, flight):
+    """Each rotor by itself, whose shaft is turned by a small angle, with its lever and its reaction."""
+    tilt = {"twist_all": 0.002, "twist_1": 0.02, "bend_1": -0.01, "twist_2": 0.004, "bend_2": 0.03}
+    found = columns("rotor_tilt", flight).direct @ [tilt.get(c.name, 0.0) for c in CATALOGUE["rotor_tilt"].coefficients]
+    twist, bend = [0.012, 0.004, -0.008, 0.0], [-0.005, 0.015, 0.005, -0.015]
+    wanted = np.zeros_like(found)
+    for rotor, speed, about_arm, outwards in zip(flight.vehicle.rotors, flight.rotor_speed.T, twist, bend, strict=True):
+        hub = np.array(rotor.position_m)
+        arm = hub / np.hypot(*hub[:2]) * [1.0, 1.0, 0.0]
+        lean = about_arm * np.cross([0.0, 0.0, 1.0], arm) + outwards * arm
+        force = rotor.thrust_factor_n_s2 * speed[:, None] ** 2 * lean
+        wanted[:, 3:] += force
+        wanted[:, :3] += np.cross(hub, force) - rotor.spin * rotor.drag_factor_n_m_s2 * speed[:, None] ** 2 * lean
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
+def test_tilted_rotors_are_told_apart_by_pairs(flight):
+    says = CATALOGUE["rotor_tilt"].describe(flight.vehicle, {"twist_all": -0.01, "bend_2": 0.02})
+    assert says == "all rotors lean 0.6 deg clockwise; M2 leans 1.1 deg outwards more than M4."
+
+
 def crossed(number):
     """Rotors between the axes, in turn on both sides of them and of both spins."""
     places = circle(number).rotors
