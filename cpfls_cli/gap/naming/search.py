@@ -80,7 +80,8 @@ def _exchanged(
             continue
         number = float(np.log(look.hypothesis.known.sum()))
         best = simplest(look.ranking, look.above_floor, number)
-        if free_numbers(best.chosen) < free_numbers(chosen):
+        simpler = free_numbers(best.chosen) < free_numbers(chosen)
+        if simpler and best.candidate.effect.name != candidate.effect.name:
             return _exchanged(refined(flights, best.chosen, step.floor).chosen, step, effects, settings)
     return chosen
 

@@ -90,6 +90,14 @@ def test_a_poor_choice_is_replaced_by_what_serves_better():
     assert sorted(names(better.chosen)) == ["com_offset", "linear_damping"]
 
 
+def test_what_took_up_two_effects_makes_room_for_the_simpler_one():
+    """Tilted rotors push aside as an askew autopilot does, and turn the vehicle as an offset does."""
+    known = flights((candidate("com_offset"), [0.001, -0.0005]), (candidate("mounting"), [-0.01, 0.03, 0.03]))
+    chosen, steps = forward_selection(known, [*TRIED, CATALOGUE["mounting"]], SETTINGS, np.random.default_rng(0))
+    assert names(steps[1].hypothesis.chosen) == ["rotor_tilt"]
+    assert sorted(names(chosen)) == ["com_offset", "mounting"]
+
+
 def test_what_is_chosen_is_not_looked_at_again_and_each_effect_is_listed_once():
     known = flights((candidate("com_offset"), [0.004, -0.003]))
     step = rank_effects(known, [candidate("com_offset")], [*TRIED, CATALOGUE["channel_delay"]], SETTINGS, None)
