@@ -281,7 +281,8 @@ def _wanted(effect: Effect) -> str:
     names = {number.name for number in numbers}
     more = [number for number in (effect.exact or effect).numbers if number.name not in names]
     by_name = f"; by name also {_listed(more)}" if more else ""
-    return f"{len(numbers)} value{'s' if len(numbers) > 1 else ''}: {_listed(numbers)}{by_name}"
+    least = f"{len(numbers) - effect.optional} to " if effect.optional else ""
+    return f"{least}{len(numbers)} value{'s' if len(numbers) > 1 else ''}: {_listed(numbers)}{by_name}"
 
 
 def _listed(numbers: Sequence[Coefficient | Shape]) -> str:

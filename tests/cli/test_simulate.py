@@ -151,6 +151,7 @@ def test_a_flight_in_closed_loop_can_be_identified(fly, short, cpfls, tmp_path):
         (["rotr_drag=1"], "rotr_drag: no such effect (did you mean rotor_drag"),
         (["rotor_drag=much"], "much is not a number; write NAME=VALUE"),
         (["rotor_drag=9"], "k_d = 9 is not possible on this vehicle: 0 to"),
+        (["rotor_tilt=0.01"], "takes 5 to 9 values: twist_all (rad), twist_1 (rad), bend_1 (rad)"),
         (["com_offset=0.01"], "takes 2 values: c_x (m), c_y (m); by name also c_z (m); 1 given"),
         (["com_offset.c_w=0.01"], "has no c_w; takes 2 values: c_x (m), c_y (m); by name also c_z (m)"),
         (["com_offset=0.01,0", "com_offset.c_x=0.01"], "com_offset is given twice"),
