@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from cpfls_cli.arrays import Array, BoolArray, Numbers
+from cpfls_cli.arrays import Array, BoolArray
 
 
 def damped_step(hessian: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
@@ -56,12 +55,6 @@ SMALLEST_SINGULAR_SHARE = 3e-7
 # Up to here the squares have digits enough; above, the lowest directions are multiplied out once more.
 _WELL_CONDITIONED = 3e3
 _LOWEST_DIRECTIONS = 3
-# Columns from which a tridiagonal form is worth its calls, and what it may work in, numbers a column.
-_FEW, _WORK = 64, 64
-# Columns from which Lanczos is worth its calls; its restarts at most, and the residual at which eigenvalues are exact.
-_MANY = 700
-_STEPS = 20
-_SETTLED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -191,135 +184,22 @@ def solve_normal(equations: NormalEquations, rank_tolerance: float, project: Pro
     refinement).
     """
     tolerance = max(rank_tolerance, SMALLEST_SINGULAR_SHARE)
-    inverse = _inverted(equations.matrix, tolerance**2)
-    if inverse is None:
-        return NormalSolution(np.zeros_like(equations.moment), float("inf"))
-    parameters, smallest = inverse.apply(equations.moment), inverse.smallest
-    if inverse.missing:
-        # No refinement: the condition number is this, whatever the smallest singular value is.
-        return NormalSolution(parameters, (1.0 + inverse.missing) / tolerance)
-    if inverse.largest > _WELL_CONDITIONED**2 * smallest:
-        square, back = project(parameters, inverse.lowest)
-        parameters = parameters + inverse.apply(back - equations.penalty * parameters)
-        penalised = square + (inverse.lowest.T * equations.penalty) @ inverse.lowest
-        smallest = np.linalg.eigvalsh(penalised)[0]
-    return NormalSolution(parameters, float(np.sqrt(inverse.largest / smallest)))
-
-
-@dataclass(frozen=True)
-class _Inverse:
-    """Pseudoinverse of a symmetric matrix.
-
-    `apply` multiplies a vector; `missing` eigenvalues count as zero, and then `smallest` is 0 and there are no
-    `lowest`, the orthonormal directions of up to three smallest ones.
-    """
-
-    apply: Callable[[Array], Array]
-    missing: int
-    largest: float = 0.0
-    smallest: float = 0.0
-    lowest: Array = field(default_factory=lambda: np.empty((0, 0)))
-
-
-def _inverted(matrix: Array, tolerance: float) -> _Inverse | None:
-    """Invert a matrix whose eigenvalues below a share of the largest count as zero; None where all are zero.
-
-    A Cholesky decomposition does that, with the few eigenvectors that are asked for: of a large matrix by few steps
-    of Lanczos, if it has full rank, of others by a tridiagonal form. Where it fails all eigenvectors are computed.
-    """
-    with suppress(np.linalg.LinAlgError):
-        found = _factored(matrix, tolerance) if len(matrix) >= _MANY else _reduced(matrix, tolerance)
-        if found is not None:
-            return found
-    eigenvalues, vectors = np.linalg.eigh(matrix)
-    kept = eigenvalues > tolerance * eigenvalues[-1]
+    eigenvalues, vectors = np.linalg.eigh(equations.matrix)
+    kept = eigenvalues > tolerance**2 * eigenvalues[-1]
     if not kept.any():
-        return None
+        return NormalSolution(np.zeros_like(equations.moment), float("inf"))
     inverse, basis = 1.0 / eigenvalues[kept], vectors[:, kept]
-
-    def apply(right_side: Array) -> Array:
-        return np.asarray(basis @ (inverse * (basis.T @ right_side)))
-
-    if missing := len(eigenvalues) - len(inverse):
-        return _Inverse(apply, missing)
-    return _Inverse(apply, 0, eigenvalues[-1], eigenvalues[0], basis[:, :_LOWEST_DIRECTIONS])
-
-
-def _reduced(matrix: Array, tolerance: float) -> _Inverse | None:
-    """Invert by Cholesky and the lowest eigenvectors, from a tridiagonal form; None where all are had as soon.
-
-    Directions that count as zero get the largest eigenvalue, and nothing of a vector that is multiplied.
-    """
-    from scipy import linalg
-    from scipy.linalg import lapack
-
-    size = len(matrix)
-    if size < _FEW:
-        return None
-    form, diagonal, off_diagonal, reflectors, _ = lapack.dsytrd(matrix, lower=1, lwork=_WORK * size)
-
-    def turned_back(vectors: Numbers) -> Numbers:
-        from scipy.linalg import lapack
-
-        below = lapack.dormqr("L", "N", form[1:, :-1], reflectors, vectors[1:], _WORK * size)[0]
-        return np.concatenate([vectors[:1], below])
-
-    last = (size - 1, size - 1)
-    (largest,) = linalg.eigvalsh_tridiagonal(diagonal, off_diagonal, select="i", select_range=last, check_finite=False)
-    if not largest > 0:
-        return None
-    near_zero = (-largest, tolerance * largest)
-    none = turned_back(
-        linalg.eigh_tridiagonal(diagonal, off_diagonal, select="v", select_range=near_zero, check_finite=False)[1]
-    )
-    factor = linalg.cho_factor(matrix + largest * none @ none.T, check_finite=False)
-
-    def apply(right_side: Array) -> Array:
-        from scipy import linalg
-
-        inside = right_side - none @ (none.T @ right_side)
-        return np.asarray(linalg.cho_solve(factor, inside, check_finite=False))
-
-    if missing := none.shape[1]:
-        return _Inverse(apply, missing)
-    lowest = (0, _LOWEST_DIRECTIONS - 1)
-    values, vectors = linalg.eigh_tridiagonal(
-        diagonal, off_diagonal, select="i", select_range=lowest, check_finite=False
-    )
-    return _Inverse(apply, 0, largest, values[0], turned_back(vectors))
-
-
-def _factored(matrix: Array, tolerance: float) -> _Inverse | None:
-    """Invert by Cholesky; None where the rank may not be full."""
-    from scipy import linalg
-
-    factor = linalg.cho_factor(matrix, check_finite=False)
-
-    def apply(right_side: Array) -> Array:
-        from scipy import linalg
-
-        return np.asarray(linalg.cho_solve(factor, right_side, check_finite=False))
-
-    size = len(matrix)
-    upper, lower = _extreme(lambda vector: matrix @ vector, size, 1), _extreme(apply, size, _LOWEST_DIRECTIONS)
-    # Far enough from zero that no rounding decides the rank.
-    if upper is None or lower is None or not 1.0 / lower[0] > 4.0 * tolerance * upper[0]:
-        return None
-    return _Inverse(apply, 0, upper[0], 1.0 / lower[0], lower[1])
-
-
-def _extreme(apply: Callable[[Array], Array], size: int, count: int) -> tuple[float, Array] | None:
-    """Find the largest eigenvalue of a symmetric operator, and directions, by Lanczos; None if it does not settle."""
-    # Slow to load, and most that solve have few columns.
-    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
-
-    operator = LinearOperator((size, size), matvec=apply, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(size)
-    try:
-        values, vectors = eigsh(operator, count, which="LA", v0=start, maxiter=_STEPS, tol=_SETTLED)
-    except ArpackError:
-        return None
-    return float(values[-1]), np.asarray(vectors[:, ::-1])
+    parameters = basis @ (inverse * (basis.T @ equations.moment))
+    if missing := len(kept) - len(inverse):
+        # No refinement: the condition number is this, whatever the smallest singular value is.
+        return NormalSolution(parameters, (1.0 + missing) / tolerance)
+    smallest, largest = eigenvalues[0], eigenvalues[-1]
+    if largest > _WELL_CONDITIONED**2 * smallest:
+        lowest = vectors[:, :_LOWEST_DIRECTIONS]
+        square, back = project(parameters, lowest)
+        parameters = parameters + basis @ (inverse * (basis.T @ (back - equations.penalty * parameters)))
+        smallest = np.linalg.eigvalsh(square + (lowest.T * equations.penalty) @ lowest)[0]
+    return NormalSolution(parameters, float(np.sqrt(largest / smallest)))
 
 
 def quick_solution(equations: NormalEquations) -> tuple[Array, tuple[Array, bool], Array]:

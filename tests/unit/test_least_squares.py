@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from cpfls_cli import least_squares
 from cpfls_cli.dynamics import outside_visited, visited_cells
 from cpfls_cli.identification.data import TorqueData
 from cpfls_cli.identification.findings import rule_excitation
@@ -88,13 +87,6 @@ def test_no_rows_at_all_are_an_error():
         Triangle.of([])
 
 
-@pytest.fixture(params=["all eigenvectors", "tridiagonal form", "Lanczos"])
-def each_way(request, monkeypatch):
-    """As few columns are solved, as some are, and as many."""
-    monkeypatch.setattr(least_squares, "_FEW", PARAMETERS + (request.param == "all eigenvectors"))
-    monkeypatch.setattr(least_squares, "_MANY", PARAMETERS + (request.param != "Lanczos"))
-
-
 def columns(singular_values, rows=200, seed=32):
     """A matrix of given singular values, a right-hand side, and the parameters behind it."""
     rng = np.random.default_rng(seed)
@@ -122,7 +114,6 @@ def decay(condition, kind, scale=1.0):
     return scale * values
 
 
-@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("scale", [1.0, 1e6, 1e-6])
 @pytest.mark.parametrize("kind", ["even", "one", "cluster"])
 @pytest.mark.parametrize("condition", [3.0, 5e3, 2e4, 1e5, 1e6])
@@ -132,7 +123,6 @@ def test_condition_number_has_six_digits(condition, kind, scale):
     assert (found, found) == (pytest.approx(np.linalg.cond(A), rel=1e-6), pytest.approx(condition, rel=1e-6))
 
 
-@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("kind", ["even", "one", "cluster"])
 @pytest.mark.parametrize("condition", [3.0, 5e3, 2e4, 1e5, 1e6])
 def test_residual_is_that_of_the_decomposition(condition, kind):
@@ -143,7 +133,6 @@ def test_residual_is_that_of_the_decomposition(condition, kind):
     np.testing.assert_allclose(residual, best, atol=1e-7 * np.abs(best).max())
 
 
-@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("condition", [3.0, 2e4, 1e6])
 def test_penalised_system_is_solved_with_its_penalty(condition):
     A, y, _ = columns(decay(condition, "even"))
@@ -163,7 +152,6 @@ def test_losing_rank_never_improves_the_conditioning():
     ] == pytest.approx([8, 2e6, 3e6])
 
 
-@pytest.mark.usefixtures("each_way")
 @pytest.mark.parametrize("rank_tolerance", [1e-10, 1e-6, 1e-4])
 @pytest.mark.parametrize("seed", range(3))
 def test_conditioning_is_ordered_to_the_end(rank_tolerance, seed):
@@ -181,7 +169,6 @@ def test_conditioning_is_ordered_to_the_end(rank_tolerance, seed):
     assert solved(*columns(fewer, seed=seed)[:2], rank_tolerance=rank_tolerance).conditioning > worse[-1]
 
 
-@pytest.mark.usefixtures("each_way")
 def test_dependent_columns_get_the_parameters_of_smallest_norm():
     values = np.geomspace(1.0, 0.1, PARAMETERS)
     values[-5:] = 0.0
@@ -189,22 +176,6 @@ def test_dependent_columns_get_the_parameters_of_smallest_norm():
     found = solved(A, y)
     np.testing.assert_allclose(found.parameters, np.linalg.pinv(A, rcond=1e-10) @ y, atol=1e-9)
     assert found.conditioning == pytest.approx(6 / SMALLEST_SINGULAR_SHARE)
-
-
-@pytest.mark.parametrize("kind", ["even", "one", "cluster"])
-@pytest.mark.parametrize(("condition", "full"), [(3.0, True), (1e5, True), (3e7, False)])
-def test_cholesky_and_lanczos_find_what_the_eigendecomposition_does(kind, condition, full):
-    A = columns(decay(condition, kind))[0]
-    matrix, tolerance = A.T @ A, SMALLEST_SINGULAR_SHARE**2
-    found, expected = least_squares._factored(matrix, tolerance), np.linalg.eigvalsh(matrix)
-    assert (found is not None) == full
-    if found is not None:
-        # Rounding of the matrix moves its smallest eigenvalue by 1e-16 of the largest.
-        assert found.smallest == pytest.approx(expected[0], rel=1e-9 + 1e-14 * condition**2)
-        assert (found.largest, found.missing) == (pytest.approx(expected[-1], rel=1e-12), 0)
-        right_side = matrix @ np.ones(PARAMETERS)
-        np.testing.assert_allclose(matrix @ found.apply(right_side), right_side, rtol=1e-9)
-        np.testing.assert_allclose(found.lowest.T @ found.lowest, np.eye(3), atol=1e-9)
 
 
 def test_normal_equations_without_any_excitation():
