@@ -157,9 +157,9 @@ class Effect:
     carried: Body | None = None  # For effects with a state of their own, in place of `acts`.
     log: SensorLog | None = None  # For effects on the log: how they are simulated.
     test: SensorTest | None = None  # For effects that the sensor audit finds.
-    # ``accounts(number, values) -> float``: relative error of a number of the vehicle that the effect itself leaves, so
-    # that the number is not called wrong.
-    accounts: Callable[[str, Mapping[str, float]], float] | None = None
+    # ``accounts(number, values, vehicle) -> float``: relative error of a number of the vehicle that the effect itself
+    # leaves, so that the number is not called wrong.
+    accounts: Callable[[str, Mapping[str, float], VehicleSettings], float] | None = None
     # ``in_vehicle(parts, shape, linear) -> VehicleParts``: for effects that have a place of their own in the model of a
     # whole vehicle.
     in_vehicle: Callable[[VehicleParts, Mapping[str, float], Array], VehicleParts] | None = None
@@ -279,6 +279,6 @@ def hub_wrench(hubs: Array, force: Array) -> Array:
     return wrench(cross(hubs[None], force).sum(axis=1), force.sum(axis=1))
 
 
-def a_few_percent(_number: str, _values: Mapping[str, float]) -> float:
+def a_few_percent(_number: str, _values: Mapping[str, float], _vehicle: VehicleSettings) -> float:
     """Account for an error of any number as small as formulas of thrust are off by: it is not called wrong for it."""
     return 0.05

@@ -300,8 +300,10 @@ def before(rows: Array) -> Array:
     np.cumsum(np.moveaxis(rows, 0, -1), axis=-1, out=total[..., 1:])
     first, count = _PAST[-1] + 1, max(0, len(rows) - 1 - _AHEAD - _PAST[-1])
     ends = [total[..., first - ago : first - ago + count] for ago in _PAST]
-    parts = [(one - other) / own for (one, other), own in zip(pairwise(ends), np.diff(_PAST), strict=True)]
-    return np.moveaxis(np.stack(parts, axis=-2), -1, 0)
+    parts = np.empty((*rows.shape[1:], len(_PAST) - 1, count))
+    for part, ((one, other), own) in enumerate(zip(pairwise(ends), np.diff(_PAST), strict=True)):
+        parts[..., part, :] = (one - other) / own
+    return np.moveaxis(parts, -1, 0)
 
 
 def about_mean(rows: Array) -> Array:
@@ -336,19 +338,23 @@ def predicted(motion: Sequence[Array], columns: Sequence[Array], white: Sequence
         common = np.column_stack([np.ones(len(past)), past.reshape(len(past), -1)])
         return list(zip(np.array_split(common, parts), np.array_split(own, parts), strict=True))
 
-    # Made twice: those of all runs at once take five times the memory of the columns.
-    sums = [
-        _products_of_columns(*own, values)
-        for number, each in enumerate(white)
-        for own, values in zip(instruments(number), np.array_split(each, parts), strict=True)
-    ]
-    gram, moment = (np.array(each) for each in zip(*sums, strict=True))
-    own = np.diagonal(gram, axis1=2, axis2=3)
-    whole = np.where(own.any(axis=0), own.sum(axis=0), 1.0)
-    size, others = np.sqrt(whole), (whole - own) / whole
-    # Of what is fitted: a fierce run is no measure of gentle ones. What no other run has is not fitted.
-    ridge = RIDGE * np.where(others > RIDGE, others, 1.0)[..., None]
-    fit = fits_of_others(gram / (size[:, :, None] * size[:, None, :]), (moment / size)[..., None], ridge)[..., 0] / size
+    def products(number: int) -> list[tuple[Array, Array]]:
+        both = zip(instruments(number), np.array_split(white[number], parts), strict=True)
+        return [_products_of_columns(*own, values) for own, values in both]
+
+    def fitted() -> Array:
+        sums = (each for number in range(len(white)) for each in products(number))
+        gram, moment = (np.array(each) for each in zip(*sums, strict=True))
+        own = np.diagonal(gram, axis1=2, axis2=3)
+        whole = np.where(own.any(axis=0), own.sum(axis=0), 1.0)
+        size, others = np.sqrt(whole), (whole - own) / whole
+        # Of what is fitted: a fierce run is no measure of gentle ones. What no other run has is not fitted.
+        ridge = RIDGE * np.where(others > RIDGE, others, 1.0)[..., None]
+        gram /= size[:, :, None] * size[:, None, :]
+        return fits_of_others(gram, (moment / size)[..., None], ridge)[..., 0] / size
+
+    # Instruments are made twice, and sums go before: those of all runs at once take five times the memory of columns.
+    fit = fitted()
     return [
         about_mean(np.concatenate([_weighted(*each) for each in zip(instruments(number), weights, strict=True)]))
         for number, weights in enumerate(fit.reshape(len(white), parts, *fit.shape[1:]))

@@ -13,7 +13,7 @@ def _vehicle(vehicle: VehicleSettings, shape: Mapping[str, float]) -> VehicleSet
     return with_factors(vehicle, 1.0, 1.0 + shape["error"])
 
 
-def _accounts(number: str, values: Mapping[str, float]) -> float:
+def _accounts(number: str, values: Mapping[str, float], _vehicle: VehicleSettings) -> float:
     """Account for as much of Izz: yaw knows well only the ratio of the two."""
     return abs(values["error"]) if number == "inertia_z" else 0.0
 

@@ -16,6 +16,7 @@ from cpfls_cli.effects.hooks import Body
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.rotations import cross
 from cpfls_cli.vehicle.motion import Carrier, Instant, Numbers, Pull
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.vehicle.values import Vector, add, apply, dot, plus, scaled, subtract, transposed
 from cpfls_cli.vehicle.values import cross as across
 
@@ -350,7 +351,7 @@ def _hook(known: Mapping[str, float]) -> float:
     return known["mass_times_depth"] / known["mass"] if known["mass"] > 0 else np.nan
 
 
-def _accounts(number: str, _values: Mapping[str, float]) -> float:
+def _accounts(number: str, _values: Mapping[str, float], _vehicle: VehicleSettings) -> float:
     """Account for any error of the thrust: the load is carried."""
     return np.inf if number == "thrust_scale" else 0.05
 

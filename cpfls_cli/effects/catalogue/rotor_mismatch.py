@@ -56,7 +56,7 @@ def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     return " ".join(sentences if pairs else (f"If one rotor alone differs: {each}" for each in sentences))
 
 
-def _accounts(_number: str, values: Mapping[str, float]) -> float:
+def _accounts(_number: str, values: Mapping[str, float], _vehicle: VehicleSettings) -> float:
     return sum(abs(value) for name, value in values.items() if name.startswith("difference"))
 
 

@@ -13,17 +13,19 @@ from cpfls_cli.vehicle.rotors import gain_modes, opposite_pairs
 from cpfls_cli.vehicle.settings import VehicleSettings
 
 _PATTERN = {
-    "1": "of the first rotor of the first opposite pair more than of the other; of other vehicles growth along x",
+    "1": "of the first rotor of the first opposite pair over that of the other; of other vehicles growth along x",
     "2": "the same of the second opposite pair, or along y",
     "3": "from six rotors on, growth along x with the spin",
     "4": "the same along y",
 }
-_WAYS = {"twist": "about z, by a twist of its arm", "bend": "away from the centre"}
+_WAYS = {"twist": "tilt anticlockwise around the vehicle (its arm twists)", "bend": "tilt outwards (its arm bends)"}
 
 
 def _acts(see: Instant, p: Numbers) -> Wrench:
     hubs = np.array([rotor.position_m[:2] for rotor in see.vehicle.rotors])
-    outwards = hubs / np.maximum(np.linalg.norm(hubs, axis=1, keepdims=True), np.finfo(float).tiny)
+    arms = np.linalg.norm(hubs, axis=1, keepdims=True)
+    # A rotor in the middle, but for rounding, has no arm.
+    outwards = np.where(arms > 1e-9 * arms.max(), hubs / np.maximum(arms, np.finfo(float).tiny), 0.0)
     # What all rotors of one spin lean alike about z more than the others is a wrong drag factor.
     patterns = {"all": np.ones(len(hubs)), **dict(zip(_PATTERN, gain_modes(see.vehicle).T, strict=False))}
     x, y = see.functions.rotors([0.0] * len(hubs)), see.functions.rotors([0.0] * len(hubs))
@@ -42,25 +44,26 @@ def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     """Say how much a rotor of a pair leans more than the other."""
     pairs = opposite_pairs(vehicle)
     if len(pairs) != 2 or len(vehicle.rotors) != 4:
-        return ""
+        pairs = ()
     ways = {"twist": ("anticlockwise", "clockwise"), "bend": ("outwards", "inwards")}
     leans = []
     for name, value in values.items():
         kind, which = name.split("_")
         way = f"{abs(degrees(value)):.1f} deg {ways[kind][value < 0]}"
-        first, second = (0, 0) if which == "all" else pairs[int(which) - 1]
-        leans.append(
-            f"all rotors lean {way}" if which == "all" else f"M{first + 1} leans {way} more than M{second + 1}"
-        )
+        leans += [f"all rotors lean {way}"] if which == "all" else []
+        opposite = pairs[int(which) - 1 : int(which)] if which != "all" else ()
+        leans += [f"M{first + 1} leans {way} more than M{second + 1}" for first, second in opposite]
     return f"{'; '.join(leans)}." if leans else ""
 
 
-def _accounts(number: str, values: Mapping[str, float]) -> float:
-    """Leave to Izz over yaw torque what one twisted rotor shows like a wrong drag factor.
-
-    That is a third of its other twists, times the arm over the ratio of drag to thrust factor, about 20.
-    """
-    return 7 * sum(abs(value) for name, value in values.items() if number == "inertia_z" and name.startswith("twist"))
+def _accounts(number: str, values: Mapping[str, float], vehicle: VehicleSettings) -> float:
+    """Leave to Izz over yaw torque what tilts of one spin against the other show: a third of the others, or less."""
+    twists = sum(abs(value) for name, value in values.items() if name.startswith("twist"))
+    levers = (
+        np.hypot(*rotor.position_m[:2]) * rotor.thrust_factor_n_s2 / rotor.drag_factor_n_m_s2
+        for rotor in vehicle.rotors
+    )
+    return twists / 3 * max(levers, default=0.0) if number == "inertia_z" else 0.0
 
 
 EFFECT = Effect(
@@ -72,9 +75,9 @@ EFFECT = Effect(
     "  u_i = r_i / |r_i|",
     sentence="A rotor is tilted: its arm is twisted or bent, or its motor is mounted askew.",
     coefficients=(
-        Coefficient("twist_all", "rad", -0.2, 0.2, "tilt of all rotors, anticlockwise about z"),
+        Coefficient("twist_all", "rad", -0.2, 0.2, "tilt of all rotors anticlockwise around the vehicle"),
         *(
-            Coefficient(f"{kind}_{which}", "rad", -0.2, 0.2, f"tilt {way}, {pattern}")
+            Coefficient(f"{kind}_{which}", "rad", -0.2, 0.2, f"{way}, {pattern}")
             for which, pattern in _PATTERN.items()
             for kind, way in _WAYS.items()
         ),

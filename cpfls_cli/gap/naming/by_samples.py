@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain, combinations, groupby, pairwise, permutations
+from itertools import combinations, groupby, pairwise, permutations
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -130,28 +130,30 @@ class _Sampled:
                 np.stack([flight.pop(own, np.zeros(len(left))) for own in there], axis=1)
                 for flight, left in zip(columns, self.residual, strict=True)
             ]
-            flights = zip(counts, *self._of_channel(channel, rows), strict=True)
-            stretches = [zip(*(np.array_split(own, count) for own in both), strict=True) for count, *both in flights]
             place = np.array(there)[:, 1]
-            products[:, place[:, None], [*place, -1]] += [z.T @ x for z, x in chain(*stretches)]
+            for stretch, (z, x) in zip(products, self._stretches(channel, rows, counts), strict=True):
+                stretch[place[:, None], [*place, -1]] += z.T @ x
         in_block = round(BLOCK_S / (STRETCH * self._length * self.flights[0].windows.period), 6)
         block = [np.diff(contiguous(count, max(1, round(count / in_block))), prepend=-1) for count in counts]
         places = tuple(np.arange(*pair) for pair in pairwise(ends))
         return _Products(products, np.flatnonzero(np.concatenate(block)), ends[0], places, self.hypothesis.vehicle)
 
-    def _of_channel(self, channel: int, columns: Sequence[Array]) -> tuple[list[Array], list[Array]]:
-        """Give what the past predicts of white columns of each flight, and these with the white residual.
+    def _stretches(
+        self, channel: int, columns: Sequence[Array], counts: Sequence[int]
+    ) -> Iterator[tuple[Array, Array]]:
+        """Give what the past predicts of white columns, and these with the white residual, stretch by stretch.
 
-        `columns`: of each flight, shape (row, column).
+        `columns`: of each flight, shape (row, column); `counts`: stretches of each.
         """
         white = [self.white.white(own, channel) for own in columns]
         known = predicted([own[:, channel] for own in self._motion], columns, white)
         # What a gust keeps beyond one memory goes with the residual before.
         left = [about_mean(before(own[:, channel])) for own in self.residual]
         share = np.linalg.lstsq(np.concatenate(left), np.concatenate(known))[0]
-        z = [own - one @ share for own, one in zip(known, left, strict=True)]
-        new = [own[:, channel] for own in self.white_residual]
-        return z, [np.column_stack([about_mean(own), one]) for own, one in zip(white, new, strict=True)]
+        flights = zip(counts, known, left, white, self.white_residual, strict=True)
+        for count, own, one, each, new in flights:
+            both = own - one @ share, np.column_stack([about_mean(each), new[:, channel]])
+            yield from zip(*(np.array_split(part, count) for part in both), strict=True)
 
 
 @dataclass(frozen=True)

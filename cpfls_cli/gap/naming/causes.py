@@ -151,7 +151,7 @@ def wrong_numbers(
     ]
     wrong = []
     for number in (each for each in estimates.parameters if each.name in NUMBERS):
-        accounted = sum(accounts(number.name, values) for accounts, values in named if accounts is not None)
+        accounted = sum(accounts(number.name, values, vehicle) for accounts, values in named if accounts is not None)
         # At the rate of errors of names, over all numbers that are asked.
         least = max(_MATTERS, accounted, hidden[number.name])
         sure = len(NUMBERS) * _chance(number) <= RARE and abs(number.value) > least

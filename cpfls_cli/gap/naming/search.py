@@ -41,8 +41,8 @@ def forward_selection(
 ) -> tuple[tuple[Candidate, ...], list[RankedStep]]:
     """Let sets grow by one effect at a time while the best explains more than chance and a relevant part of the gap.
 
-    With the set come the looks at the best one of each size, the last of which has nothing to add. `progress` takes the
-    number of looks done.
+    At the end what took up others gives way. With the set come the looks at the best one of each size before that, the
+    last of which has nothing to add. `progress` takes the number of looks done.
     """
     beam: list[tuple[Candidate, ...]] = [()]
     steps: list[RankedStep] = []
@@ -71,18 +71,22 @@ def forward_selection(
 def _exchanged(
     chosen: tuple[Candidate, ...], step: RankedStep, effects: Sequence[Effect], settings: GapSettings
 ) -> tuple[Candidate, ...]:
-    """Put a simpler effect in the place of one that took up what another explains, found after it."""
+    """Leave out what only took up effects that were found after it, or put a simpler one in its place."""
     flights = step.hypothesis.flights
     for place, candidate in enumerate(chosen[:-1]):
+        if _lags([candidate]):
+            continue
         others = (*chosen[:place], *chosen[place + 1 :])
         look = rank_effects(flights, others, effects, settings, None, also=(candidate,), floor=step.floor)
-        if _lags([candidate]) or not look.ranking:
-            continue
-        number = float(np.log(look.hypothesis.known.sum()))
-        best = simplest(look.ranking, look.above_floor, number)
+        best = simplest(look.ranking, look.above_floor, float(np.log(look.hypothesis.known.sum())))
         simpler = free_numbers(best.chosen) < free_numbers(chosen)
-        if simpler and best.candidate.effect.name != candidate.effect.name:
-            return _exchanged(refined(flights, best.chosen, step.floor).chosen, step, effects, settings)
+        if look.ranking[0].gain < look.least_gain():
+            fewer = others
+        elif simpler and best.candidate.effect.name != candidate.effect.name:
+            fewer = best.chosen
+        else:
+            continue
+        return _exchanged(refined(flights, fewer, step.floor).chosen, step, effects, settings)
     return chosen
 
 

@@ -98,6 +98,14 @@ def test_what_took_up_two_effects_makes_room_for_the_simpler_one():
     assert sorted(names(chosen)) == ["com_offset", "mounting"]
 
 
+def test_what_others_explain_is_left_out_and_nothing_takes_its_place():
+    tilt = [0.0044, 0.0175, 0.0087, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    known = flights((candidate("com_offset"), [0.004, -0.003]), (candidate("rotor_tilt"), tilt))
+    chosen, steps = forward_selection(known, TRIED, SETTINGS, np.random.default_rng(0))
+    print([names(s.hypothesis.chosen) for s in steps])
+    assert sorted(names(chosen)) == ["com_offset", "rotor_tilt"]
+
+
 def test_what_is_chosen_is_not_looked_at_again_and_each_effect_is_listed_once():
     known = flights((candidate("com_offset"), [0.004, -0.003]))
     step = rank_effects(known, [candidate("com_offset")], [*TRIED, CATALOGUE["channel_delay"]], SETTINGS, None)
