@@ -48,7 +48,7 @@ from cpfls_cli.gap.naming.estimate import Estimates, NamedFit, Refusal, earned, 
 from cpfls_cli.gap.naming.held_out import HeldOut, Judge, Judgement, differences
 from cpfls_cli.gap.naming.noisy_rate import with_noisy_rate
 from cpfls_cli.gap.naming.open_questions import not_excited, not_separated, unexplained_channels, untried, with_unnamed
-from cpfls_cli.gap.naming.ranking import RankedStep, rank_effects
+from cpfls_cli.gap.naming.ranking import RankedStep
 from cpfls_cli.gap.naming.results import (
     NAMES_EFFECTS,
     Alternative,
@@ -164,10 +164,8 @@ def _diagnosed(
             quiet = np.minimum(quiet, gusts.noise(windows))
             flights = flights.in_air(gusts, unidentified_axes(named.learned, given))
             across = gusts.found.size[3:5]
-            searched = _named(flights, settings, rng, progress)
-            named = _judged_with_lags(_significant(searched, given), given, across)
-            if _wrong_inertia(named):
-                named = _at_stated_inertia(searched, flights, given, across) or named
+            named = _significant(_named(flights, settings, rng, progress), given)
+            named = _judged_with_lags(named, given, across)
             named = _with_small(named, gusts, given, across)
             gusts = _gusts(named.judgement.found, given, settings)
     losses = _losses(flights, named, settings, rng)
@@ -245,11 +243,7 @@ class _Flights(NamedTuple):
     def in_air(self, gusts: Air, axes: BoolArray) -> _Flights:
         """Give all of them the floor of their air; inertia that instruments do not identify is the loop's."""
         in_gusts = (gusts.around(flights, gusts.floor(self.training, flights)) for flights in self)
-        return _Flights(*in_gusts).as_stated(axes)
-
-    def as_stated(self, axes: BoolArray) -> _Flights:
-        """Hold the inertia about some body axes, shape (3,), at what the config states."""
-        return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in self))
+        return _Flights(*([flight.as_stated(axes) for flight in flights] for flights in in_gusts))
 
 
 class _Named(NamedTuple):
@@ -440,35 +434,6 @@ def _with_small(named: _Named, gusts: Air, given: Instruments, across: Array) ->
         small=new,
         refusals=refusals,
     )
-
-
-def _at_stated_inertia(named: _Named, flights: _Flights, given: Instruments, across: Array) -> _Named | None:
-    """Find what explains as an inertia that is wrong does, and leaves it as the config states it; None if nothing.
-
-    A loop answers gusts by its rotors, so that a fit gives the inertia what their acceleration does. What is added is
-    significant by instruments jointly with the inertia, and that is not any more with it.
-    """
-    found, held = named.judgement.found, flights.as_stated(np.ones(3, dtype=bool)).training
-    chosen = found.hypothesis.chosen
-    names = VEHICLE_NUMBERS.rivals.keys() - {each.effect.name for each in chosen}
-    tried = [each for each in named.effects if each.name in names and not each.is_lag]
-    for scored in rank_effects(held, chosen, tried, found.settings, None, floor=found.floor).ranking:
-        fit = fitted(held, scored.chosen, found.floor, found.settings)
-        fit = fit._replace(hypothesis=system(flights.training, fit.hypothesis.chosen))
-        kept = _significant(named._replace(judgement=named.judgement._replace(found=fit)), given)
-        if scored.candidate.effect.name in kept.sure:
-            other = _judged_with_lags(kept, given, across)
-            if not _wrong_inertia(other):
-                return other
-    return None
-
-
-def _wrong_inertia(named: _Named) -> bool:
-    """Check whether a moment of inertia is among the numbers that are named as wrong."""
-    (hypothesis, estimates, *_), _ = named.judgement
-    names = (each.effect.name for each in hypothesis.chosen)
-    wrong = _wrong_numbers(named, dict(zip(names, estimates.effects, strict=True)), 0.0)
-    return wrong is not None and any(each.name.startswith("inertia") for each in wrong.numbers)
 
 
 def _wrong_numbers(
