@@ -1,7 +1,7 @@
 """Lags, delays and filters between command and rotors in gusts: a loop that answers these looks alike."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import NamedTuple
 
@@ -67,7 +67,7 @@ def decided_by_instruments(found: NamedFit, effects: Sequence[Effect], given: In
     # One number is judged by its own size, several by how much less they leave.
     less = chance_of_ranks(more_residual(sets.predictable[()], sets.predictable[best]))
     chances = {name: sets.chance_of(own[0]) if len(own) == 1 else less for name, own in sets.numbers(best).items()}
-    return ActuationFit(sets.traded(best), chances, tuple(alike))
+    return ActuationFit(sets._fit(best, together=True) or sets.fits[best], chances, tuple(alike))
 
 
 @dataclass
@@ -160,31 +160,9 @@ class _Sets:
 
     def numbers(self, names: _Names) -> dict[str, tuple[Estimate, ...]]:
         """Give the numbers of each effect of a set."""
-        return _numbers(self.fits[names], names)
-
-    def traded(self, names: _Names) -> NamedFit:
-        """Give the fit of a set; the interval of one lag or delay holds that which it has jointly with the other.
-
-        That is where the other is more than its standard error, which is neither named nor excluded. Of a filter no
-        number is a time that a lag could trade for.
-        """
-        pairs = [each for each in self.fits if set(names) < set(each)]
-        fit = self._fit(names, together=True) or self.fits[names]
-        joint = [self.numbers(each) for each in pairs if len(names) == 1 and self.count(each) == 2]
-        own = [
-            each[names[0]][0]
-            for each in joint
-            for name, (one, *_) in each.items()
-            if name not in names and one.value > (one.high - one.value) / ERRORS
-        ]
-        if not own:
-            return fit
-        ((number,),) = _numbers(fit, names).values()
-        low = max(number.plausible[0], min(each.low for each in own))
-        wider = replace(number, low=min(number.low, low), high=max(number.high, *(each.high for each in own)))
-        each_with = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
-        effects = tuple((wider,) if candidate.effect.name in names else each for candidate, each in each_with)
-        return fit._replace(estimates=replace(fit.estimates, effects=effects))
+        fit = self.fits[names]
+        pairs = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
+        return {candidate.effect.name: numbers for candidate, numbers in pairs if candidate.effect.name in names}
 
     def _needed(self, names: _Names, rate: float) -> set[str]:
         """Name the effects whose only number is significant at a rate.
@@ -212,8 +190,3 @@ class _Sets:
         period = self.given.flown[0].motion.period
         error = np.hypot((number.high - number.value) / ERRORS, period / np.sqrt(12))
         return float(erfc(number.value / error / np.sqrt(2)))
-
-
-def _numbers(fit: NamedFit, names: _Names) -> dict[str, tuple[Estimate, ...]]:
-    pairs = zip(fit.hypothesis.chosen, fit.estimates.effects, strict=True)
-    return {candidate.effect.name: numbers for candidate, numbers in pairs if candidate.effect.name in names}

@@ -80,32 +80,6 @@ def test_what_is_needed_next_to_the_other_is_named_whatever_was_found(own, toget
     assert bool({"low_pass_filter", "notch_filter"} & {*sum(tried, ())}) == (names == DELAY)
 
 
-@pytest.mark.parametrize(("delay", "low"), [(0.012, 0.016), (0.009, 0.029)], ids=["likely", "unlikely"])
-def test_the_interval_of_a_lag_holds_that_with_a_delay_of_more_than_its_standard_error(delay, low, monkeypatch):
-    left = {(): 90.0, LAG: LITTLE, DELAY: LITTLE[::-1], BOTH: LITTLE}
-    names, _, result, _ = apart(monkeypatch, LAG, left, {BOTH: [(0.02, 0.004), (delay, 0.02)]})
-    assert names == LAG
-    ((number,),) = result.found.estimates.effects
-    assert (number.value, number.low, number.high) == pytest.approx((0.03, low, 0.031))
-
-
-@pytest.mark.parametrize(
-    ("best", "sizes", "numbers"),
-    [
-        (("low_pass_filter",), [(0.02, 0.001), (6.0, 0.1)], [(0.03, 0.029, 0.031)] * 2),
-        (LAG, [(0.005, 0.01), (9.0, 3.0)], [(0.03, 0.029, 0.031)]),
-    ],
-    ids=["a filter keeps both of its numbers", "a frequency is no time that a lag trades for"],
-)
-def test_a_lag_and_a_filter_do_not_trade(best, sizes, numbers, monkeypatch):
-    filtered = ("motor_lag", "low_pass_filter")
-    left = {(): 90.0, LAG: 60.0, DELAY: 60.0, BOTH: 60.0} | dict.fromkeys((best, filtered), 9.0)
-    names, _, result, _ = apart(monkeypatch, filtered, left, {filtered: sizes, BOTH: [SURE, ABSENT]})
-    assert names == best
-    (own,) = result.found.estimates.effects
-    assert [(each.value, each.low, each.high) for each in own] == [pytest.approx(each) for each in numbers]
-
-
 FILTER, NOTCH = ("low_pass_filter",), ("notch_filter",)
 FILTER_FOR_DELAY, DELAY_FOR_LAG = (("low_pass_filter", "command_delay", ""), ("command_delay", "motor_lag", ""))
 ALONE, LATER = {(): 90.0, BOTH: LITTLE, LAG: 9.0, DELAY: LITTLE}, {(): 90.0, BOTH: LITTLE, LAG: 9.0, DELAY: 9.0}
