@@ -108,12 +108,13 @@ def test_an_offset_under_a_wrong_mass_or_thrust_is_where_it_is(wrong):
         assert offset.coefficients[name].value == pytest.approx(true, rel=0.03)
 
 
-def test_a_thrust_that_does_not_carry_the_weight_is_not_named():
-    """What lowers every change of the force by a third, and not its mean, is no thrust."""
+@pytest.mark.parametrize("share", [2 / 3, 0.87], ids=["a gap is left", "the thrust would close the gap"])
+def test_a_thrust_that_does_not_carry_the_weight_is_not_named(share):
+    """What lowers every change of the force, and not its mean, is no thrust, and stays a gap."""
 
     def damped(signals):
         force = signals.specific_force - [0.0, 0.0, 9.81]
-        return replace(signals, specific_force=[0.0, 0.0, 9.81] + force * [1.0, 1.0, 2 / 3])
+        return replace(signals, specific_force=[0.0, 0.0, 9.81] + force * [1.0, 1.0, share])
 
     flights = [damped(noisy(fly(seed), np.random.default_rng(seed))) for seed in (1, 2, 3)]
     found = diagnose(*_held_last(flights), SETTINGS, np.random.default_rng(1))
