@@ -175,7 +175,8 @@ def _connected(address: str, patience_s: float) -> Iterator[Client]:
         except TypeError as error:
             # What Dask makes of an address with TLS where its settings name no certificates, or wrong ones.
             raise WorkerError(f"{address}: no connection with TLS: {str(error).splitlines()[0]}") from error
-        except (OSError, ImportError) as error:
+        # On a busy machine Dask's own thread may not start within the ten seconds that it asserts.
+        except (OSError, ImportError, AssertionError) as error:
             raise WorkerError(
                 f"no Dask scheduler of a fitting version answers at {address} within {patience_s:g} s: start one with "
                 "`dask scheduler`, and give the address that it prints"

@@ -143,6 +143,15 @@ def test_an_address_where_nothing_answers_is_an_error_in_words(capfd):
     assert capfd.readouterr() == ("", "")
 
 
+def test_a_client_whose_thread_does_not_start_is_an_error_in_words(monkeypatch):
+    def asserts(*_given, **_options):
+        raise AssertionError
+
+    monkeypatch.setattr("cpfls_cli.workers.cluster.Client", asserts)
+    with pytest.raises(ComputationError, match="no Dask scheduler"), cluster(EVALUATOR, "tcp://127.0.0.1:1"):
+        pass
+
+
 @pytest.mark.parametrize("name", ["distributed.core", "tornado.application"])
 def test_nothing_is_logged_within_and_all_is_as_before_after(name):
     logger = logging.getLogger(name)
