@@ -50,7 +50,7 @@ def _describe(vehicle: VehicleSettings, values: Mapping[str, float]) -> str:
     for name, value in values.items():
         kind, which = name.split("_")
         way = f"{abs(degrees(value)):.1f} deg {ways[kind][value < 0]}"
-        leans += [f"all rotors lean {way}"] if which == "all" else []
+        leans += [f"All rotors lean {way}"] if which == "all" else []
         opposite = pairs[int(which) - 1 : int(which)] if which != "all" else ()
         leans += [f"M{first + 1} leans {way} more than M{second + 1}" for first, second in opposite]
     return f"{'; '.join(leans)}." if leans else ""

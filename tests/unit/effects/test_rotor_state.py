@@ -181,7 +181,7 @@ def test_tilted_rotors_push_along_their_shafts_and_turn_the_vehicle_against_them
 
 def test_tilted_rotors_are_told_apart_by_pairs(flight):
     says = CATALOGUE["rotor_tilt"].describe(flight.vehicle, {"twist_all": -0.01, "bend_2": 0.02})
-    assert says == "all rotors lean 0.6 deg clockwise; M2 leans 1.1 deg outwards more than M4."
+    assert says == "All rotors lean 0.6 deg clockwise; M2 leans 1.1 deg outwards more than M4."
 
 
 def crossed(number):
