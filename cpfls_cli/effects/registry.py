@@ -1,6 +1,7 @@
 """The catalogue: every effect that has a module in it."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
@@ -8,6 +9,7 @@ from types import MappingProxyType
 from cpfls_cli.effects import catalogue
 from cpfls_cli.effects.effect import Effect
 from cpfls_cli.errors import InputError
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.words import did_you_mean
 
 _MODULES = [import_module(f"{catalogue.__name__}.{module.name}") for module in iter_modules(catalogue.__path__)]
@@ -24,6 +26,14 @@ SUPPLY: Effect = next(known for known in CATALOGUE.values() if known.actuation a
 
 THRUST_CURVE: Effect = next(known for known in CATALOGUE.values() if known.tried_last)
 """The effect of a thrust that is no square of what drives the rotors."""
+
+
+@lru_cache(maxsize=256)
+def acting(name: str, vehicle: VehicleSettings) -> Effect:
+    """Give an effect with the numbers that act on a vehicle: what may be left out is of six rotors and more."""
+    known = CATALOGUE[name]
+    fewer = min(len(known.coefficients), len(known.numbers) - known.optional)
+    return known if len(vehicle.rotors) >= 6 else known.form(fewer, ())
 
 
 def effect(name: str) -> Effect:

@@ -17,7 +17,7 @@ from cpfls_cli.consistency.findings import contradictions
 from cpfls_cli.consistency.rotors import impossible
 from cpfls_cli.dynamics import InertiaModel
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, acting
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
@@ -67,6 +67,7 @@ from cpfls_cli.gap.residual.rotor_loss import RotorLoss, rotor_losses
 from cpfls_cli.gap.settings import CLEAR, ERRORS, NOISE, GapSettings
 from cpfls_cli.playback.instruments import Instruments
 from cpfls_cli.rounding import ascending
+from cpfls_cli.vehicle.settings import VehicleSettings
 from cpfls_cli.weak_form.windows import common_windows
 
 
@@ -503,7 +504,7 @@ def _searched(
 
     Such an effect takes up what others would explain, and has to go before they can be seen.
     """
-    effects, refusals = considered(settings), list[Refusal]()
+    effects, refusals = considered(settings, weak[0].signals.vehicle), list[Refusal]()
     while True:
         chosen, steps = forward_selection(
             weak, effects, settings, rng, lambda n: progress(0.1 + 0.1 * min(n, 5), "search")
@@ -516,10 +517,10 @@ def _searched(
         effects = [effect for effect in effects if effect.name not in out]
 
 
-def considered(settings: GapSettings) -> list[Effect]:
+def considered(settings: GapSettings, vehicle: VehicleSettings) -> list[Effect]:
     """List the effects that the search tries."""
     return [
-        effect
+        acting(name, vehicle)
         for name, effect in CATALOGUE.items()
         if effect.columns is not None and effect.kind != "parameter" and name not in settings.ignore
     ]

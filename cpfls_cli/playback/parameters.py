@@ -12,7 +12,7 @@ import numpy as np
 from cpfls_cli.arrays import Array
 from cpfls_cli.effects import scales
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.registry import CATALOGUE, THRUST_CURVE
+from cpfls_cli.effects.registry import CATALOGUE, THRUST_CURVE, acting
 from cpfls_cli.effects.signals import Signals
 from cpfls_cli.fuzzy.periodic import PeriodicStructure
 from cpfls_cli.inertia import INERTIA_PARAMETERS
@@ -153,14 +153,9 @@ _OF_ROTORS: Mapping[str, tuple[Number, ...]] = {
 
 
 def of_vehicle(block: str, vehicle: VehicleSettings) -> tuple[Effect, list[int]]:
-    """Give an effect with the numbers that act on a vehicle, and the places of those that free runs identify.
-
-    What may be left out is of six rotors and more.
-    """
-    known = CATALOGUE[block]
-    fewer = min(len(known.coefficients), len(known.numbers) - known.optional)
-    acting = known if len(vehicle.rotors) >= 6 else known.form(fewer, ())
-    return acting, [place for place, each in enumerate(acting.coefficients) if not each.by_force]
+    """Give an effect with the numbers that act on a vehicle, and the places of those that free runs identify."""
+    known = acting(block, vehicle)
+    return known, [place for place, each in enumerate(known.coefficients) if not each.by_force]
 
 
 @lru_cache(maxsize=256)

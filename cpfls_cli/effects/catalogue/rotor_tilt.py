@@ -83,7 +83,7 @@ EFFECT = Effect(
         ),
     ),
     optional=4,
-    needs=frozenset({"rotor_speed", "force"}),
+    needs=frozenset({"rotor_speed"}),
     excitation="yaw effort to both sides, changes of thrust, and roll and pitch, with the accelerometer in the log",
     rivals={
         "rotor_mismatch": "log the force: rotors that drag differently push to no side",

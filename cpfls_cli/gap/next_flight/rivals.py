@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from cpfls_cli.arrays import Array, IntArray
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.registry import CATALOGUE
+from cpfls_cli.effects.registry import acting
 from cpfls_cli.errors import InputError
 from cpfls_cli.gap.balance.balance_system import System, is_free, system
 from cpfls_cli.gap.balance.refine import fit, least_squares, refined
@@ -275,23 +275,24 @@ def open_questions(
         for each in named
         if each.candidate is not None
     }
-    questions, others = [], []
+    questions, others, vehicle = [], [], flights[0].signals.vehicle
     for rival in rivals:
         one = sized[rival.instead_of]
         besides = tuple(each for name, each in sized.items() if name not in (rival.instead_of, rival.name))
-        other = fitted_rival(flights, [each.candidate for each in besides], CATALOGUE[rival.name], floor)
+        other = fitted_rival(flights, [each.candidate for each in besides], acting(rival.name, vehicle), floor)
         pair = (one, other.candidate.effect), (other, one.candidate.effect)
         questions += [Question(true, effect, besides) for true, effect in pair]
         others += [Question(true, each, besides) for true, known in pair for each in _alike(true, known, flights)]
     questions += [each for each in others if not _is_answered(each, flights, floor, settings)]
     once = {(each.true.candidate.effect.name, each.rival and each.rival.name): each for each in questions}
     asked = tuple(question for question in once.values() if _is_open(question))
-    return (*asked, *(Question(usual(effect, flights[0].signals.vehicle), None) for effect in unseen))
+    return (*asked, *(Question(usual(effect, vehicle), None) for effect in unseen))
 
 
 def _alike(true: SizedEffect, rival: Effect, flights: Sequence[WeakFlight]) -> list[Effect]:
     """List what else looks like an effect by the catalogue, and must not take the place of the rival."""
-    others = (CATALOGUE[name] for name in true.candidate.effect.rivals if name != rival.name)
+    vehicle = flights[0].signals.vehicle
+    others = (acting(name, vehicle) for name in true.candidate.effect.rivals if name != rival.name)
     known = (each for each in others if each.columns is not None and each.kind == true.candidate.effect.kind)
     return [each for each in known if not all(each.missing(flight.signals) for flight in flights)]
 

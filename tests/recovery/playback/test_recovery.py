@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.shared.playback_scores import free_runs, rate_stays, score
 from cpfls_cli.effects.scales import hover_speed
 from cpfls_cli.playback.fit import fit, windows_of
-from cpfls_cli.playback.model import Remainder, VehicleModel
+from cpfls_cli.playback.model import ModelEffect, Remainder, VehicleModel
 from cpfls_cli.playback.parameters import blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
 from cpfls_cli.playback.structure import Structure, choose, fitted_to_all
@@ -105,6 +105,19 @@ def test_a_force_without_a_name_is_learned_and_what_has_a_name_is_not():
     final, _ = fitted_to_all(found.structure, STATED, flights, settings, found.fit)
     learned, flew = (pushes(model) for model in (final.model, pushed()))
     assert np.abs(learned - flew).max() < 0.1 * np.abs(flew).max()
+
+
+def test_tilted_rotors_are_found_and_are_no_rotors_that_differ():
+    """All arms are twisted by half a degree, one more than its opposite by 1 degree and bent by 2."""
+    bent = np.deg2rad([0.5, 1.0, 2.0, 0.0, 0.0])
+    true = replace(truth(), effects=(*truth().effects, ModelEffect("rotor_tilt", {}, bent)))
+    flights = flown(true, KINDS * 2, seed=1, noise=MIDDLING, duration_s=15.0)
+    candidates = (*TRUE_BLOCKS, "rotor_tilt", "rotor_mismatch")
+    found, settings = chosen(STATED, flights, candidates, search_windows=60, folds=2, horizon_s=0.3)
+    assert set(found.structure.blocks) == {*TRUE_BLOCKS, "rotor_tilt"}
+    final, _ = fitted_to_all(found.structure, STATED, flights, settings, found.fit)
+    (tilt,) = (each for each in final.model.effects if each.name == "rotor_tilt")
+    assert tilt.coefficients == pytest.approx(bent, abs=np.deg2rad(0.3))
 
 
 def pushes(model, speed=2.0):

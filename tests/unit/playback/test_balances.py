@@ -119,7 +119,7 @@ def test_effects_of_motion_and_rotors_are_the_blocks_that_are_tried():
     of_air = {"inflow", "parasitic_drag", "rotor_drag", "translational_lift"}
     of_motion = {"flapping_moment", "linear_damping", "quadratic_damping", "rolling_moment", "rotor_plane_damping"}
     of_rotors = {"rotor_acceleration", "rotor_gyroscopic", "rotor_mismatch", "com_offset", "torque_bias"}
-    of_rotors |= {"thrust_slope"}
+    of_rotors |= {"rotor_tilt", "thrust_slope"}
     assert set(blocks_of(STATED)) & set(CATALOGUE) == of_air | of_motion | of_rotors
 
 
