@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import ceil, pi
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from cpfls_cli.flightlog.topics import hold_asked, previous_rows
 from cpfls_cli.inertia import body_torque_columns
 from cpfls_cli.lag import delayed, fit_delay, lagged
 
-_STEEPEST_PITCH = pi / 2 - pi / 180
 _LARGEST_REFINEMENT = 10  # Rows of the result for one of the log: more hold nothing new.
 _SHORTEST_PERIOD_S = 1e-6
 _FASTEST_HZ = 40e3  # Above the 32 kHz at which the fastest gyroscopes are read.
@@ -82,7 +81,7 @@ def read_signals(
     spikes = repair.find_signal_spikes(table, settings)
     masked = {name: np.where(spikes[name], np.nan, values) for name, values in table.signals.items()}
     repaired = table if settings.spike_deviations is None else SignalTable(table.time, masked)
-    present = np.isfinite(np.hstack(list(repaired.signals.values())))
+    present = np.isfinite(np.hstack([*repaired.signals.values(), stretches.off_vertical(repaired, settings)]))
     rows, incomplete_ends, beyond_gap = repair.longest_stretch(table.time, present, settings)
     table, repaired, scattered = _on_regular_stamps(table.rows(rows), repaired.rows(rows), flat=not stamped_hz)
     resting = stretches.rotors_at_rest(table, settings)
@@ -209,12 +208,6 @@ def _derived(signals: Imported) -> dict[str, Array]:
     derived = {} if body_rate is None else {"body_rate": body_rate}
     if signals.attitude is None or body_rate is None:
         return derived
-    steep = np.flatnonzero(np.abs(signals.attitude[:, 1]) > _STEEPEST_PITCH)
-    if len(steep):
-        raise ComputationError(
-            f"pitch comes within a degree of +-90 degrees at {signals.time[steep[0]]:.3f} s of the flight, where"
-            " Euler rates are not defined: cut that part off with import.crop_s"
-        )
     attitude_rate = rotations.attitude_rate(signals.attitude, body_rate)
     derived |= {"attitude_rate": attitude_rate, "attitude_acceleration": derivative(signals.time, attitude_rate)}
     if signals.body_torque is not None:

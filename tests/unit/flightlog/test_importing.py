@@ -106,6 +106,34 @@ def test_or_the_longest_part_is_kept():
     assert any("gap" in sentence for sentence in signals.warnings)
 
 
+LOOP = pytest.mark.parametrize("quaternion", [None, "wxyz", "xyzw"])
+
+
+def looped(quaternion):
+    """A log of 2 s with a loop after 0.7 s, whose attitude is stated as angles or as a quaternion."""
+    pitch = np.where(np.abs(np.arange(201) - 70) < 5, np.pi / 2, 0.1)
+    turned = {"w": np.cos(pitch / 2), "x": np.zeros(201), "y": np.sin(pitch / 2), "z": np.zeros(201)}
+    angles = {"x": np.zeros(201), "y": pitch, "z": np.zeros(201)}
+    name, columns, unit = ("quaternion", tuple(quaternion), "1") if quaternion else ("attitude", (*"xyz",), "rad")
+    mapped = {"signals": RATE | {name: SignalMap(columns=columns, unit=unit)}, "quaternion_order": quaternion or "wxyz"}
+    return log() | (turned if quaternion else angles), mapped
+
+
+@LOOP
+def test_a_pitch_of_a_quarter_turn_stops_and_says_how_to_go_on(quaternion):
+    columns, mapped = looped(quaternion)
+    with pytest.raises(InputError, match=r"within a degree of \+-90 degrees at 0\.660 s.*gap_rule to longest-part"):
+        read_signals(columns, settings(**mapped))
+
+
+@LOOP
+def test_or_the_longest_part_without_one_is_kept(quaternion):
+    columns, mapped = looped(quaternion)
+    read = read_signals(columns, settings(gap_rule="longest-part", **mapped))
+    assert read.span_s == pytest.approx((0.85, 2.0))
+    np.testing.assert_allclose(read.attitude[:, 1], 0.1, atol=1e-9)
+
+
 def test_absent_values_are_interpolated_and_counted_by_column():
     signals = read_signals(log(q=([40, 41, 42], np.nan), r=(7, np.inf)), settings())
     assert signals.missing == {"q": 3, "r": 1}
@@ -223,7 +251,8 @@ def test_degrees_taken_for_radians_stop_at_the_pitch():
 
 def test_a_nose_straight_up_is_no_degrees():
     columns, mapped = attitude(log(), pitch=np.pi / 2 + 0.01 + 1e-3 * log()["p"])
-    assert read_signals(columns, settings(signals=mapped)).warnings == ()
+    with pytest.raises(InputError, match=r"pitch comes within a degree of \+-90 degrees"):
+        read_signals(columns, settings(signals=mapped))
 
 
 def test_a_spike_of_the_pitch_that_is_interpolated_is_no_degrees():
