@@ -245,7 +245,9 @@ def gain_modes(vehicle: VehicleSettings) -> Array:
     spins = np.array([float(rotor.spin) for rotor in vehicle.rotors])
     common = np.column_stack([np.ones_like(spins), spins])
     seeds = _seeds(vehicle)
-    return np.asarray(seeds - common @ np.linalg.lstsq(common, seeds, rcond=None)[0])
+    modes = seeds - common @ np.linalg.lstsq(common, seeds, rcond=None)[0]
+    # What acts by rounding alone would be written into every export.
+    return np.where(np.abs(modes) > 1e-12 * np.abs(seeds).max(), modes, 0.0)
 
 
 def _seeds(vehicle: VehicleSettings) -> Array:
