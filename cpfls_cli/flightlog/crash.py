@@ -306,8 +306,9 @@ def ended_early(signs: Signs, rests: Resting, part: tuple[int, int]) -> dict[str
     troubled, hits, strained = (first + np.flatnonzero(own) for own in marked)
     stops = _stops_in_the_air(signs, part)
     lost = len(troubled) > 0 and (after - troubled[-1]) * signs.period < _AT_ONCE_S
-    # What falls since its rotors stopped hits the ground later.
-    lost = lost and not (stops and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S)
+    if lost and (_last_burst(troubled, signs.period) - after) * signs.period >= _FALL_S:
+        # What falls since its rotors stopped hits the ground later, and lost nothing by that.
+        lost = not stops and not (signs.level is not None and signs.level[after : troubled[-1]].max() < ALIVE)
     # Who flips and lands, ends the log in a flip, or flies on as before has lost nothing.
     ignores = lost and not _recovers(signs, part) and _ignores_rotors(signs, part, int(troubled[0]))
     if lost and (len(hits) or lies_then or ignores):

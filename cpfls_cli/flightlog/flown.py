@@ -32,8 +32,8 @@ _FAR_RAD = 0.2  # Range of leans that no estimate has there.
 _UNMOVED, _STILL_M = 0.01, 0.3  # Ranges of height, m, and lean, rad, that no hover keeps to; of a height that drifts.
 _ABOVE_IDLE = 1.2  # Times the level at which rotors idle amid a flight.
 # Rate from which on forces are held against it, and slope and correlation of both from which on a stand holds the
-# vehicle; share of the mean below which a rotor hardly works: without one of four nothing hovers that does not spin.
-_SWINGS_RAD_S, _AS_HELD, _OF_MEAN = 0.03, 0.6, 0.1
+# vehicle; by what share of all that four rotors do two of them do more than the others: any two turn the vehicle.
+_SWINGS_RAD_S, _AS_HELD, _UNEVEN = 0.03, 0.6, 0.29
 # Range of squared commands, over their mean, whose thrust is felt in the air, unless it climbs by so many m; and the
 # share of it that is felt where something else holds the vehicle.
 _WORKS, _CLIMBS_M, _UNFELT = 1.0, 3.0, 0.12
@@ -341,9 +341,9 @@ def _held(signs: Signs, active: BoolArray) -> str:
         if len(third) and float(np.median(third)) < ALIVE:
             return "no more than two of its four rotors work at a time"
         works = np.median(shares, axis=0)
-        idle = np.flatnonzero(works < _OF_MEAN * works.mean())
-        if len(idle) and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
-            return f"rotor {idle[0] + 1} hardly works, and it does not spin"
+        apart = np.abs(2 * (works[0] + works[1:]) - works.sum()).max()
+        if apart > _UNEVEN * works.sum() and float(np.median(signs.slow[active])) < _TURNS_RAD_S:
+            return f"rotor {np.argmin(works) + 1} works far less than the others, and it does not spin"
     if _unfelt(signs, active):
         return "what it feels does not grow with its thrust"
     if signs.body_rate is None or signs.felt is None:

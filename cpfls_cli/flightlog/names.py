@@ -478,6 +478,19 @@ def _of_matrix(columns: Mapping[str, Array]) -> list[str]:
     return longest if len(longest) >= _FEWEST_COLUMNS else []
 
 
+def without_names(columns: Mapping[str, object] | tuple[str, ...]) -> str:
+    """Say what to do with columns that numbers in brackets alone tell apart; empty where names say more."""
+    names = tuple(columns)
+    if (
+        len(names) <= _AXES_OF_A_BODY + 1
+        or len({name.rpartition("[")[0] for name in names}) > 1
+        or names[0][-1:] != "]"
+    ):
+        return ""
+    what = f"{OF_A_MATRIX} ({names[0]} to {names[-1]})"
+    return f"{what}: save each of its columns under a name, such as time, roll, pitch, yaw, p, q, r, m1, m2, m3, m4"
+
+
 def nameless_signals(columns: Mapping[str, Array], time: Array) -> tuple[Named, ...]:
     """Find attitude, rates, accelerometer, position, velocity and rotors among columns without names, on a clock, s.
 

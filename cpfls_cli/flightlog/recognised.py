@@ -17,7 +17,15 @@ from cpfls_cli.flightlog.agreement import body_rate_from, fit_axes, handed, slow
 from cpfls_cli.flightlog.airframe import MovedBy
 from cpfls_cli.flightlog.conversion import as_mapped
 from cpfls_cli.flightlog.flown import SHORTEST_FLIGHT_S, FlownPart, too_short
-from cpfls_cli.flightlog.names import OF_A_MATRIX, Named, column_groups, evenly_rising, named_signals, nameless_clock
+from cpfls_cli.flightlog.names import (
+    OF_A_MATRIX,
+    Named,
+    column_groups,
+    evenly_rising,
+    named_signals,
+    nameless_clock,
+    without_names,
+)
 from cpfls_cli.flightlog.repair import increasing_rows
 from cpfls_cli.flightlog.settings import ROTORS, UNITS_OF_SIGNAL, SignalMap, SignalName
 from cpfls_cli.flightlog.topics import ROWS, STAMP, Topics, column_names, rows_clock
@@ -206,6 +214,8 @@ def _flat_time(fields: Mapping[str, Array], units: Mapping[str, str]) -> tuple[s
     if rows := _rows_by_motion(fields):
         doubt = f"it has no stamps: {rows} is taken for them, with which the attitude turns as the gyroscope reads"
         return rows, "s", doubt
+    if matrix := without_names(fields):
+        raise InputError(matrix)
     raise InputError(
         "no column of time stamps is recognised: it has to rise from row to row and be called t, time or timestamp;"
         f" rename it, or {by_hand}, with import.time_column = row / 100 where 100 rows come in a second"

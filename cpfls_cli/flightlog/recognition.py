@@ -27,6 +27,7 @@ from cpfls_cli.flightlog.names import (
     named_signals,
     nameless_signals,
     only_of_airplanes,
+    without_names,
     words_of,
 )
 from cpfls_cli.flightlog.rebuilt import with_rebuilt
@@ -187,6 +188,8 @@ def _nothing_found(log: LogTable, named: Sequence[Named], system: str) -> str:
         return (
             f"a track of positions ({some([*log.names], _SHOWN)}) holds no motion of the body: give the autopilot's log"
         )
+    if matrix := without_names(log.names):
+        return matrix
     alone = {name: ColumnGroup(name, "one", (name,)).words for name in log.names}
     lone = [name for name, own in alone.items() if own and {*own} <= _AXES and not re.search(r"\d", name)]
     parts = f"{some(lone, _SHOWN)}: single axes, and a signal takes all three; " if lone else ""

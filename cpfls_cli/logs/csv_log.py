@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -39,6 +39,9 @@ def contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read columns of a log; without a wish, those whose first value is a number, a time or absent."""
     with _opened(path) as table:
         names, first, stated = table.names, dict(zip(table.names, table.first, strict=False)), table.stated
+        if len(said := [name for name, own in first.items() if name[:1].isalpha() and name == own.strip()]) > 1:
+            way = f"leave the words out, and {NAME_COLUMNS}"
+            raise InputError(f"{path}: each line says what its numbers are ({some(said, MOST_LISTED)}): {way}")
         # What is absent at first may be a word later on.
         for row in (own for _, own in table.rows if len(own) == len(first)):
             if all(map(str.strip, first.values())):
@@ -168,7 +171,7 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         first = next((own for _, own in _rows(iter(begun), delimiter) if own), [])
         if len(names) in (1, len(first)):
             break
-    rows = _rows(chain(begun, lines), delimiter, line)
+    first, rows = _below_units(_rows(chain(begun, lines), delimiter, line), first)
     # A loop that writes a separator behind each field leaves an empty one, in either of both.
     while len(names) > len(first) > 0 and not names[-1]:
         names.pop()
@@ -191,6 +194,19 @@ def _table(path: Path, lines: Iterator[str]) -> _Table:
         names = [own for name, size in parts for own in ([f"{name}[{at}]" for at in range(size)] or [name])]
         first = _spread(first, sizes)
     return _Table(names, first, rows, stated, repeated)
+
+
+def _below_units(rows: _Rows, first: list[str]) -> tuple[list[str], _Rows]:
+    """Leave out a row of words below the names, as of their units, where numbers come next; give the first of them."""
+
+    def counts(fields: Sequence[str]) -> bool:
+        return any(field.strip() and _kind(field) for field in fields)
+
+    if counts(first):
+        return first, rows
+    ahead = list(islice((own for own in rows if own[1]), 2))
+    ahead = ahead[len(ahead) > 1 and counts(ahead[1][1]) :]
+    return ahead[0][1] if ahead else first, chain(ahead, rows)
 
 
 def _ways(numbers: Sequence[str], lines: Iterator[str]) -> str:

@@ -283,7 +283,8 @@ def _first_line(path: Path) -> bytes:
     """Read the first bytes of a file, up to the first line; none where the reader will say that it cannot be read."""
     try:
         with path.open("rb") as stream:
-            return stream.readline(_LONGEST_LINE)
+            # Flash that nothing was written to reads so, and a log may begin behind it.
+            return stream.readline(_LONGEST_LINE).lstrip(b"\xff")
     except OSError:
         return b""
 

@@ -169,11 +169,17 @@ def test_a_trimmed_vehicle_and_one_with_a_weak_rotor_fly(shares):
     assert (flown.flies, flown.span_s, flown.ended) == (True, None, "")
 
 
-def test_a_quadrotor_without_one_rotor_spins_or_is_held():
-    rotors = np.full((len(TIME), 4), 0.4) * [1, 1, 1, 0.01]
+@pytest.mark.parametrize("shares", [(1, 1, 1, 0.01), (1.43, 1.38, 0.72, 0.47), (1.4, 0.6, 1.4, 0.3)])
+def test_a_quadrotor_whose_rotors_pull_unevenly_spins_or_is_held(shares):
+    rotors = np.full((len(TIME), 4), 0.4) * shares
     wobbles = 0.3 * np.sin(9 * TIME)[:, None] * [1.0, 1.0, 0.0]
     held = find_flown(Signs(time=TIME, rotors=rotors, body_rate=0.1 * wobbles))
-    assert held.reasons == ("no flight in it: rotor 4 hardly works, and it does not spin, as on a test stand",)
+    assert held.reasons == (
+        "no flight in it: rotor 4 works far less than the others, and it does not spin, as on a test stand",
+    )
+    # One that works twice as much as the others leaves the sums of any two nearly alike.
+    calm = 0.15 * np.sin(3 * TIME)[:, None] * [1.0, 0.0, 0.0]
+    assert find_flown(Signs(time=TIME, rotors=0.4 + 0 * rotors + [0.4, 0, 0, 0], body_rate=calm)).flies
     spinning = wobbles + np.cumsum(np.where(TIME < 38, 0.002, -0.04))[:, None] * [0, 0, 1.0]
     assert find_flown(Signs(time=TIME, rotors=rotors, body_rate=spinning)).flies
 
@@ -662,3 +668,10 @@ def test_what_flies_of_drawn_flights(case):
     assert [name for name, _ in found.moments] == list(*moments)
     ends = np.array(found.stretches_s).reshape(-1, 2)
     assert ends == pytest.approx(np.clip(spans, 0, time[-1]).reshape(-1, 2), abs=0.75)
+
+
+def test_what_falls_a_little_since_its_rotors_were_off_loses_no_control():
+    """The ground shakes it, of which without an accelerometer nothing is felt."""
+    level, height = between(5, 30, 0.5), np.interp(TIME, [5, 8, 30, 30.4], [0, 0.4, 0.4, 0])
+    flown = flown_by(level, height, turning(5, 30) + between(30.4, 30.6, 15.0) * np.sin(60 * TIME))
+    assert (flown.flies, flown.ended) == (True, "")

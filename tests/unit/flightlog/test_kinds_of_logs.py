@@ -154,7 +154,8 @@ def test_messages_of_ros_are_known_by_their_fields(own):
     assert proposal.time_column == "/imu/data.timestamp"
 
 
-def test_a_parrot_minidrone_counts_motors_that_turn_the_other_way_downward(own):
+@pytest.mark.parametrize("motors", ["rt_motor", "rt_yout/motors_refout", "rt_yout/motorsRS_cmdout"])
+def test_a_parrot_minidrone_counts_motors_that_turn_the_other_way_downward(own, motors):
     turned = Rotation.from_matrix(NED @ own.rotation.as_matrix() @ FLIP)
     commands = 500 * (own.speed / 1000) ** 2 * [1.0, -1.0, 1.0, -1.0]
     columns = {
@@ -162,7 +163,7 @@ def test_a_parrot_minidrone_counts_motors_that_turn_the_other_way_downward(own):
         **named(turned.as_euler("ZYX")[:, ::-1], *(f"rt_estim/{axis}" for axis in ("roll", "pitch", "yaw"))),
         **named(own.rate @ FLIP, *(f"rt_estim/gyro_{axis}" for axis in "xyz")),
         **named(own.position @ NED.T, *(f"rt_estim/{axis}" for axis in "xyz")),
-        **named(commands, *(f"rt_motor[{motor}]" for motor in range(4))),
+        **named(commands, *(f"{motors}[{motor}]" for motor in range(4))),
     }
     proposal = proposed({"": columns}, "Parrot minidrone", units={"time": "s"})
     found = maps(proposal)

@@ -739,6 +739,15 @@ def test_a_track_of_positions_is_no_log_of_a_flight():
         recognise(log, {}, {}, "")
 
 
+@pytest.mark.parametrize("clock", [{}, {"time": np.arange(100.0) / 10}])
+def test_a_matrix_without_names_is_called_so(clock):
+    """Whether something else has stamps or nothing has."""
+    matrix = {f"data[{column}]": np.arange(100.0) ** (column % 3) for column in range(7)}
+    held = "a matrix without names" if not clock else "no column is recognised"
+    with pytest.raises(InputError, match=held):
+        recognise({"": matrix | clock}, {}, {}, "")
+
+
 def test_columns_of_something_else_are_refused_by_name():
     log = {"": {"t": np.arange(100.0), "price": np.arange(100.0) ** 2}}
     with pytest.raises(InputError, match=r"no column is recognised as a signal of a flight \(columns: t, price\)"):

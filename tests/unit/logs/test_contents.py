@@ -284,7 +284,10 @@ def test_other_names_are_no_logs(name):
     assert not is_log(Path(name))
 
 
-@pytest.mark.parametrize("first", [b"\xbc\x02\x00", b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n"])
+HEADER = b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n"
+
+
+@pytest.mark.parametrize("first", [b"\xbc\x02\x00", HEADER, b"\xff\xff" + HEADER])
 def test_binary_logs_are_known_by_their_first_bytes_whatever_their_name(tmp_path, first):
     for name in ("log00", "LOG.TXT", "log.tar.gz", "study.h5", "log.ulg", "log.csv"):
         (tmp_path / name).write_bytes(first)
@@ -514,6 +517,23 @@ def test_dates_and_times_of_day_are_stamps_in_seconds(read, first):
 def test_a_table_of_one_value_a_row_is_refused(read):
     with pytest.raises(InputError, match=r"log\.csv: holds one value a row, named by key: give each a column"):
         read("t,key,Value\n0.5,gyro_x,1\n0.5,gyro_y,2\n")
+
+
+@pytest.mark.parametrize("below", ["[s],[rad/s],[rad/s]\n", "True , True , True \n", "\n,,\n"])
+def test_words_below_the_names_are_no_samples(read, below):
+    contents = read(f"time,p,q\n{below}0,1,2\n0.5,3,4\n")
+    assert listed(contents) == {"": {"time": [0.0, 0.5], "p": [1.0, 3.0], "q": [2.0, 4.0]}}
+
+
+def test_words_in_two_rows_are_no_units(read):
+    assert names(read("time,mode,note\nnever,hover,a\nnever,land,b\n0.5,1,2\n")) == []
+
+
+def test_words_before_the_numbers_of_each_line_are_no_names(read):
+    with pytest.raises(
+        InputError, match=r"log\.csv: each line says what its numbers are \(time, Gyro\): leave the words"
+    ):
+        read("time; 0,02; Gyro; -0,1; 0,2; 0,0\ntime; 0,04; Gyro; -0,1; 0,3; 0,1\n")
 
 
 def test_a_log_without_names_says_where_they_go(read):
