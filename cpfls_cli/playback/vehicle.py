@@ -370,6 +370,16 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
         yield number._replace(low=ends[0], high=ends[1], determined=number.determined and identified)
 
 
+def within_samples(numbers: Sequence[FoundNumber], rotors_hz: float) -> Iterator[FoundNumber]:
+    """Call a lag not determined that is shorter than the time between two samples of the rotors, in which they change.
+
+    It stands for the time from a change to the sample that shows it.
+    """
+    for number in numbers:
+        shorter = number.name == LAG and number.value * rotors_hz < 1
+        yield number._replace(determined=False) if shorter else number
+
+
 def _covariance(physical: Callable[[Array], Mapping[str, Physical]], fitted: Fitted, spread: Uncertainty) -> Array:
     """Turn the covariance of a fit into that of what follows from its numbers."""
     values = fitted.values

@@ -65,7 +65,7 @@ from cpfls_cli.playback.parameters import CURVE, MASS, blocks_of
 from cpfls_cli.playback.replay import fading, replay
 from cpfls_cli.playback.settings import GroupSettings, PlaybackSettings
 from cpfls_cli.playback.structure import Judged, Kept, SearchStoppedError, TriedStructure
-from cpfls_cli.playback.vehicle import Share, VehicleFit, find_vehicle
+from cpfls_cli.playback.vehicle import Share, VehicleFit, find_vehicle, within_samples
 from cpfls_cli.playback.weight import commanded_thrust
 from cpfls_cli.report.canvas import BASELINE, GREY, Drawn, Figure, legend_over, line, style_of
 from cpfls_cli.report.content import percent
@@ -328,7 +328,8 @@ def vehicle(
     found, signal = _found(run, training, settings, checkpoint, kept or {})
     # Rotors show nothing above half the rate at which they are logged.
     rotors_hz = min(flight.logged_hz for flight in training if not flight.group)
-    found = replace(found, loop=found.loop.up_to(rotors_hz / 2))
+    seen = tuple(within_samples(found.numbers, rotors_hz))
+    found = replace(found, loop=found.loop.up_to(rotors_hz / 2), numbers=seen)
     first = [_FIRST_ANSWER] if settings.quick else []
     warnings = [*first, *limit, *twice, *lacking, *(warning for flight in read for warning in flight.warnings)]
     sizes = [sum(map(len, flight.parts)) for flight in training]

@@ -13,9 +13,9 @@ from cpfls_cli.playback.constants import Constants
 from cpfls_cli.playback.fit import Fitted
 from cpfls_cli.playback.flight import LoggedFlight
 from cpfls_cli.playback.loop import LoopBounds, _explained, _factors
-from cpfls_cli.playback.parameters import FoundNumber, blocks_of
+from cpfls_cli.playback.parameters import LAG, FoundNumber, blocks_of
 from cpfls_cli.playback.settings import PlaybackSettings
-from cpfls_cli.playback.vehicle import bodily, find_vehicle, held_by_bounds, widened_by_loop
+from cpfls_cli.playback.vehicle import bodily, find_vehicle, held_by_bounds, widened_by_loop, within_samples
 from cpfls_cli.playback.weight import CommandedThrust, carrying_weight, commanded_thrust, widened_by_law
 from cpfls_cli.stages.vehicle import supplied_alike
 from tests.builders.playback_flights import MIDDLING, STATED, TRUE_BLOCKS, flown, truth
@@ -361,3 +361,9 @@ def test_a_body_that_torque_and_rotation_leave_to_no_vehicle_contradicts_no_fit(
     fitted = SimpleNamespace(model=SimpleNamespace(body=SimpleNamespace(inertia=own * inertia)))
     found = SimpleNamespace(fitted=fitted, half=np.full(3, 0.02))
     assert Constants.contradict(found, inertia, np.full(3, 0.96), np.full(3, 1.05)) is contradicts
+
+
+@pytest.mark.parametrize(("rotors_hz", "determined"), [(10.0, False), (50.0, True)])
+def test_a_lag_between_two_samples_of_the_rotors_is_not_determined(rotors_hz, determined):
+    numbers = [FoundNumber(name, "s", 0.046, 0.04, 0.05, np.nan, True, False) for name in (LAG, "delay_s")]
+    assert [own.determined for own in within_samples(numbers, rotors_hz)] == [determined, True]
