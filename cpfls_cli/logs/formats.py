@@ -8,7 +8,7 @@ loaded when the first file of its format is read.
 import re
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from math import nan
 from pathlib import Path
@@ -150,14 +150,29 @@ def is_log(path: Path) -> bool:
 
 def log_contents(path: Path, wanted: Collection[str] | None = None) -> LogContents:
     """Read the wanted columns of a log, flat or ``topic.field``, as numbers; if none is named, all that are numbers."""
-    contents: LogContents = _reader(path).contents(path, wanted)
-    return contents
+    own = None if wanted is None else {*wanted, *(part for name in wanted for part in _nanoseconds_of(name))}
+    return _with_fractions(_reader(path).contents(path, own))
 
 
 def log_flights(path: Path) -> list[LogContents]:
     """Read all columns that are numbers, of each flight that a file holds."""
     reader = _reader(path)
-    return reader.flights(path) if hasattr(reader, "flights") else [reader.contents(path, None)]
+    return reader.flights(path) if hasattr(reader, "flights") else [_with_fractions(reader.contents(path, None))]
+
+
+def _nanoseconds_of(name: str) -> list[str]:
+    """Name the columns that may hold what whole seconds lack, as in stamps of ROS."""
+    own = re.fullmatch(r"(.*?)secs?", name)
+    return [f"{own[1]}{rest}" for rest in ("nanosec", "nsec", "nsecs", "nanosecs")] if own else []
+
+
+def _with_fractions(contents: LogContents) -> LogContents:
+    """Add nanoseconds to the whole seconds of a flat log."""
+    fields = contents.topics.get("", {})
+    pairs = [(name, part) for name in fields for part in _nanoseconds_of(name) if part in fields]
+    added = {name: fields[name] + 1e-9 * fields[part] for name, part in pairs if len(fields[name]) == len(fields[part])}
+    units = contents.units | dict.fromkeys(added, "s")
+    return replace(contents, topics=contents.topics | {"": fields | added}, units=units) if added else contents
 
 
 @contextmanager

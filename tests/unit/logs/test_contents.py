@@ -33,6 +33,7 @@ from cpfls_cli.logs.formats import (
     formats_in_words,
     is_log,
     log_contents,
+    log_flights,
     suffixes_in_words,
 )
 from tests.builders import blackbox_logs, ulogs
@@ -517,6 +518,14 @@ def test_dates_and_times_of_day_are_stamps_in_seconds(read, first):
 def test_a_table_of_one_value_a_row_is_refused(read):
     with pytest.raises(InputError, match=r"log\.csv: holds one value a row, named by key: give each a column"):
         read("t,key,Value\n0.5,gyro_x,1\n0.5,gyro_y,2\n")
+
+
+@pytest.mark.parametrize(("seconds", "parts"), [("stamp.sec", "stamp.nanosec"), ("secs", "nsecs")])
+def test_nanoseconds_that_ros_counts_apart_are_added_to_their_seconds(tmp_path, seconds, parts):
+    path = put_file(tmp_path / NAME, f"{seconds},{parts},p\n7,900000000,1\n8,100000000,2\n".encode())
+    for own in (log_contents(path), log_contents(path, {seconds}), *log_flights(path)):
+        assert own.topics[""][seconds] == pytest.approx([7.9, 8.1])
+        assert own.units == {seconds: "s"}
 
 
 @pytest.mark.parametrize("below", ["[s],[rad/s],[rad/s]\n", "True , True , True \n", "\n,,\n"])
