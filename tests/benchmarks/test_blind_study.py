@@ -41,7 +41,7 @@ def judged(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     groups = [own for own in sets(Size(777, 1, ("mid",), ("coloured",))) if own[0].case.name in CASES]
     found = {}
-    for logs, own in zip(fly(groups, folder, duration=15.0), groups, strict=True):
+    for logs, own in zip(fly(groups, folder, duration=8.0), groups, strict=True):
         key = json.loads((folder / "keys" / logs.name / "key.json").read_text(encoding="ascii"))
         said = judge(logs)
         found[own[0].case.name] = Scored(key, said, outcome(key, said))

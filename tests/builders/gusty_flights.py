@@ -94,9 +94,9 @@ def gusty_flights(flights, seconds=30.0):
     rngs = [np.random.default_rng([flight.path, flight.draw]) for flight in flights]
     path = np.stack([path_of(flight, samples) for flight in flights], axis=1)
     pushes = [_pushes(rng, samples, flight) * flight.gusts for rng, flight in zip(rngs, flights, strict=True)]
-    shoves = [_memory(rng, samples, np.ones(3)) * 0.06 * max(f.gusts) for rng, f in zip(rngs, flights, strict=True)]
+    shoves = [memory(rng, samples, np.ones(3)) * 0.06 * max(f.gusts) for rng, f in zip(rngs, flights, strict=True)]
     noise = [f.truth.gyro_noise * rng.standard_normal((samples, 3)) for rng, f in zip(rngs, flights, strict=True)]
-    logs = _flown(flights, path, *(np.stack(each, axis=1) for each in (pushes, shoves, noise)))
+    logs = flown_along(flights, path, *(np.stack(each, axis=1) for each in (pushes, shoves, noise)))
     for number, (rng, flight) in enumerate(zip(rngs, flights, strict=True)):
         *motion, speed, command, up = (np.ascontiguousarray(log[:, number]) for log in logs)
         noisy = speed + flight.truth.speed_noise * speed.mean() * rng.standard_normal(speed.shape)
@@ -118,7 +118,7 @@ def gusty_flights(flights, seconds=30.0):
 
 def _pushes(rng, samples, flight):
     """Draw gusts of unit size about the axes, shape (samples, 3)."""
-    total = sum(np.sqrt(share) * _memory(rng, samples, factor * MEMORY_S) for share, factor in flight.memories)
+    total = sum(np.sqrt(share) * memory(rng, samples, factor * MEMORY_S) for share, factor in flight.memories)
     if not flight.smooth_s:
         return total
     keep = np.exp(-STEP_S / flight.smooth_s)
@@ -126,7 +126,7 @@ def _pushes(rng, samples, flight):
     return smooth / smooth.std(axis=0)
 
 
-def _memory(rng, samples, memory_s):
+def memory(rng, samples, memory_s):
     """Draw an Ornstein-Uhlenbeck process of unit size, shape (samples, 3)."""
     keep = np.exp(-STEP_S / memory_s)
     drawn = rng.standard_normal((samples, 3)) * np.sqrt(1 - keep**2)
@@ -166,7 +166,7 @@ def _sines(rng, turns, size, samples):
     return ((waves * blocks[:, None]) @ steps.T).real.swapaxes(1, 2).reshape(-1, len(waves))[:samples]
 
 
-def _flown(flights, path, pushes, shoves, noise):
+def flown_along(flights, path, pushes, shoves, noise):
     """Integrate each flight; give motion with the measured rate, speed, command and wanted up, flights second."""
     # Of each flight without gaps, so that one form of the loop is compiled.
     logs = np.empty((len(flights), -(-len(path) // EVERY), 29))

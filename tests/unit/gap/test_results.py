@@ -197,4 +197,5 @@ def test_what_no_flight_learned_from_shows_is_no_difference_between_flights():
     held_out = SimpleNamespace(unlearned={"vertical_descent": 0.2}, shares=lambda: {"force": 0.5})
     found = SimpleNamespace(hypothesis=SimpleNamespace(chosen=[None]), estimates=None, settings=GapSettings())
     # Nothing else is asked for: no step, no judge.
-    assert unseen._other_numbers(SimpleNamespace(found=found, held_out=held_out), None) == ()
+    first = SimpleNamespace(found=found, held_out=held_out)
+    assert unseen.differences(first, first, None, None) == ()

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from cpfls_cli.look.columns import LookedLog
 from cpfls_cli.look.flight import Samples
 from cpfls_cli.look.look import look_at, what_is_logged
 from cpfls_cli.look.reading import read_flight
-from cpfls_cli.look.timeline import _at_limit, _misread, timeline
+from cpfls_cli.look.timeline import timeline
 from tests.builders import ended_flights as ended
 from tests.builders import looked_logs as logs
 from tests.builders.dataflash_logs import dataflash
@@ -21,6 +22,7 @@ from tests.builders.unknown_logs import flight, named, with_ground
 
 OWN = flight(seconds=20.0)
 HOP = with_ground(flight(seconds=20.0))
+NOTHING = SimpleNamespace(counted_from_s=0.0, flown=SimpleNamespace(moments=(), air_s=()))
 
 
 def read(contents):
@@ -32,6 +34,11 @@ def read(contents):
 def events(contents, messages=()):
     found, recognition = read(contents)
     return timeline(found, contents.topics, recognition, messages)
+
+
+def shown(flight, kind):
+    """Give the events of a kind that signals alone show."""
+    return [event for event in timeline(flight, {}, NOTHING) if event.kind == kind]
 
 
 def of(found, kind):
@@ -192,7 +199,7 @@ def test_a_rotor_that_oscillates_at_its_limit_is_at_it_most_of_the_time():
     # Of ten samples seven are at the limit, for a second; then three.
     share = np.where((time > 4) & (time < 5), 7, np.where((time > 7) & (time < 8), 3, 0))
     speeds[:, 2] = np.where(np.arange(5000) % 10 < share, 1.0, speeds[:, 2])
-    (limit,) = _at_limit(still_flight(rotors=Samples(time, speeds, "rotors")), np.inf)
+    (limit,) = shown(still_flight(rotors=Samples(time, speeds, "rotors")), "limit")
     assert limit.text.startswith("M3 at its upper limit once, ")
     assert (limit.time_s, limit.until_s) == (pytest.approx(4.0, abs=0.03), pytest.approx(5.0, abs=0.03))
 
@@ -389,13 +396,13 @@ def test_an_accelerometer_that_reads_wrong_shows_no_hover():
 @pytest.mark.parametrize(("size", "said"), [(1.28, ["1.28"]), (1.05, []), (0.8, ["0.80"])])
 def test_an_accelerometer_that_reads_wrong_in_a_log_that_never_stands(size, said):
     own = still_flight(20.0, specific_force=np.tile([0.0, 0.0, -9.80665 * size], (1000, 1)))
-    texts = [event.text for event in _misread(own)]
+    texts = [event.text for event in shown(own, "calibration")]
     assert texts == [f"the accelerometer reads {each} g in steady flight: calibrate it" for each in said]
     # What leans or turns may be pushed by its rotors, and of a short flight nothing is known.
     lively = own.body_rate + np.sin(own.time)[:, None]
     leaning = replace(own, attitude=own.attitude + np.array([0.0, 0.4, 0.0]))
     for each in (replace(own, body_rate=lively), leaning, replace(own, usable=own.time < 10.0)):
-        assert not list(_misread(each))
+        assert not shown(each, "calibration")
 
 
 def test_the_autopilots_word_for_take_off_may_come_long_before():
@@ -416,6 +423,6 @@ def test_a_rotor_that_is_steady_where_nothing_moves_is_at_no_limit():
     speeds = np.full((3000, 4), 0.4)
     speeds[:, 1:3] = 0.45
     still = still_flight(rotors=Samples(np.arange(3000) / 50, speeds, "rotors"))
-    assert not list(_at_limit(still, np.inf))
+    assert not shown(still, "limit")
     moving = np.where(np.arange(4) == 1, 0.45, 0.4 + 0.02 * np.sin(np.arange(3000) / 50)[:, None])
-    assert list(_at_limit(replace(still, rotors=Samples(np.arange(3000) / 50, moving, "rotors")), np.inf))
+    assert shown(replace(still, rotors=Samples(np.arange(3000) / 50, moving, "rotors")), "limit")

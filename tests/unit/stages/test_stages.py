@@ -20,7 +20,7 @@ from cpfls_cli.result import Estimate
 from cpfls_cli.stages._numbers import to_fly
 from cpfls_cli.stages.diagnose import learned_from, next_command
 from cpfls_cli.stages.extend import named_effects
-from cpfls_cli.stages.init import _unused
+from cpfls_cli.stages.init import init
 from cpfls_cli.stages.look import FIGURES
 from cpfls_cli.stages.reduce import _naming
 from cpfls_cli.stages.vehicle import held_s, next_commands
@@ -205,5 +205,8 @@ def test_a_flight_held_out_that_was_imported_from_a_log_learned_from_is_said_to_
 def test_a_topic_is_unused_where_no_instance_of_it_is_used():
     guess = SimpleNamespace(columns=SimpleNamespace(columns=("imu[1].x",)))
     names = ("imu.x", "imu.y", "imu[1].y", "mag.x", "mag[1].x")
-    unused = [*_unused(SimpleNamespace(signals=(guess,), unused=names))]
-    assert unused == ["imu.x, imu.y", "imu[1].y", "anything of mag"]
+    assert [*init.words["unused"](SimpleNamespace(signals=(guess,), unused=names))] == [
+        "imu.x, imu.y",
+        "imu[1].y",
+        "anything of mag",
+    ]
