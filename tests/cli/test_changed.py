@@ -166,7 +166,7 @@ def test_artifact_report_and_info_say_the_same(cpfls, changed, folder):
 
 
 RATE, FORCE, SPEED = ("gyro_x", "gyro_y", "gyro_z"), ("acc_x", "acc_y", "acc_z"), ("rpm1", "rpm2", "rpm3", "rpm4")
-TODAY = flight(seconds=12.0, seed=11)
+TODAY = flight(12.0, seed=11)
 RPM = TODAY.speed * 60 / (2 * np.pi)
 WRONG = {
     "gyroscope mirrored": ({"rate": named(TODAY.rate * [-1, 1, 1], *RATE)}, "gain roll"),
@@ -182,7 +182,9 @@ WRONG = {
 def logs(tmp_path_factory, cpfls):
     """Four reference flights with attitude and motion, one of today like them, and the config of `init`."""
     folder = tmp_path_factory.mktemp("wrong")
-    before = [write_csv(folder / f"before{seed}.csv", flat_log(flight(seconds=12.0, seed=seed))) for seed in (1, 2, 3, 4)]
+    before = [
+        write_csv(folder / f"before{seed}.csv", flat_log(flight(seconds=12.0, seed=seed))) for seed in (1, 2, 3, 4)
+    ]
     write_csv(folder / "same.csv", flat_log(TODAY))
     cpfls.done("init", *before, "-o", folder / "study.yaml", "--mass", MASS, "--arm", ARM)
     return folder
@@ -263,7 +265,9 @@ def stated(tmp_path_factory, cpfls):
     """Reference flights whose logs state numbers of their vehicle, and the config of `init`."""
     folder = tmp_path_factory.mktemp("stated")
     for seed, more in ((1, {}), (2, {}), (4, {"PWM_MIN": 1000})):
-        (folder / f"before{seed}.ulg").write_bytes(ulog_of_flight(flight(seconds=12.0, seed=seed), MOT_POLE_COUNT=14, **more))
+        (folder / f"before{seed}.ulg").write_bytes(
+            ulog_of_flight(flight(seconds=12.0, seed=seed), MOT_POLE_COUNT=14, **more)
+        )
     logs = [folder / f"before{seed}.ulg" for seed in (4, 1, 2)]
     cpfls.done("init", *logs, "-o", folder / "study.yaml", "--mass", MASS)
     return folder

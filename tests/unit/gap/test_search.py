@@ -13,7 +13,6 @@ from cpfls_cli.gap.balance import refine
 from cpfls_cli.gap.balance.balance_system import System, system
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming import by_samples
-from cpfls_cli.gap.naming.by_samples import _surest, _Test, _Tried
 from cpfls_cli.gap.naming.ranking import Scored, rank_effects, simplest, unbeaten
 from cpfls_cli.gap.naming.search import alternatives
 from cpfls_cli.gap.settings import GapSettings
@@ -199,66 +198,64 @@ def test_columns_are_evaluated_again_only_where_their_shape_or_the_signals_chang
         assert np.array_equal(moved.residual, alone.residual)
 
 
-class Learned:
-    """Answers which one does without others."""
+@pytest.fixture
+def small(monkeypatch):
+    """Find the first small effect, with its rivals, by the chance of each and by which ones do without others."""
 
-    def __init__(self, unneeded):
-        self.unneeded = unneeded
+    def found(chances, unneeded=(), shapes=(), lengths=(900,)):
+        def tested(_effect, own, others):
+            asked = NAMES[own[0]], *(NAMES[other] for (other,) in others)
+            chance = float(asked in unneeded) if others else chances[own[0]]
+            return SimpleNamespace(chance=chance, linear=None, without=None)
 
-    def tested(self, _effect, own, others):
-        asked = NAMES[own[0]], *(NAMES[other] for (other,) in others)
-        return _Test(float(asked in self.unneeded), *[np.zeros(1)] * 3)
+        def products(candidates):
+            places = [np.array([at]) for at in range(len(candidates))]
+            return SimpleNamespace(places=places, tested=tested, confirms=lambda _own, known, _linear: not known)
 
+        rows = [np.zeros((own, 6)) for own in lengths]
+        sampled = SimpleNamespace(white=None, white_residual=rows, products=products)
+        monkeypatch.setattr(by_samples, "_Sampled", lambda *_: sampled)
+        each = [Candidate(replace(effect(name), shapes=shapes, order=at), {}) for at, name in enumerate(NAMES)]
+        fit = SimpleNamespace(hypothesis=SimpleNamespace(flights=()), settings=GapSettings(significance=0.01))
+        named = by_samples.small_effects(fit, (), each, np.ones(6, dtype=bool))
+        return [(one.candidate.effect.name, *(rival.name for rival in one.rivals)) for one in named]
 
-def tried(chances, shapes=()):
-    each = [replace(effect(name), shapes=shapes, order=place) for place, name in enumerate(NAMES)]
-    tests = [_Test(chance, *[np.zeros(1)] * 3) for chance in chances]
-    return [
-        _Tried(Candidate(own, {}), np.array([at]), test) for at, (own, test) in enumerate(zip(each, tests, strict=True))
-    ]
-
-
-def chosen(unneeded, tried):
-    best, rivals = _surest(Learned(unneeded), tried, [], 0.01)
-    return best and best.candidate.effect.name, [each.name for each in rivals]
+    return found
 
 
 @pytest.mark.parametrize("lengths", [(), (0, 900), (4,), (39, 900)])
-def test_a_flight_that_is_shorter_than_a_stretch_shows_no_small_effects(monkeypatch, lengths):
-    sampled = SimpleNamespace(white=None, white_residual=[np.zeros((own, 6)) for own in lengths])
-    monkeypatch.setattr(by_samples, "_Sampled", lambda *_: sampled)
-    found = SimpleNamespace(hypothesis=SimpleNamespace(flights=()))
-    assert by_samples.small_effects(found, (), (), np.ones(6, dtype=bool)) == []
+def test_a_flight_that_is_shorter_than_a_stretch_shows_no_small_effects(small, lengths):
+    assert small([1e-6, 1e-6, 1e-6], lengths=lengths) == []
 
 
 @pytest.mark.parametrize("rounded", [*permutations(ROUNDED)])
-def test_of_equally_sure_ones_the_first_is_chosen(rounded):
-    assert chosen((), tried(1e-5 * np.array(rounded))) == (NAMES[0], [])
+def test_of_equally_sure_ones_the_first_is_chosen(small, rounded):
+    assert small(1e-5 * np.array(rounded)) == [NAMES[:1]]
 
 
 @pytest.mark.parametrize("rounded", [*permutations(ROUNDED)])
-def test_of_those_that_replace_each_other_the_first_of_the_catalogue_is_chosen(rounded):
+def test_of_those_that_replace_each_other_the_first_of_the_catalogue_is_chosen(small, rounded):
     # The second and the third do without each other, the first is less sure.
-    assert chosen([NAMES[1:], NAMES[:0:-1]], tried(1e-5 * np.array(rounded) * [10, 1, 1])) == (NAMES[1], [NAMES[2]])
+    assert small(1e-5 * np.array(rounded) * [10, 1, 1], [NAMES[1:], NAMES[:0:-1]]) == [NAMES[1:]]
 
 
-def test_what_another_one_replaces_is_not_chosen():
-    assert chosen([NAMES[:2]], tried([1e-6, 1e-5, 1.0])) == (NAMES[1], [])
+def test_what_another_one_replaces_is_not_chosen(small):
+    assert small([1e-6, 1e-5, 1.0], [NAMES[:2]]) == [NAMES[1:2]]
 
 
-def test_what_two_others_replace_that_it_does_not_is_not_chosen():
+def test_what_two_others_replace_that_it_does_not_is_not_chosen(small):
     """Inflow damps roll and pitch and rotor drag damps yaw, so that a damping of all three looks surer than each."""
-    sure = tried([1e-9, 1e-6, 1e-5])
-    assert chosen([NAMES], sure) == (NAMES[1], [])
+    sure = [1e-9, 1e-6, 1e-5]
+    assert small(sure, [NAMES]) == [NAMES[1:2]]
     # It does without one of them, or one of them without it: nobody says which.
     for other in [(NAMES[1], NAMES[2], NAMES[0]), (NAMES[2], NAMES[1], NAMES[0])]:
-        assert chosen([NAMES, other], sure) == (NAMES[0], [])
+        assert small(sure, [NAMES, other]) == [NAMES[:1]]
 
 
 @pytest.mark.parametrize("chances", [[0.02, 0.03, 1.0], [0.005, 0.02, 1.0]])
-def test_what_chance_offers_over_all_that_are_tried_is_not_chosen(chances):
-    assert chosen((), tried(chances)) == (None, [])
+def test_what_chance_offers_over_all_that_are_tried_is_not_chosen(small, chances):
+    assert small(chances) == []
 
 
-def test_an_effect_with_shapes_is_not_chosen():
-    assert chosen((), tried([1e-6, 1e-5, 1.0], shapes=effect("motor_lag").shapes)) == (None, [])
+def test_an_effect_with_shapes_is_not_chosen(small):
+    assert small([1e-6, 1e-5, 1.0], shapes=effect("motor_lag").shapes) == []
