@@ -219,10 +219,10 @@ def test_a_vehicle_that_flights_do_not_tell_is_refused_with_the_flight_that_is_m
 def test_what_is_good_for_control_is_good_enough_for_gains(cpfls, gains, folder, tmp_path):
     """A log without velocity judges no simulation; gains follow from rotation."""
     own = replace(found_vehicle(instrumented=False), held_out=held_out(None))
-    assert (own.verdict, gains["px4"].exit_code) == ("good-for-control", 0)
+    assert (own.verdict, gains["crazyflie"].exit_code) == ("good-for-control", 0)
     path = write_vehicle(tmp_path / "turns.h5", own, STUDY)
-    cpfls.done("tune", folder / "study.yaml", path, "--autopilot", "px4", "-o", tmp_path / "g.h5")
-    found, before = (read(each).sets["proposed"].roll.command for each in (tmp_path / "g.h5", folder / "px4.h5"))
+    cpfls.done("tune", folder / "study.yaml", path, "--autopilot", "crazyflie", "-o", tmp_path / "g.h5")
+    found, before = (read(each).sets["proposed"].roll.command for each in (tmp_path / "g.h5", folder / "crazyflie.h5"))
     assert found.disk_deg == before.disk_deg
 
 
@@ -347,14 +347,14 @@ def test_json_is_the_summary_and_a_log_that_is_too_short_for_noise_is_said(cpfls
     rows = [("IMU", (1_000_000 + 2500 * step, 0.1 * step, 0.2, 0.3)) for step in range(20)]
     (tmp_path / "log.bin").write_bytes(dataflash({"IMU": ("Qfff", "TimeUS,GyrX,GyrY,GyrZ")}, rows))
     result = cpfls.done(
-        *("tune", tmp_path / "study.yaml", folder / "vehicle.h5", "--autopilot", "px4", "--json"),
+        *("tune", tmp_path / "study.yaml", folder / "vehicle.h5", "--autopilot", "crazyflie", "--json"),
         *("--flight", tmp_path / "log.bin", "-o", tmp_path / "gains.h5"),
     )
     assert any("no log holds 256 samples" in words for words in read(tmp_path / "gains.h5").warnings)
     answer = json.loads(result.stdout)
-    assert answer["parameters"]["MC_ROLLRATE_P"]["proposed"] > 0
+    assert answer["parameters"]["pid_rate.roll_kp"]["proposed"] > 0
     assert answer["falls_short"]["proposed"] == []
-    assert answer["file"].endswith("gains.params")
+    assert answer["file"].endswith("gains.yaml")
 
 
 def test_an_imported_flight_keeps_the_parameters_of_its_log(cpfls, tmp_path):
