@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -286,6 +287,14 @@ def test_what_does_not_decide_is_said(better):
     assert said(judged, "widest 95 % band of a moment of inertia is 140 %") == -1
     assert said(judged, "3 of 100 replayed windows do not run to the end") == -1
     assert said(verdict(replace(better, band=np.array([0.2, 0.4, 0.3]))), "widest 95 % band") == 1
+
+
+@pytest.mark.parametrize(("freed", "widest"), [(True, "20 %"), (False, "0.5 %")])
+def test_the_band_of_a_moment_is_no_narrower_than_instruments_know_it(better, freed, widest):
+    known = SimpleNamespace(half=np.array([0.1, 0.05, np.inf]), identified=np.array([True, True, False]))
+    found = replace(better.identification, freed=known if freed else None)
+    judged = verdict(replace(better, band=np.full(3, 0.005), identification=found))
+    assert said(judged, f"widest 95 % band of a moment of inertia is {widest}") == 1
 
 
 def test_coloured_errors_are_said_and_speak_neither_way(better):

@@ -11,7 +11,7 @@ from cpfls_cli.gap.balance.balance_system import system
 from cpfls_cli.gap.balance.refine import Equations, least_squares
 from cpfls_cli.gap.balance.weak_flight import Candidate
 from cpfls_cli.gap.naming.causes import judge_effects
-from cpfls_cli.gap.naming.estimate import _on_bounds, effect_sentence, estimates_of, fitted, may_be_another, on_bound
+from cpfls_cli.gap.naming.estimate import effect_sentence, ends_on_bound, estimates_of, fitted, may_be_another, on_bound
 from cpfls_cli.gap.naming.ranking import chance_of_ranks, likely, off_by, within_bounds
 from cpfls_cli.gap.naming.results import Estimate
 from cpfls_cli.gap.settings import GapSettings
@@ -82,8 +82,13 @@ def test_other_effects_keep_their_sentence():
 @pytest.mark.parametrize(("low", "listed"), [(0.01, True), (0.0, False), (-0.01, False)])
 def test_what_may_be_0_is_not_surely_on_its_bound(low, listed):
     """Also where its interval ends at 0, below which it cannot be."""
-    number = Estimate("k_d", "1", 0.05, low, 0.06, (0.0, 0.05))
-    assert _on_bounds([number]) == ({number: 0.05} if listed else {})
+    estimates = SimpleNamespace(
+        effects=((Estimate("k_d", "1", 0.05, low, 0.06, (0.0, 0.05)),),), of_effect=(np.array([0.05]),)
+    )
+    hypothesis = SimpleNamespace(chosen=((CATALOGUE["rotor_drag"], {}),))
+    refusal = ends_on_bound(SimpleNamespace(hypothesis=hypothesis, estimates=estimates))
+    assert (refusal is not None) == listed
+    assert not listed or refusal.sentence.endswith("its k_d sits on the bound of what is possible, 0.05 1")
 
 
 @pytest.mark.parametrize(("sideways", "error", "refused"), [(1.5, 0.8, True), (1.5, 0.0, True), (0.6, 0.15, False)])

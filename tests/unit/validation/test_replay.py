@@ -18,7 +18,7 @@ from cpfls_cli.validation.bands import physical_sense
 from cpfls_cli.validation.evidence import MODEL, Evidence
 from cpfls_cli.validation.replay import NOTHING_MOVES, replay_steps
 from cpfls_cli.validation.trust import Trust
-from cpfls_cli.validation.verdict import Reason, Verdict, _band, confirmed_axes, region_in_words, with_loop
+from cpfls_cli.validation.verdict import Reason, Verdict, confirmed_axes, region_in_words, with_loop
 from tests.builders.flights import rigid_torque, rotating_motion, still_flight
 
 INERTIA = np.array([0.6, 0.8, 1.2, 0.0, 0.0, 0.0])
@@ -168,16 +168,6 @@ def test_a_loop_does_not_save_what_is_not_to_be_used():
 def test_flights_that_explain_roll_and_pitch_leave_the_verdict(loop):
     found = Verdict(Trust.INSIDE, "", (Reason("better", 1),))
     assert with_loop(found, loop) is found
-
-
-def test_the_band_of_a_moment_is_no_narrower_than_instruments_know_it():
-    result = SimpleNamespace(half=np.array([0.1, 0.05, np.inf]), identified=np.array([True, True, False]))
-    known = SimpleNamespace(band=np.full(3, 0.005), identification=SimpleNamespace(freed=result))
-    (reason,) = _band(known)
-    assert "20 %" in reason.text
-    known.identification.freed = None
-    (reason,) = _band(known)
-    assert "0.5 %" in reason.text
 
 
 def model(rigid_body=BODY, visited=None, d11=0.0):
