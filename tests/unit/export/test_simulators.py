@@ -95,6 +95,7 @@ def test_each_simulator_names_what_it_lacks():
     assert "flapping" in lacks["mjcf"]
 
 
+@pytest.mark.usefixtures("brief")
 @pytest.mark.parametrize("share", [0.6, 1.0])
 @pytest.mark.parametrize("form", FORMS)
 def test_a_thrust_curve_hovers_at_the_same_speed_in_every_form(form, share):
@@ -139,6 +140,7 @@ def test_an_export_flies_in_the_wind_of_its_flights(form):
     assert np.abs(still.errors[0] - found.errors[0]).max() > 1e-3
 
 
+@pytest.mark.usefixtures("brief")
 def test_an_inertia_that_depends_on_the_attitude_is_named():
     fuzzy = replace(model_of(CASES["default"]), rigid_body=np.array([*STATED.inertia_kg_m2, 0.0, 0.0, 0.0]))
     fuzzy = replace(fuzzy, coefficients=1e-5 * fuzzy.coefficients)
@@ -146,6 +148,7 @@ def test_an_inertia_that_depends_on_the_attitude_is_named():
     assert FUZZY in [each.title for each in made.missing]
 
 
+@pytest.mark.usefixtures("brief")
 def test_an_inertia_that_no_body_has_is_brought_to_the_nearest():
     model = replace(truth(), vehicle=replace(QUAD, inertia_kg_m2=(0.004, 0.005, 0.0096)), effects=())
     np.testing.assert_allclose(np.diag(of_a_body(model.body).inertia), [0.0042, 0.0052, 0.0094], rtol=1e-6)
