@@ -41,7 +41,7 @@ def test_any_structure(structure, rigid, zero_width, still, seed):
 @pytest.mark.parametrize("name", CASES)
 def test_each_structure(name):
     model = model_of(CASES[name])
-    motion = states(model, 200, seed=len(name))
+    motion = states(model, 80, seed=len(name))
     found, wanted = evaluated(model, motion), wanted_of(model, motion)
     assert max(errors(found, wanted).values()) < 1e-12, errors(found, wanted)
 
