@@ -1,6 +1,7 @@
 """Gains from one log: what is sure of them, over plants whose loops are computed here by their formula."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -37,6 +38,12 @@ def found(autopilot, values=None, own=None, **options):
     others = (SimpleNamespace(axis=axis, **weak) for axis in ("pitch", "yaw"))
     plants = [own or looked_plant(*PLANTS[autopilot]), *others]
     return tuned_gains(looked_flight(autopilot, values, **options), plants)
+
+
+@cache
+def default_gains(autopilot):
+    """Find those of the defaults once for all tests."""
+    return found(autopilot)
 
 
 def loops(autopilot, values, draws):
@@ -98,7 +105,7 @@ def test_the_interval_is_that_of_the_plants():
 
 
 def test_gains_that_suit_are_kept():
-    gains = found("px4")
+    gains = default_gains("px4")
     assert {row.direction for row in gains.rows} != {"keep"}
     again = found("px4", {row.parameter: 0.5 * (row.low + row.high) for row in gains.rows})
     assert [row.direction for row in again.rows] == ["keep"] * 3
@@ -109,14 +116,14 @@ def test_gains_that_suit_are_kept():
 
 @pytest.mark.parametrize(("factor", "direction"), [(0.3, "raise"), (1.6, "lower")])
 def test_what_is_far_off_is_moved(factor, direction):
-    suited = {row.parameter: row.proposed for row in found("px4").rows}
+    suited = {row.parameter: row.proposed for row in default_gains("px4").rows}
     rows = by_term(found("px4", {name: factor * value for name, value in suited.items()}))
     assert rows["P"].direction == direction
     assert {row.direction for row in rows.values()} <= {direction, "keep"}
 
 
 def test_one_log_bears_one_step(monkeypatch):
-    suited = {row.parameter: row.proposed for row in found("px4").rows}
+    suited = {row.parameter: row.proposed for row in default_gains("px4").rows}
     monkeypatch.setattr(cpfls_cli.look.gains, "_AT_ONCE", AT_ONCE)
     row = by_term(found("px4", {name: 0.3 * value for name, value in suited.items()}))["P"]
     assert (row.direction, row.why) == ("raise", "step")
@@ -126,7 +133,7 @@ def test_one_log_bears_one_step(monkeypatch):
 
 
 def test_gains_go_down_only_where_margins_are_surely_too_small(monkeypatch):
-    suited = {row.parameter: row.proposed for row in found("px4").rows}
+    suited = {row.parameter: row.proposed for row in default_gains("px4").rows}
     monkeypatch.setattr(cpfls_cli.look.gains, "ACCEPTABLE", ACCEPTABLE)
 
     def way(factor, spread=NARROW):
@@ -168,14 +175,14 @@ def test_gains_do_not_go_beyond_the_band():
 
 
 def test_a_weak_axis_gets_sticks_to_move():
-    gains = found("betaflight")
+    gains = default_gains("betaflight")
     assert [(axis.axis, axis.reason) for axis in gains.axes[1:]] == [("pitch", "weak"), ("yaw", "weak")]
     assert [(each.axis, each.mode) for each in gains.fly] == [("pitch", "acro"), ("yaw", "acro")]
     assert {row.axis for row in gains.rows} == {"roll"}
 
 
 def test_the_angle_is_tuned_where_one_is_flown():
-    assert "P of the angle" not in by_term(found("px4"))
+    assert "P of the angle" not in by_term(default_gains("px4"))
     assert by_term(found("px4", attitude=True))["P of the angle"].parameter == "MC_ROLL_P"
 
 
@@ -193,7 +200,7 @@ def test_versions_whose_gains_count(autopilot, system, reason):
 
 
 def test_names_are_those_of_the_version():
-    assert {"d_min_roll", "d_roll"} <= {row.parameter for row in found("betaflight").rows}
+    assert {"d_min_roll", "d_roll"} <= {row.parameter for row in default_gains("betaflight").rows}
     assert {row.parameter for row in found("betaflight", system="Betaflight 3.5.0").rows} == {
         "p_roll",
         "i_roll",
@@ -220,7 +227,7 @@ def test_axes_are_in_their_order():
 
 
 def test_what_is_logged_too_slowly_is_not_asked_to_be_flown():
-    gains = found("betaflight")
+    gains = default_gains("betaflight")
     weak = gains.axes[1]
     said = [each.text for each in answer(gains) if isinstance(each, Text)]
     assert "To see it: fly acro and move the pitch stick" in said[0]
@@ -230,5 +237,5 @@ def test_what_is_logged_too_slowly_is_not_asked_to_be_flown():
 
 
 def test_a_log_of_nobody_known_has_no_name_in_its_answer():
-    nobody = replace(found("betaflight"), version="", title="", reason="autopilot", axes=(), rows=(), fly=())
+    nobody = replace(default_gains("betaflight"), version="", title="", reason="autopilot", axes=(), rows=(), fly=())
     assert [block.title for block in answer(nobody)] == ["No gains."]

@@ -1,6 +1,7 @@
 """Gains and their margins."""
 
 from dataclasses import replace
+from functools import cache
 
 import control
 import numpy as np
@@ -35,6 +36,7 @@ FREQUENCY = np.geomspace(0.002, 200.0, 2000)
 S = 2j * np.pi * FREQUENCY
 
 
+@cache
 def found(name, spread=CERTAIN, asked=USUAL, lag=0.03):
     autopilot = AUTOPILOTS[name]
     hover = replace(hover_plant(autopilot.law(), CROSS, None, lag), spreads=(spread,) * 3)
@@ -64,10 +66,10 @@ def _clipped(proposals, axis):
 
 
 def test_what_flights_leave_open_costs_gain():
-    _, sure = found("px4")
-    _, open_ = found("px4", WIDE)
-    _, more = found("px4", asked=AskedMargins(6.0, 60.0, 35.0))
-    _, late = found("px4", lag=0.08)
+    _, sure = found("crazyflie")
+    _, open_ = found("crazyflie", WIDE)
+    _, more = found("crazyflie", asked=AskedMargins(6.0, 60.0, 35.0))
+    _, late = found("crazyflie", lag=0.08)
     for other in (open_, more, late):
         assert other.roll.bandwidth_hz < 0.95 * sure.roll.bandwidth_hz
 
