@@ -16,18 +16,8 @@ from cpfls_cli.trajectory.legs import MoveOutcome, plan_moves
 from cpfls_cli.trajectory.planning import plan, repeated
 from cpfls_cli.trajectory.profile import LIMIT_NAMES, Limits
 from cpfls_cli.trajectory.settings import ExciteSettings, TrajectorySettings
-from tests.builders.gusty_flights import (
-    EVERY,
-    GRAVITY,
-    GUSTS,
-    LARGE,
-    MEMORY_S,
-    SMALL,
-    STEP_S,
-    Flight,
-    flown_along,
-    memory,
-)
+from tests.builders import gusty_flights
+from tests.builders.gusty_flights import EVERY, GRAVITY, GUSTS, LARGE, MEMORY_S, SMALL, STEP_S, Flight
 
 _DOUBLING = np.log([1.0, 1.0, 2.0, 4.0, 8.0])
 BAND_HZ = (0.5, 5.0)
@@ -135,12 +125,13 @@ def flown(mission, flights):
     heading = np.zeros((len(mission.position), 1))
     path = np.hstack([mission.position, mission.velocity, mission.acceleration, heading])
     rngs, samples = [np.random.default_rng([77, each.draw]) for each in flights], len(path)
+    memory = gusty_flights.memory
     pushes = [memory(rng, samples, MEMORY_S) * each.gusts for rng, each in zip(rngs, flights, strict=True)]
     shoves = [memory(rng, samples, np.ones(3)) * 0.06 * max(e.gusts) for rng, e in zip(rngs, flights, strict=True)]
     noise = [e.truth.gyro_noise * rng.standard_normal((samples, 3)) for rng, e in zip(rngs, flights, strict=True)]
     paths = np.repeat(path[:, None], len(flights), axis=1)
     air = (np.stack(each, axis=1) for each in (pushes, shoves, noise))
-    *_, rate, speed, _, _ = flown_along(flights, paths, *air)
+    *_, rate, speed, _, _ = gusty_flights.flown_along(flights, paths, *air)
     for number, (rng, each) in enumerate(zip(rngs, flights, strict=True)):
         measured = each.truth.speed_noise * speed[:, number].mean() * rng.standard_normal(speed[:, number].shape)
         yield rate[:, number], speed[:, number] + measured
