@@ -148,6 +148,7 @@ class Effect:
     order: int = 1000
     of_all_forces: bool = False  # Whether it has a lever for the forces of all other effects.
     trims: bool = False  # Whether it is always the same, so that a vehicle that hovers is trimmed for it.
+    moves: bool = False  # Whether runs that start from measured motion show it by the velocity alone.
     actuation: Actuation | None = None  # For effects between command and rotors: how they are simulated.
     # ``acts(see, p) -> Wrench`` at an instant, of its numbers by name. None for what changes only the log or the
     # actuators, or has a state of its own.

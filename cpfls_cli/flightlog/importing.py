@@ -81,8 +81,9 @@ def read_signals(
     spikes = repair.find_signal_spikes(table, settings)
     masked = {name: np.where(spikes[name], np.nan, values) for name, values in table.signals.items()}
     repaired = table if settings.spike_deviations is None else SignalTable(table.time, masked)
-    present = np.isfinite(np.hstack([*repaired.signals.values(), stretches.off_vertical(repaired, settings)]))
-    rows, incomplete_ends, beyond_gap = repair.longest_stretch(table.time, present, settings)
+    upright, steep = stretches.near_vertical(repaired, settings)
+    present = np.isfinite(np.hstack([*repaired.signals.values(), upright]))
+    rows, left = repair.longest_stretch(table.time, present, settings)
     table, repaired, scattered = _on_regular_stamps(table.rows(rows), repaired.rows(rows), flat=not stamped_hz)
     resting = stretches.rotors_at_rest(table, settings)
     slow = bandwidth.slow_signals(table, stamped_hz)
@@ -98,16 +99,15 @@ def read_signals(
     warnings = (
         *(*cut, *broken, *stretches.warn_of_values(counts), *dead, *stretches.warn_of_rest(table, resting, settings)),
         *(*bandwidth.warn_of_slow(slow, rate_hz), *bandwidth.warn_of_cut_offs(filtered, settings)),
-        *([f"{beyond_gap} rows beyond a gap are not used"] if beyond_gap else []),
-        *(*scattered, *hurried, *stretches.warn_of_angles(read.signals), *unknown),
+        *([f"{left['gap']} rows beyond a gap are not used"] if left["gap"] else []),
+        *(*steep, *scattered, *hurried, *stretches.warn_of_angles(read.signals), *unknown),
     )
-    dropped |= {"incomplete_ends": incomplete_ends, "gap": beyond_gap}
     return Imported(
         time=clock - clock[0],
         **converted | setpoints,
         samples_read=len(read.time),
         samples=len(clock),
-        dropped={reason: rows for reason, rows in dropped.items() if rows},
+        dropped={reason: rows for reason, rows in (dropped | left).items() if rows},
         **counts,
         gaps=int((np.diff(table.time) > 1.5 * np.median(np.diff(table.time))).sum()),
         longest_gap_s=float(np.diff(table.time).max()),
@@ -208,6 +208,13 @@ def _derived(signals: Imported) -> dict[str, Array]:
     derived = {} if body_rate is None else {"body_rate": body_rate}
     if signals.attitude is None or body_rate is None:
         return derived
+    steep = np.flatnonzero(np.abs(signals.attitude[:, 1]) > stretches.STEEPEST_PITCH)
+    if len(steep):
+        raise ComputationError(
+            f"pitch comes within a degree of +-90 degrees at {signals.time[steep[0]]:.3f} s of the flight, where"
+            " Euler rates are not defined: cut that part off with import.crop_s, or set import.gap_rule to"
+            " longest-part; a spike is interpolated with import.spike_deviations"
+        )
     attitude_rate = rotations.attitude_rate(signals.attitude, body_rate)
     derived |= {"attitude_rate": attitude_rate, "attitude_acceleration": derivative(signals.time, attitude_rate)}
     if signals.body_torque is not None:

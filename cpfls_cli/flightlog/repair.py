@@ -152,7 +152,7 @@ def _behind(time: Array) -> BoolArray:
     return np.asarray(time < np.maximum.accumulate(time), dtype=bool)
 
 
-def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> tuple[slice, int, int]:
+def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -> tuple[slice, dict[str, int]]:
     """Find the longest stretch in which no column lacks values for longer than `gap_s`, as `gap_rule` has it.
 
     `present`, shape (sample, column), is where each column has a value. Given back are the rows, how many are left out
@@ -181,7 +181,7 @@ def longest_stretch(time: Array, present: BoolArray, settings: ImportSettings) -
         )
     first, last = max(stretches, key=lambda run: float(time[run[1]] - time[run[0]]))
     incomplete = first_full + len(time) - 1 - last_full
-    return slice(first, last + 1), incomplete, len(time) - incomplete - (last + 1 - first)
+    return slice(first, last + 1), {"incomplete_ends": incomplete, "gap": len(time) - incomplete - (last + 1 - first)}
 
 
 def _slow_log(time: Array, present: BoolArray, settings: ImportSettings) -> str | None:

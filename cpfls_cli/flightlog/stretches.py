@@ -38,7 +38,8 @@ _STRAIGHT = 1e-3  # Bend of a straight line by the rounding of a file, as a shar
 _NEVER_SATURATED = {"quaternion", "voltage"}
 # A quarter turn, and a margin for noise and filters.
 _LARGEST_PITCH = pi / 2 + 0.05
-_STEEPEST_PITCH = pi / 2 - pi / 180
+STEEPEST_PITCH = pi / 2 - pi / 180
+"""Beyond it Euler rates are not to be had, rad."""
 _FULL_TURN = 7.0  # Somewhat more than a full turn, rad.
 _ANGLE_QUANTILE = 0.99
 
@@ -293,25 +294,23 @@ def refuse_steep_pitch(signals: Mapping[str, Array]) -> None:
         )
 
 
-def off_vertical(table: SignalTable, settings: ImportSettings) -> Array:
-    """Mark with NaN, shape (time, 1), what is near a pitch of a quarter turn, where Euler rates are not defined."""
+def near_vertical(table: SignalTable, settings: ImportSettings) -> tuple[Array, list[str]]:
+    """Mark with NaN, shape (time, 1), what is near a vertical nose, where it is to be a gap; and say when that is."""
     attitude, quaternion = table.signals.get("attitude"), table.signals.get("quaternion")
     pitch = np.zeros(len(table.time)) if attitude is None else np.nan_to_num(attitude[:, 1])
     if attitude is None and quaternion is not None:
         w, x, y, z = np.roll(quaternion, settings.quaternion_order == "xyzw", axis=1).T
         squared = np.maximum((quaternion**2).sum(axis=1), np.finfo(float).tiny)
         pitch = np.arcsin(np.clip(np.nan_to_num(2 * (w * y - z * x) / squared), -1.0, 1.0))
-    # What is beyond a quarter turn is an angle in another unit.
-    steep = np.flatnonzero((np.abs(pitch) > _STEEPEST_PITCH) & (np.abs(pitch).max() <= _LARGEST_PITCH))
-    if len(steep) and settings.gap_rule == "stop":
-        raise InputError(
-            f"pitch comes within a degree of +-90 degrees at {table.time[steep[0]]:.3f} s, where Euler rates are not"
-            " defined: crop with import.crop_s, or set import.gap_rule to longest-part"
-        )
-    until = np.append(table.time[steep], np.inf)[np.searchsorted(table.time[steep], table.time)]
-    since = np.append(-np.inf, table.time[steep])[np.searchsorted(table.time[steep], table.time, side="right")]
+    steep = table.time[np.abs(pitch) > STEEPEST_PITCH]
+    until = np.append(steep, np.inf)[np.searchsorted(steep, table.time)]
+    since = np.append(-np.inf, steep)[np.searchsorted(steep, table.time, side="right")]
     near = np.minimum(until - table.time, table.time - since) <= settings.gap_s
-    return np.where(near, np.nan, 0.0)[:, None]
+    # What is beyond a quarter turn is an angle in another unit; a nose that is always up leaves nothing.
+    if settings.gap_rule == "stop" or not steep.size or np.abs(pitch).max() > _LARGEST_PITCH or (~near).sum() < 2:
+        return np.zeros((len(near), 1)), []
+    said = f"pitch comes within a degree of +-90 degrees at {steep[0]:.3f} s, where Euler rates are not defined"
+    return np.where(near, np.nan, 0.0)[:, None], [f"{said}: {near.sum()} rows around that are a gap"]
 
 
 def warn_of_angles(signals: Mapping[str, Array]) -> tuple[str, ...]:

@@ -204,9 +204,8 @@ _SEEN = {"body_rate", "velocity", "rotor_speed", "thrust"}
 
 def needs_velocity(block: str) -> bool:
     """Tell whether a block can only be found where the velocity was measured."""
-    return block in (*LEARNED, "thrust_factor") or (
-        block in CATALOGUE and bool(CATALOGUE[block].needs & {"velocity", "force"})
-    )
+    known = CATALOGUE.get(block)
+    return block in (*LEARNED, "thrust_factor") or bool(known and (known.moves or known.needs & {"velocity", "force"}))
 
 
 def of_no_command(commanded: Iterable[bool]) -> set[str]:

@@ -11,7 +11,7 @@ import numpy as np
 from cpfls_cli.artifacts.diagnosis import Diagnosis
 from cpfls_cli.config.study import Study, generator, settings_of
 from cpfls_cli.effects.effect import Effect
-from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS
+from cpfls_cli.effects.registry import CATALOGUE, VEHICLE_NUMBERS, acting
 from cpfls_cli.effects.registry import effect as find
 from cpfls_cli.effects.signals import TRAINING, in_roles
 from cpfls_cli.errors import ComputationError, InputError, SettingError, about
@@ -100,7 +100,8 @@ def planned(run: Run, diagnosis: Path | None = None) -> PlannedPath | None:
 def _effects(study: Study) -> list[Effect]:
     key = "trajectory.next_flight.separate"
     with about(key, InputError):
-        effects = [find(name) for name in dict.fromkeys(study.trajectory.next_flight.separate)]
+        names = [find(name).name for name in dict.fromkeys(study.trajectory.next_flight.separate)]
+    effects = [acting(name, study.vehicle) for name in names]
     require_visible(effects, key, study.vehicle)
     return effects
 
@@ -188,7 +189,7 @@ def _open_effects(
         return rivals, []
     # Numbers of the vehicle are free in every fit: of their rivals it is asked whether they show.
     of_numbers = [each for each in found.alternatives if each.instead_of == VEHICLE_NUMBERS.name]
-    hidden = [CATALOGUE[each.name] for each in of_numbers or found.not_excited if each.name in visible]
+    hidden = [acting(each.name, study.vehicle) for each in of_numbers or found.not_excited if each.name in visible]
     unseen = [each for each in hidden if not all(each.missing(flight.signals) for flight in flights)]
     if asked:
         return [], []

@@ -83,6 +83,7 @@ EFFECT = Effect(
         ),
     ),
     optional=4,
+    moves=True,
     needs=frozenset({"rotor_speed"}),
     excitation="yaw effort to both sides, changes of thrust, and roll and pitch, with the accelerometer in the log",
     rivals={

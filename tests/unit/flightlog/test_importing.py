@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cpfls_cli.errors import InputError
-from cpfls_cli.flightlog.importing import apply_rotor_lag, read_signals
+from cpfls_cli.errors import ComputationError, InputError
+from cpfls_cli.flightlog.importing import apply_rotor_lag, import_log, read_signals
 from cpfls_cli.flightlog.settings import ImportSettings, SignalMap
 
 RATE = {"body_rate": SignalMap(columns=("p", "q", "r"), unit="rad/s")}
@@ -122,15 +122,16 @@ def looped(quaternion):
 @LOOP
 def test_a_pitch_of_a_quarter_turn_stops_and_says_how_to_go_on(quaternion):
     columns, mapped = looped(quaternion)
-    with pytest.raises(InputError, match=r"within a degree of \+-90 degrees at 0\.660 s.*gap_rule to longest-part"):
-        read_signals(columns, settings(**mapped))
+    with pytest.raises(ComputationError, match=r"of \+-90 degrees at 0\.660 s.*gap_rule to longest-part"):
+        import_log(columns, settings(**mapped))
 
 
 @LOOP
 def test_or_the_longest_part_without_one_is_kept(quaternion):
     columns, mapped = looped(quaternion)
-    read = read_signals(columns, settings(gap_rule="longest-part", **mapped))
+    read = import_log(columns, settings(gap_rule="longest-part", **mapped))
     assert read.span_s == pytest.approx((0.85, 2.0))
+    assert any("within a degree of +-90 degrees at 0.660 s" in warning for warning in read.warnings)
     np.testing.assert_allclose(read.attitude[:, 1], 0.1, atol=1e-9)
 
 
@@ -251,8 +252,19 @@ def test_degrees_taken_for_radians_stop_at_the_pitch():
 
 def test_a_nose_straight_up_is_no_degrees():
     columns, mapped = attitude(log(), pitch=np.pi / 2 + 0.01 + 1e-3 * log()["p"])
-    with pytest.raises(InputError, match=r"pitch comes within a degree of \+-90 degrees"):
-        read_signals(columns, settings(signals=mapped))
+    assert read_signals(columns, settings(signals=mapped)).warnings == ()
+
+
+@pytest.mark.parametrize("rule", ["stop", "longest-part"])
+@pytest.mark.parametrize("wrong", [None, 170])
+def test_a_vertical_nose_does_not_pass_because_of_a_wrong_value_elsewhere(rule, wrong):
+    """Nor where it is always up, which leaves nothing to be a gap."""
+    roll, pitch = np.zeros(201), np.full(201, np.pi / 2)
+    if wrong is not None:
+        pitch[20:], pitch[wrong], roll[140:] = 0.1, 5.0, np.nan
+    columns, mapped = attitude(log(), roll=roll, pitch=pitch)
+    with pytest.raises(ComputationError, match=r"pitch comes within a degree"):
+        import_log(columns, settings(signals=mapped, gap_rule=rule))
 
 
 def test_a_spike_of_the_pitch_that_is_interpolated_is_no_degrees():
