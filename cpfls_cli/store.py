@@ -22,6 +22,7 @@ from cpfls_cli.arrays import Array
 from cpfls_cli.artifacts.gate import (
     CONFIG,
     INPUTS,
+    MAKERS,
     PART,
     SCHEMA_VERSION,
     DatasetSpec,
@@ -260,9 +261,9 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
     with opened_file(path) as file, patient(path):
         wanted, held = kind.FORMAT, held_format(path, file)  # type: ignore[attr-defined]
         if held != wanted:
-            makers = " or ".join(f"`cpfls {each}`" for each in getattr(kind, "MADE_BY", "").split(" or ") if each)
-            made_by = f" (made by {makers})" if makers else ""
-            raise InputError(f"{path}: is a {held}; this command needs a {wanted}{made_by}")
+            name = wanted.removeprefix("cpfls/")
+            made = f"made by `cpfls {MAKERS.get(name, name)}`"
+            raise InputError(f"{path}: is a {held}; this command needs a {wanted} ({made})")
         origin, missing = identified(path, file)[1], list[str]()
         given = _read(kind, file, missing, rows)
     if missing:

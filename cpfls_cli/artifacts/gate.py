@@ -164,7 +164,7 @@ def held_format(path: Path, file: h5py.File) -> str:
     return name
 
 
-_MAKERS = {
+MAKERS = {
     "flight": "simulate` or `cpfls import",
     "twin": "simulate",
     "selection": "reduce",
@@ -176,8 +176,10 @@ _MAKERS = {
     "identified": "identify",
     "model": "identify",
     "flight-numbers": "changed",
+    "checkpoint": "identify",
+    "vehicle-checkpoint": "vehicle",
 }
-"""Commands that made files of earlier versions, by kind or format, where they are not called alike."""
+"""Commands that made files of this version and earlier ones, by kind or format, where they are not called alike."""
 
 
 def other_version(path: Path, file: h5py.File) -> InputError:
@@ -191,7 +193,7 @@ def other_version(path: Path, file: h5py.File) -> InputError:
     name = str(file.attrs.get("kind", "") or file.attrs.get("format", "")).removeprefix("cpfls/")
     return InputError(
         f"{path}: was written by cpfls {version}, whose files this version does not read; make it again with "
-        f"`cpfls {_MAKERS.get(name, name)}`"
+        f"`cpfls {MAKERS.get(name, name)}`"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
@@ -99,10 +100,12 @@ def take_inputs(job: Any, inputs: Mapping[str, Path]) -> dict[str, InputFile]:
 def _check_input(path: Path) -> None:
     if not path.exists():
         raise InputError(f"{path}: no such file")
+    if path.is_dir():
+        bags = [own.name for kind in ("*.db3", "*.mcap") for own in sorted(path.glob(kind))]
+        inside = f"of a ROS 2 bag name the file in it: {', '.join(bags)}" if bags else ""
+        raise InputError(f"{path}: is a folder, not a file; {inside or f'give its files: {shlex.quote(str(path))}/*'}")
     if not path.is_file():
-        bags = [own.name for kind in ("*.db3", "*.mcap") for own in sorted(path.glob(kind))] if path.is_dir() else []
-        remedy = f"; of a ROS 2 bag name the file in it: {', '.join(bags)}" if bags else ""
-        raise InputError(f"{path}: is a {'folder' if path.is_dir() else 'device or a pipe'}, not a file{remedy}")
+        raise InputError(f"{path}: is a device or a pipe, not a file")
 
 
 def origin_before(study: Study, inputs: Mapping[str, InputFile], stage: str = "checkpoint") -> Origin:

@@ -11,7 +11,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
 from typer.core import TyperGroup
@@ -181,17 +181,19 @@ def refuse_overrides(common: Common, *, given: bool = True) -> None:
 
 
 def check_order(command: str, arguments: Mapping[str, Any], output: Path | None) -> None:
-    """Refuse arguments that do not begin with the config where one is asked for, and a log that is none."""
+    """Refuse a file in the place of another: of the config, of a model before flights, of a log."""
     from cpfls_cli.cli.terminal import messages_for_errors
 
     given = [path for value in arguments.values() for path in (value if isinstance(value, list) else [value]) if path]
-    # Of a log alone gains are found too.
-    if arguments.get("config") is None or (command == "tune" and len(given) == 1):
-        return
+    logs = arguments.get("logs") or [path for path in (arguments.get("log"),) if path]
     with messages_for_errors():
-        refuse_misplaced_config(command, given, output)
-        if "log" in arguments:
-            refuse_misplaced_log(arguments["log"])
+        # Of a log alone gains are found too.
+        if arguments.get("config") is not None and not (command == "tune" and len(given) == 1):
+            refuse_misplaced_config(command, given, output)
+            if arguments.get("model") is not None and _what(given[1]) == "a log":
+                _refuse_exchanged(command, given, 1, _MODELS, "model comes before it", output)
+        for path in logs:
+            refuse_misplaced_log(path)
 
 
 WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
@@ -242,83 +244,74 @@ def sheet(indent: str = "") -> str:
 
 
 _CONFIGS = (".yaml", ".yml")
+_MODELS = ("a cpfls/extended", "a cpfls/identified", "a cpfls/vehicle")
 
-Kind = Literal["log", "artifact", "config"]
 
-
-def _kind(path: Path) -> Kind | None:
-    """Tell what a file is: by what it holds, then by its name."""
+def _what(path: Path) -> str | None:
+    """Say what a file is, by what it holds, then by its name; None where that is not known."""
     if not path.is_file():
         return None
-    if _format(path) is not None:
-        return "artifact"
-    if is_log(path):
-        # A log may end in .json, and so may a simulator's frame.
-        return None if path.suffix.lower() == ".json" and _is_simulator_file(path) else "log"
-    return "config" if path.suffix.lower() in _CONFIGS else None
+    if is_hdf5(path):
+        from cpfls_cli.artifacts.gate import format_name
 
-
-def _is_simulator_file(path: Path) -> bool:
+        if (held := format_name(path)) is not None:
+            return f"a {held}"
+    suffix, log = path.suffix.lower(), "a log" if is_log(path) else None
+    # A simulator's frame may end in .json as a log does.
+    if suffix in _CONFIGS or (log and suffix != ".json"):
+        return log or "a config"
     from cpfls_cli.simulators.formats import is_simulator_file
 
-    return is_simulator_file(path)
-
-
-def _format(path: Path) -> str | None:
-    """Tell the format of an artifact; None for any other file, which is not opened as one."""
-    if not is_hdf5(path):
-        return None
-    from cpfls_cli.artifacts.gate import format_name
-
-    return format_name(path)
+    return "a simulator's file" if is_simulator_file(path) else log
 
 
 def refuse_misplaced_log(path: Path) -> None:
-    """Refuse an artifact or a config in the place of a log."""
-    kind = _kind(path)
-    if kind == "artifact":
-        raise InputError(f"{path}: is a {_format(path)}, not a log: it needs no import; `cpfls info {path}` shows it")
-    if kind == "config":
-        raise InputError(f"{path}: is a config, not a log; first the config, then the log")
+    """Refuse another file in the place of a log."""
+    what = _what(path)
+    if what not in (None, "a log"):
+        shown = f": it needs no import; `cpfls info {path}` shows it" if what.startswith("a cpfls/") else ""
+        raise InputError(f"{path}: is {what}, not a log{shown}")
 
 
 def refuse_misplaced_config(command: str, given: Sequence[Path], output: Path | None) -> None:
-    """Refuse a log or an artifact in the place of the config, and give the command with the two exchanged.
+    """Refuse another file in the place of the config, and give the command with the two exchanged.
 
     `given` are its arguments, the config first.
     """
-    kind = _kind(given[0])
-    if command == "gap" and kind == "artifact" and _format(given[0]) == "cpfls/vehicle":
+    what, wanted = _what(given[0]), ["a config"]
+    if command == "gap":
+        wanted += ["a simulator's file", "a cpfls/vehicle"]
+    if what in (None, *wanted):
         return
-    if kind not in ("log", "artifact"):
-        if kind is None and command != "gap" and given[0].is_file():
-            _refuse_simulator_file(given[0])
-        return
-    what = "a log" if kind == "log" else f"a {_format(given[0])}"
-    config = next((path for path in given if _kind(path) == "config"), None)
-    if config is not None:
-        exchanged = [config, *(given[0] if path == config else path for path in given[1:])]
-        words = ["cpfls", command, *map(str, exchanged), *([] if output is None else ["-o", str(output)])]
-        raise ConfigError(f"{given[0]}: is {what}, and the config comes first: {shlex.join(words)}")
-    made = f"`cpfls init {shlex.quote(str(given[0]))} -o study.yaml` writes one for it, and " if kind == "log" else ""
-    raise ConfigError(f"{given[0]}: is {what}, not a config (YAML); {made}`cpfls config` prints a commented default")
+    _refuse_exchanged(command, given, 0, wanted, "config comes first", output)
+    name, made = shlex.quote(str(given[0])), "`cpfls config` prints a commented default"
+    if what == "a simulator's file":
+        made = f"`cpfls init --from {name} -o study.yaml` writes one of it"
+    elif what == "a log":
+        made = f"`cpfls init {name} -o study.yaml` writes one for it, and {made}"
+    raise ConfigError(f"{given[0]}: is {what}, not a config (YAML); {made}")
 
 
-def _refuse_simulator_file(path: Path) -> None:
-    if _is_simulator_file(path):
-        made = shlex.join(["cpfls", "init", "--from", str(path), "-o", "study.yaml"])
-        raise ConfigError(f"{path}: is a simulator's file, not a config (YAML); `{made}` writes one of it")
+def _refuse_exchanged(
+    command: str, given: Sequence[Path], place: int, wanted: Sequence[str], why: str, output: Path | None
+) -> None:
+    """Refuse a file where one that comes later belongs, and give the command with the two exchanged."""
+    for other, path in enumerate(given[place + 1 :], place + 1):
+        if _what(path) in wanted:
+            paths = [*given[:place], path, *given[place + 1 : other], given[place], *given[other + 1 :]]
+            words = ["cpfls", command, *map(str, paths), *([] if output is None else ["-o", str(output)])]
+            raise ConfigError(f"{given[place]}: is {_what(given[place])}, and the {why}: {shlex.join(words)}")
 
 
 def what_it_is(path: Path) -> str | None:
     """Say of a file in the place of an artifact what it is and what to do with it; None where that is not known."""
-    kind = _kind(path)
-    if kind == "log":
+    what = _what(path)
+    if what == "a log":
         flight = path.name.partition(".")[0] + ("-flight.h5" if path.suffix == ".h5" else ".h5")
         words = ["cpfls", "import", "CONFIG", str(path), "-o", flight]
         return f"{path}: is a log, and this takes what cpfls made: {shlex.join(words)}"
-    if kind == "config":
-        shows = shlex.join(["cpfls", "config", str(path)])
-        return f"{path}: is a config, and this takes what cpfls made; `{shows}` shows it"
-    foreign = foreign_file(path) if kind is None and path.is_file() else None
-    return None if foreign is None else f"{path}: {foreign}"
+    if what in ("a config", "a simulator's file"):
+        shows = f"; `{shlex.join(['cpfls', 'config', str(path)])}` shows it" if what == "a config" else ""
+        return f"{path}: is {what}, and this takes what cpfls made{shows}"
+    foreign = foreign_file(path) if what is None and path.is_file() else None
+    return foreign and f"{path}: {foreign}"

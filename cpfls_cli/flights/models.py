@@ -136,6 +136,8 @@ def read_base(path: Path | None, study: Study) -> VehicleModel:
         return rigid
     if is_found(path):
         return read_model(path, study)
+    if (held := format_name(path)) not in (None, IdentifiedModel.FORMAT):
+        raise InputError(f"{path}: is a {held}; this command needs a model made by `cpfls identify` or `cpfls vehicle`")
     record = identified_in(path)
     require_vehicle_of(path, study)
     return replace(rigid, fuzzy=record.functions)

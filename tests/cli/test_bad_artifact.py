@@ -81,7 +81,9 @@ def test_foreign_hdf5(refuse, study, tmp_path):
 def test_missing_file_and_folder(refuse, study, tmp_path):
     words = ("-o", tmp_path / "out.h5")
     assert refuse("reduce", study, tmp_path / "none.h5", *words) == [f"{tmp_path / 'none.h5'}: no such file"]
-    assert refuse("reduce", study, tmp_path, *words) == [f"{tmp_path}: is a folder, not a file"]
+    assert refuse("reduce", study, tmp_path, *words) == [
+        f"{tmp_path}: is a folder, not a file; give its files: {tmp_path}/*"
+    ]
     assert refuse("info", tmp_path / "none.h5") == [f"{tmp_path / 'none.h5'}: no such file"]
     assert refuse("check", tmp_path) == [f"{tmp_path}: is a folder, not an artifact"]
 
@@ -343,14 +345,34 @@ def test_a_log_before_the_config_is_answered_with_the_command_that_works(cpfls, 
         (("replay", "LOG", "vehicle", "CONFIG"), "replay CONFIG vehicle LOG"),
         (("identify", "FLIGHT", "CONFIG"), "identify CONFIG FLIGHT"),
         (("report", "FLIGHT", "CONFIG"), "report CONFIG FLIGHT"),
+        (("gap", "LOG", "SIMULATOR"), "gap SIMULATOR LOG"),
     ],
 )
 def test_of_all_commands_with_a_config(refuse, pipeline, log, log_study, tmp_path, words, meant):
-    files = {"LOG": log, "CONFIG": log_study, "FLIGHT": pipeline.flight}
+    simulator = put_file(tmp_path / "uav.sdf", b'<sdf version="1.9"></sdf>')
+    files = {"LOG": log, "CONFIG": log_study, "FLIGHT": pipeline.flight, "SIMULATOR": simulator}
     (line,) = refuse(*(files.get(word, word) for word in words), "-o", tmp_path / "out")
     for word, path in files.items():
         line = line.replace(str(path), word)
     assert line.endswith(f"and the config comes first: cpfls {meant} -o {tmp_path / 'out'}")
+
+
+def test_a_flight_before_its_model_is_answered_with_the_command_that_works(refuse, pipeline, log, log_study, tmp_path):
+    (line,) = refuse("replay", log_study, log, pipeline.model, "-o", tmp_path / "out.h5")
+    meant = f"cpfls replay {log_study} {pipeline.model} {log} -o {tmp_path / 'out.h5'}"
+    assert line == f"{log}: is a log, and the model comes before it: {meant}"
+
+
+@pytest.mark.parametrize("command", ["look", "init"])
+def test_what_is_no_log_is_named_where_a_log_belongs(refuse, pipeline, log, log_study, tmp_path, command):
+    simulator = put_file(tmp_path / "uav.sdf", b'<sdf version="1.9"></sdf>')
+    shows = f": it needs no import; `cpfls info {pipeline.flight}` shows it"
+    for path, what in (
+        (pipeline.flight, f"a cpfls/flight, not a log{shows}"),
+        (log_study, "a config, not a log"),
+        (simulator, "a simulator's file, not a log"),
+    ):
+        assert refuse(command, log, path, "-o", tmp_path / "out") == [f"{path}: is {what}"]
 
 
 def test_a_log_where_no_config_was_given(refuse, log, tmp_path):
@@ -364,7 +386,8 @@ def test_a_log_where_no_config_was_given(refuse, log, tmp_path):
 @pytest.mark.parametrize("command", ["info", "check", "export", "report", "replay", "identify", "reduce"])
 def test_a_log_where_an_artifact_belongs(refuse, log, study, tmp_path, command):
     given = {"info": (log,), "check": (log,), "export": (log,), "replay": (study, log, log)}
-    output = () if command in ("info", "check") else ("-o", tmp_path / "out.json")
+    output = () if command in ("info", "check") else ("-o", tmp_path / "out.h5")
+    output = ("-o", tmp_path / "out.json") if command in ("export", "report") else output
     (line,) = refuse(command, *given.get(command, (study, log)), *output)
     assert line == f"{log}: is a log, and this takes what cpfls made: cpfls import CONFIG {log} -o log.h5"
 
@@ -380,7 +403,7 @@ def test_what_needs_no_import_is_said_so(refuse, pipeline, study, log_study, tmp
         f"{pipeline.flight}: is a cpfls/flight, not a log: it needs no import; `cpfls info {pipeline.flight}` shows it"
     ]
     (line,) = refuse("import", log_study, study, "-o", tmp_path / "out.h5")
-    assert line == f"{study}: is a config, not a log; first the config, then the log"
+    assert line == f"{study}: is a config, not a log"
 
 
 def test_a_flight_where_no_config_was_given(refuse, pipeline):
