@@ -41,6 +41,8 @@ PAGE = "report.html"
 """File of the page of a folder with one answer."""
 _INDEX = "index"
 """File of the page over several results, and the end of the name of its template."""
+_OTHERS = {".csv", ".html", ".json", ".md", ".yaml", ".yml"}
+"""Suffixes of files that are no results."""
 
 
 @dataclass
@@ -267,9 +269,10 @@ class Stage:
             if isinstance(found, Outcome):
                 return found
             results = dict(found) if self.folder else {"": found}
-            if self.fills and run.writes:
-                run.last_words = f"{run.output / PAGE}: all of it, with figures{run.last_words}"
             several = len(results) > 1
+            if run.writes and (self.fills or self.folder):
+                first = PAGE if self.fills else f"{_INDEX if several else next(iter(results))}.html"
+                run.last_words = f"{run.output / first}: all of it, with figures{run.last_words}"
             texts = [*([self.text(results, f"_{_INDEX}")] if several else [])]
             # Of what is refused among several, the index says all.
             shown = {name: each for name, each in results.items() if not (several and getattr(each, "refused", False))}
@@ -325,8 +328,10 @@ class Stage:
         run.outputs = [output]
         if not self.folder:
             check_output(output, run.force, run.inputs)
+            if hasattr(self.kind, "FORMAT") and output.suffix.lower() in _OTHERS:
+                raise InputError(f"{output}: the result is an HDF5 file; let its name end in .h5")
             return
-        if output.suffix in {".html", ".h5", ".md", ".json"}:
+        if output.suffix in {".h5", *_OTHERS}:
             raise InputError(
                 f"{output}: -o names a folder, which gets a page for each log: -o {output.with_suffix('')}"
             )

@@ -212,6 +212,8 @@ def _with_file(run: Run, found: Diagnosis, of: VehicleOf, split: FlightSplit) ->
     vehicle = run.study.vehicle
     said, files = corrected(of, vehicle, found, split.training)
     run.texts.update({run.output / name: text for name, text in files.items()})
+    if said.changes:
+        run.last_words = f"; {joined([str(run.output / name) for name in files])}: your file, corrected"
     held, horizon = split.held_out, run.study.gap.horizon_s
     try:
         pairs = played(of, files, vehicle, split.training, held, run.study.gap)

@@ -11,6 +11,7 @@ import typer
 
 from cpfls_cli.artifacts.model import AnyModel
 from cpfls_cli.config.study import Study
+from cpfls_cli.errors import InputError
 from cpfls_cli.files import read_content
 from cpfls_cli.pages.comparison import differing
 from cpfls_cli.pages.page import WORDS, Page, report_page
@@ -20,19 +21,21 @@ from cpfls_cli.report.source import Source, Sources, source_of_result, unique_la
 from cpfls_cli.stage import Run, kind_of, stage, stage_that_made
 from cpfls_cli.store import Origin, read
 from cpfls_cli.version import __version__
+from cpfls_cli.words import joined
 
 ArtifactsArgument = Annotated[list[Path], typer.Argument(metavar="ARTIFACT", help="Artifacts to report on.")]
 FormOption = Annotated[
-    Form | None,
-    typer.Option("--format", help="Form of the report; default: by the suffix of FILE (.md, .json), else html."),
+    Form | None, typer.Option("--format", help="Form of the report; default: by the suffix of FILE.")
 ]
+_FORMS = {".html": Form.HTML, ".htm": Form.HTML, ".md": Form.MARKDOWN, ".markdown": Form.MARKDOWN, ".json": Form.JSON}
 
 
 @stage(dict, study=True, words=WORDS)
 def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> dict[str, Any] | None:
     """Write a report about artifacts."""
-    suffix = run.output.suffix.lower()
-    form = form or {".md": Form.MARKDOWN, ".markdown": Form.MARKDOWN, ".json": Form.JSON}.get(suffix, Form.HTML)
+    form = form or _FORMS.get(run.output.suffix.lower())
+    if form is None:
+        raise InputError(f"{run.output}: its suffix names no form: {joined(list(_FORMS), 'or')}; else give --format")
     inputs = run.take({str(path): path for path in artifacts})
     if len(artifacts) == 1 and not (own := stage_that_made(artifacts[0])).study:
         return _written(run, own.report(artifacts[0], form))

@@ -43,6 +43,17 @@ def test_output_that_cannot_be_a_file(refuse, study, tmp_path, force):
         assert refuse("trajectory", study, "-o", output, *force) == [f"{output}: {message}"]
 
 
+def test_a_name_that_promises_another_file_is_refused(refuse, pipeline, study, tmp_path):
+    for suffix in (".csv", ".json"):
+        output = tmp_path / f"path{suffix}"
+        (line,) = refuse("trajectory", study, "-o", output)
+        assert line == f"{output}: the result is an HDF5 file; let its name end in .h5"
+    output = tmp_path / "page.pdf"
+    (line,) = refuse("report", study, pipeline.trajectory, "-o", output)
+    forms = ".html, .htm, .md, .markdown or .json"
+    assert line == f"{output}: its suffix names no form: {forms}; else give --format"
+
+
 def test_folder_without_permission(refuse, study, tmp_path, monkeypatch):
     # Root may write anywhere, so the refusal of the system is put in its place.
     def refuse_to_make(**_):

@@ -212,7 +212,8 @@ def test_several_results_have_a_page_each_and_an_index(tmp_path):
     ]
     assert "<h1>2 things</h1>" in (tmp_path / "out" / "index.html").read_text()
     assert "<h1>A b</h1>" in (tmp_path / "out" / "b.html").read_text()
-    assert [block.text for block in outcome.blocks] == ["2 things", "- a", "- b", "A a", "A b", "all", "of b"]
+    page = f"{tmp_path / 'out' / 'index.html'}: all of it, with figures"
+    assert [block.text for block in outcome.blocks] == ["2 things", "- a", "- b", "A a", "A b", page, "all", "of b"]
     assert outcome.summary["b"]["name"] == "b"
     assert run.origin("look", "a").cautions == ("all",)
     assert run.origin("look", "b").cautions == ("all", "of b")
@@ -266,11 +267,21 @@ def test_info_check_and_report_know_results(cpfls, looked):
     assert (looked.parents[1] / "r.html").read_text() == looked.with_suffix(".html").read_text()
 
 
+def test_look_ends_with_the_page_to_open(cpfls, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("log.csv", "other.csv"):
+        write_csv(tmp_path / name, flat_log(flight(seconds=12.0)))
+    for folder, logs, first in (("one", ("log.csv",), "log.html"), ("two", ("log.csv", "other.csv"), "index.html")):
+        assert f"\n{folder}/{first}: all of it, with figures\n" in cpfls.done("look", *logs, "-o", folder).stdout
+        assert (tmp_path / folder / first).is_file()
+    assert "all of it" not in cpfls.done("look", "log.csv").stdout
+
+
 def test_other_commands_refuse_results_in_one_sentence(cpfls, looked):
     log = looked.parents[1] / "log.csv"
     for words, message in (
         (("export", looked, "-o", "x.json"), "is a cpfls/look; this command needs a model"),
-        (("look", looked), "is an artifact of this program"),
+        (("look", looked), f"{looked}: is a cpfls/look, not a log"),
         (("look", log, "-o", "x.html"), "-o x\n"),
         (("look", log, "-o", "out"), "--force"),
     ):
