@@ -215,13 +215,13 @@ def pictures(figures: Mapping[str, Callable[[Any], str]], prefix: str, given: An
 
 def figure_html(picture: Picture) -> str:
     """Write a figure, what it draws folded away as a table."""
-    svg: str = picture.svg
+    plot = f'<div class="plot">{picture.svg}</div>'
     if not picture.rows:
-        return svg
+        return plot
     head = "".join(f'<th scope="col">{title}</th>' for title in ("Panel", "Curve", "x", "y"))
     rows = "".join(f"<tr>{''.join(f'<td>{escape(visible(cell))}</td>' for cell in row)}</tr>" for row in picture.rows)
     table = f'<div class="table" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-    return f'<div class="plot">{svg}</div><details><summary>Numbers</summary>{table}</details>'
+    return f"{plot}<details><summary>Numbers</summary>{table}</details>"
 
 
 def _rows(figure: Figure) -> Iterator[tuple[str, ...]]:

@@ -162,6 +162,12 @@ def test_who_does_not_see_a_figure_reads_its_panels_curves_and_their_extremes():
     assert "<b>" not in page
 
 
+def test_a_figure_without_numbers_scrolls_on_a_narrow_page_too():
+    picture = plot("one", "", "what", 2.0, lambda figure: figure.subplots()).picture
+    assert not picture.rows
+    assert figure_html(picture).startswith('<div class="plot"><svg ')
+
+
 def test_no_figure_is_left_open():
     plot("name", "", "what", 2.0, draw).picture.figure()
     assert not plt.get_fignums()
