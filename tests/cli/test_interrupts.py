@@ -63,6 +63,8 @@ def test_signal_during_the_search_keeps_what_can_be_resumed(pipeline, study, tmp
     assert process.wait().returncode == code
     assert messages.endswith("the search was interrupted; the same command with --resume goes on\n")
     assert "Traceback" not in messages
+    assert "--resume" in (answer := printed.read_text())
+    assert "identification.validation.enabled" not in answer
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.h5", "model.h5.checkpoint"]
 
 
