@@ -527,7 +527,7 @@ def _badly_explained(diagnostics: FitDiagnostics) -> Iterator[str]:
 
 
 def _percent(shares: Array) -> str:
-    return " ".join(f"{100 * share:.3g}" for share in shares) + " %"
+    return ", ".join(f"{100 * share:.3g}" for share in shares) + " %"
 
 
 def _outside(diagnostics: FitDiagnostics) -> Iterator[str]:

@@ -134,7 +134,7 @@ _SURE_SHARE, _SURE_HOVER, _SURE_EXPONENT = 0.05, 0.03, 0.3
 _LACKING = {
     "autopilot": "the control law of what wrote it is not known",
     "version": "gains of this version have another meaning",
-    "parameters": "it states no gains",
+    "parameters": "the log states no gains",
 }
 _OF_AXIS = {
     "weak": "what a command does is not identified",
@@ -409,7 +409,9 @@ def next_steps(found: Found, answers: Sequence[Answer]) -> tuple[NextStep, ...]:
     ranked = sorted(wanted.items(), key=lambda own: (own[0] != cause, -len(own[1])))
     flights = [NextStep(what=text, why=", ".join(questions)) for text, questions in ranked]
     slow = [each for each in open_ if each.log and not each.log.startswith("also ")]
-    how = "faster" if found.settings or _gyroscope_hz(found.flight) >= _LEAST_HZ else f"at {_LEAST_HZ:g} Hz or more"
+    least = _LEAST_HZ if _gyroscope_hz(found.flight) < _LEAST_HZ else _WHOLE_SPECTRUM_HZ
+    asked = any("gyroscope" in each.log for each in slow) or least == _LEAST_HZ
+    how = f"at {least:g} Hz or more" if asked and not found.settings else "faster"
     logged = [
         NextStep(
             what=f"log {joined(dict.fromkeys(signal for each in slow for signal in each.log.split(', ')))} {how}",

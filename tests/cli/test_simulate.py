@@ -95,13 +95,15 @@ def test_a_flight_says_what_its_autopilot_followed(fly, short):
     np.testing.assert_allclose(attitude[:, 2], plan["attitude"][:, 2], atol=1e-6)
 
 
-def test_effects_are_recorded_with_their_values(fly):
+def test_effects_are_recorded_with_their_values(fly, cpfls):
     path, said = fly("--effect", "com_offset=0.01,-0.02", "--effect", "torque_bias.M_z=0.05", "--json")
     names, values = read(path, "effects/name", "effects/value")
     expected = {"com_offset.c_x": 0.01, "com_offset.c_y": -0.02, "com_offset.c_z": 0.0}
     expected |= {"torque_bias.M_x": 0.0, "torque_bias.M_y": 0.0, "torque_bias.M_z": 0.05}
     assert dict(zip(names.astype(str), values, strict=True)) == expected
     assert json.loads(said)["effects"] == expected
+    shown = "effects: com_offset.c_x = 0.01, com_offset.c_y = -0.02, torque_bias.M_z = 0.05\n"
+    assert shown in cpfls.done("info", path).stdout
 
 
 def test_effect_without_values_is_named_alone(fly):
