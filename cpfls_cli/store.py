@@ -261,9 +261,8 @@ def examine(path: Path, kind: type[T], rows: int | None = None) -> tuple[T, Orig
     with opened_file(path) as file, patient(path):
         wanted, held = kind.FORMAT, held_format(path, file)  # type: ignore[attr-defined]
         if held != wanted:
-            name = wanted.removeprefix("cpfls/")
-            made = f"made by `cpfls {MAKERS.get(name, name)}`"
-            raise InputError(f"{path}: is a {held}; this command needs a {wanted} ({made})")
+            made = MAKERS.get(wanted.removeprefix("cpfls/"), wanted.removeprefix("cpfls/"))
+            raise InputError(f"{path}: is a {held}; this command needs a {wanted} (made by `cpfls {made}`)")
         origin, missing = identified(path, file)[1], list[str]()
         given = _read(kind, file, missing, rows)
     if missing:

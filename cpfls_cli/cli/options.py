@@ -8,6 +8,7 @@ import functools
 import inspect
 import re
 import shlex
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -196,51 +197,35 @@ def check_order(command: str, arguments: Mapping[str, Any], output: Path | None)
             refuse_misplaced_log(path)
 
 
-WORKFLOWS: tuple[tuple[str, tuple[str, ...]], ...] = (
-    ("I have one log", ("cpfls look log.bbl -o look", "cpfls tune log.bbl -o gains")),
-    (
-        "I have logs and want a model",
-        (
-            "cpfls init logs/* --mass 1.2 --arm 0.16 -o study.yaml",
-            "cpfls vehicle study.yaml logs/* --held-out today.csv -o vehicle.h5",
-        ),
-    ),
-    (
-        "My simulator differs from flight",
-        (
-            "cpfls gap uav.sdf logs/* -o gap",
-            "cpfls gap study.yaml logs/* -o gap",
-            "cpfls simulate study.yaml today.csv --autopilot px4 -o twin.h5",
-            "cpfls report study.yaml twin.h5 -o twin.html",
-        ),
-    ),
-    (
-        "Something changed",
-        ("cpfls changed study.yaml today.csv --reference logs/* -o changed", "cpfls trend study.yaml logs -o trend"),
-    ),
-    (
-        "I want gains",
-        (
-            "cpfls vehicle study.yaml logs/* --held-out today.csv -o vehicle.h5",
-            "cpfls tune study.yaml vehicle.h5 --autopilot px4 -o gains.h5",
-        ),
-    ),
-    (
-        "I want to plan a flight",
-        (
-            "cpfls trajectory study.yaml --hover 30 --excite roll,pitch -o path.h5",
-            "cpfls simulate study.yaml path.h5 --autopilot px4 -o flight.h5",
-        ),
-    ),
-    ("I want the paper", ("make quick", "make reproduce")),
-)
-"""What to type for what: the first screen of ``cpfls --help`` and of README.md."""
+_SHEET = """\
+I have one log
+  cpfls look log.bbl -o look
+  cpfls tune log.bbl -o gains
+I have logs and want a model
+  cpfls init logs/* --mass 1.2 --arm 0.16 -o study.yaml
+  cpfls vehicle study.yaml logs/* --held-out today.csv -o vehicle.h5
+My simulator differs from flight
+  cpfls gap uav.sdf logs/* -o gap
+  cpfls gap study.yaml logs/* -o gap
+  cpfls simulate study.yaml today.csv --autopilot px4 -o twin.h5
+  cpfls report study.yaml twin.h5 -o twin.html
+Something changed
+  cpfls changed study.yaml today.csv --reference logs/* -o changed
+  cpfls trend study.yaml logs -o trend
+I want gains
+  cpfls vehicle study.yaml logs/* --held-out today.csv -o vehicle.h5
+  cpfls tune study.yaml vehicle.h5 --autopilot px4 -o gains.h5
+I want to plan a flight
+  cpfls trajectory study.yaml --hover 30 --excite roll,pitch -o path.h5
+  cpfls simulate study.yaml path.h5 --autopilot px4 -o flight.h5
+I want the paper
+  make quick
+  make reproduce"""
 
 
 def sheet(indent: str = "") -> str:
-    """Write all of it, each command on a line of its own."""
-    lines = [line for title, commands in WORKFLOWS for line in (title, *(f"  {command}" for command in commands))]
-    return "\n".join(indent + line for line in lines)
+    """Write what to type for what: the first screen of ``cpfls --help`` and of README.md."""
+    return textwrap.indent(_SHEET, indent)
 
 
 _CONFIGS = (".yaml", ".yml")
