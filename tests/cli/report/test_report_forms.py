@@ -47,7 +47,7 @@ def blocks(page, kind):
 
 def test_the_suffix_chooses_the_form_and_the_option_has_the_last_word(report):
     assert report("a.html", little=True)[0].startswith("<!DOCTYPE html>")
-    assert report("a.txt", little=True)[0].startswith("<!DOCTYPE html>")
+    assert report("a.txt", "--format", "md", little=True)[0].startswith("# ")
     assert report("a.md", little=True)[0].startswith("# ")
     assert report("a.MD", "--format", "json", little=True)[0].startswith("{")
     assert report("a.json", "--format", "html", little=True)[0].startswith("<!DOCTYPE html>")
