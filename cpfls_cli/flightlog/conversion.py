@@ -115,7 +115,7 @@ def as_mapped(values: Array, columns: ColumnMap) -> Array:
 
 def _require_present(columns: Mapping[str, Array], settings: ImportSettings) -> None:
     if not settings.signals:
-        raise InputError("import.signals: no signal is mapped to columns of the log")
+        raise InputError("import.signals: no signal is mapped to columns of the log; `cpfls init LOG` finds them")
     wanted = [("import.time_column", str(settings.time_column), "")]
     for name, signal in settings.signals.items():
         tried = ", nor all columns of any entry of otherwise" if signal.otherwise else ""

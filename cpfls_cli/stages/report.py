@@ -33,7 +33,7 @@ _FORMS = {".html": Form.HTML, ".htm": Form.HTML, ".md": Form.MARKDOWN, ".markdow
 @stage(dict, study=True, words=WORDS)
 def report(run: Run, artifacts: ArtifactsArgument, form: FormOption = None) -> dict[str, Any] | None:
     """Write a report about artifacts."""
-    form = form or _FORMS.get(run.output.suffix.lower())
+    form = form or _FORMS.get(run.output.suffix.lower() or ".html")
     if form is None:
         raise InputError(f"{run.output}: its suffix names no form: {joined(list(_FORMS), 'or')}; else give --format")
     inputs = run.take({str(path): path for path in artifacts})

@@ -166,7 +166,8 @@ def trend(
     run.files = {role: inputs[role] for role in numbers}
     run.exit_code = exit_code(found.verdict)
     run.also["new"] = new
-    run.last_words = f"; {new} of {len(numbers)} flights were new, the others kept."
+    kept_before = ", the others kept" if new < len(numbers) else ""
+    run.last_words = f"; {new} of {len(numbers)} flights were new{kept_before}."
     _go_on(run, found, {numbers[role].name: path for role, path in kept.items() if role in numbers})
     return found
 

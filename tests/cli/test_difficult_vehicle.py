@@ -28,7 +28,7 @@ from tests.builders.vehicles import OPEN_FACTORS
 ROOT = Path(__file__).parents[2]
 HEADLINE = (
     "FORECAST NOT JUDGED; VEHICLE NOT JUDGED: THE FLIGHTS SHOW THE LOOP: no flight was held out to judge its forecast; "
-    "its constants are those of vehicle and autopilot together; 1 of 2 numbers are not determined."
+    "its constants are those of vehicle and autopilot together; 1 of 2 numbers is not determined."
 )
 HEAVY = "too heavy for 0.8 kg between these rotors (Ixx 0.05 where"
 ROTATION = ("--set", "trajectory.path=full-rotation")

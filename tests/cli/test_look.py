@@ -235,7 +235,7 @@ def test_margins_are_judged_by_their_intervals():
     assert looked(10.0, 15.0, 20.0) == "# Flies, but margins of roll are small {warning}"
     assert looked(20.0, 28.0, 40.0) == "# Flies; margins of roll may be small {unsure}"
     assert looked(35.0, 40.0, 45.0) == "# Flies; good, as far as this log shows: margins of roll {good}"
-    assert looked(25.0, 40.0, 45.0).startswith("# Flies; whether rotors")
+    assert looked(25.0, 40.0, 45.0).startswith("# Flies; this log does not show whether rotors")
 
 
 def test_a_headline_says_when_before_what():

@@ -165,7 +165,7 @@ def test_people_read_what_was_flown(cpfls, config, path, vehicle, tmp_path):
     top = ("--mode", "closed-loop", "--effect", "torque_bias.M_z=0.01")
     result = cpfls.done("simulate", config, path, "--model", vehicle, *top, "-o", tmp_path / "f.h5")
     assert "effects, those of the model among them: linear_damping.d_x = " in result.stdout
-    assert "torque_bias.M_x = 0, torque_bias.M_y = 0, torque_bias.M_z = 0.01" in result.stdout
+    assert "torque_bias.M_z = 0.01" in result.stdout
     assert "with vehicle.h5" in result.stdout
 
 

@@ -75,7 +75,7 @@ def test_what_is_impossible_takes_nothing_from_what_is_possible(monkeypatch):
     known = flights(DRAG, force=True)
     step = SimpleNamespace(floor=best_floor(system(known, [])))
     offered = [replace(CATALOGUE["rotor_drag"], coefficients=(narrow,)), CATALOGUE["flapping_moment"]]
-    monkeypatch.setattr(diagnose, "considered", lambda _: offered)
+    monkeypatch.setattr(diagnose, "considered", lambda *_: offered)
     # As where other effects, which go afterwards, held it within its bounds while it was chosen.
     monkeypatch.setattr(diagnose, "forward_selection", lambda _, effects, *__: ([Candidate(effects[0], {})], [step]))
     effects, _, found, (refusal,) = diagnose._searched(known, SETTINGS, np.random.default_rng(0), lambda *_: None)
