@@ -73,7 +73,7 @@ def test_what_is_said_of_it(cpfls, vehicle, tmp_path):
     assert effects == "Effects: linear rotational damping, quadratic rotational damping."
     assert learned == "Learned, without a name: torque x, torque z, force z over the direction of the airflow."
     assert judged == (
-        "NOT JUDGED: no flight was held out to judge its forecast; its constants are identified; 1 of 2 numbers are "
+        "NOT JUDGED: no flight was held out to judge its forecast; its constants are identified; 1 of 2 numbers is "
         "not determined."
     )
     assert whole_of_it == "JAX holds all of it."
