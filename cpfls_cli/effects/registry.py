@@ -30,7 +30,7 @@ THRUST_CURVE: Effect = next(known for known in CATALOGUE.values() if known.tried
 
 @lru_cache(maxsize=256)
 def acting(name: str, vehicle: VehicleSettings) -> Effect:
-    """Give an effect with the numbers that act on a vehicle: what may be left out is of six rotors and more."""
+    """Give an effect with the coefficients that act on a vehicle: optional ones need six rotors or more."""
     known = CATALOGUE[name]
     fewer = min(len(known.coefficients), len(known.numbers) - known.optional)
     return known if len(vehicle.rotors) >= 6 else known.form(fewer, ())

@@ -211,9 +211,9 @@ def _derived(signals: Imported) -> dict[str, Array]:
     steep = np.flatnonzero(np.abs(signals.attitude[:, 1]) > stretches.STEEPEST_PITCH)
     if len(steep):
         raise ComputationError(
-            f"pitch comes within a degree of +-90 degrees at {signals.time[steep[0]]:.3f} s of the flight, where"
-            " Euler rates are not defined: cut that part off with import.crop_s, or set import.gap_rule to"
-            " longest-part; a spike is interpolated with import.spike_deviations"
+            f"{stretches.VERTICAL.format(signals.time[steep[0]], ' of the flight')}: cut that part off with"
+            " import.crop_s, or set import.gap_rule to longest-part; a spike is interpolated with"
+            " import.spike_deviations"
         )
     attitude_rate = rotations.attitude_rate(signals.attitude, body_rate)
     derived |= {"attitude_rate": attitude_rate, "attitude_acceleration": derivative(signals.time, attitude_rate)}

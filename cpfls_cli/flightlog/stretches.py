@@ -39,7 +39,8 @@ _NEVER_SATURATED = {"quaternion", "voltage"}
 # A quarter turn, and a margin for noise and filters.
 _LARGEST_PITCH = pi / 2 + 0.05
 STEEPEST_PITCH = pi / 2 - pi / 180
-"""Beyond it Euler rates are not to be had, rad."""
+"""Pitch beyond which Euler rates are not used, rad."""
+VERTICAL: Final = "pitch comes within a degree of +-90 degrees at {:.3f} s{}, where Euler rates are not defined"
 _FULL_TURN = 7.0  # Somewhat more than a full turn, rad.
 _ANGLE_QUANTILE = 0.99
 
@@ -295,7 +296,7 @@ def refuse_steep_pitch(signals: Mapping[str, Array]) -> None:
 
 
 def near_vertical(table: SignalTable, settings: ImportSettings) -> tuple[Array, list[str]]:
-    """Mark with NaN, shape (time, 1), what is near a vertical nose, where it is to be a gap; and say when that is."""
+    """Mark rows near a vertical pitch with NaN, shape (time, 1), where they are to be a gap; and compose a warning."""
     attitude, quaternion = table.signals.get("attitude"), table.signals.get("quaternion")
     pitch = np.zeros(len(table.time)) if attitude is None else np.nan_to_num(attitude[:, 1])
     if attitude is None and quaternion is not None:
@@ -309,8 +310,8 @@ def near_vertical(table: SignalTable, settings: ImportSettings) -> tuple[Array, 
     # What is beyond a quarter turn is an angle in another unit; a nose that is always up leaves nothing.
     if settings.gap_rule == "stop" or not steep.size or np.abs(pitch).max() > _LARGEST_PITCH or (~near).sum() < 2:
         return np.zeros((len(near), 1)), []
-    said = f"pitch comes within a degree of +-90 degrees at {steep[0]:.3f} s, where Euler rates are not defined"
-    return np.where(near, np.nan, 0.0)[:, None], [f"{said}: {near.sum()} rows around that are a gap"]
+    said = f"{VERTICAL.format(steep[0], '')}: {near.sum()} rows around that are a gap"
+    return np.where(near, np.nan, 0.0)[:, None], [said]
 
 
 def warn_of_angles(signals: Mapping[str, Array]) -> tuple[str, ...]:

@@ -371,9 +371,9 @@ def widened_by_loop(numbers: Sequence[FoundNumber], loop: LoopBounds) -> Iterato
 
 
 def within_samples(numbers: Sequence[FoundNumber], rotors_hz: float) -> Iterator[FoundNumber]:
-    """Call a lag not determined that is shorter than the time between two samples of the rotors, in which they change.
+    """Mark a lag as not determined where it is shorter than the sampling period of the rotors.
 
-    It stands for the time from a change to the sample that shows it.
+    Such a lag may be the time from a change to the sample that shows it.
     """
     for number in numbers:
         shorter = number.name == LAG and number.value * rotors_hz < 1
